@@ -30,6 +30,11 @@ pub enum Error {
         /// What was given.
         name: String,
     },
+    /// No parameter of that name.
+    NoParameter {
+        /// What was given.
+        name: String,
+    },
     /// A formula that cannot be an effect.
     Formula {
         /// Its name.
@@ -115,6 +120,7 @@ impl fmt::Display for Error {
             Self::Effect { name } => {
                 write!(f, "no effect is named '{name}': pendmap effects lists them")
             }
+            Self::NoParameter { name } => write!(f, "the model has no parameter '{name}'"),
             Self::Formula { name, why } => write!(f, "formula '{name}': {why}"),
             Self::Twice { name, other } => {
                 write!(f, "{name} and {other} are the same effect: one of them must be left out")

@@ -40,9 +40,9 @@ class Pendmap:
         """Choose the steps a forcing period (2 pi where p = 0) and the threads."""
         self.case, self.steps, self.threads = case, steps, threads
         pendulum = importlib.import_module("pendmap").Pendulum
-        self.parameters = pendulum(
+        self.pendulum = pendulum(
             gamma=case.gamma, p=case.p, omega=case.omega, torque=torque, theta_r=theta_r
-        ).parameters
+        )
 
     @property
     def setting(self) -> str:
@@ -52,7 +52,7 @@ class Pendmap:
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return wrapped angle and velocity, shape (N,), after whole forcing periods."""
         theta, velocity, _ = _core().advance(
-            self.parameters, theta, velocity, periods, self.steps, self.threads
+            self.pendulum, theta, velocity, periods, self.steps, self.threads
         )
         return theta, velocity
 

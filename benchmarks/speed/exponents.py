@@ -56,7 +56,7 @@ class Pendmap(ours.Pendmap):
         """Return the finite-time exponents, shape (N,)."""
         core = importlib.import_module("pendmap._core")
         growth: Floats = core.growth(
-            self.parameters, theta, velocity, 1, periods, self.steps, self.threads
+            self.pendulum, theta, velocity, 1, periods, self.steps, self.threads
         )
         return growth[:, 0] / (periods * self.case.period)
 

@@ -1,11 +1,30 @@
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypedDict
+from typing import Any, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pendmap.model import Pendulum
+from pendmap.model.effects import FormulaKey
+
 __all__ = [
+    "Attractor",
+    "BasinMap",
+    "Bifurcation",
+    "CriticalAmplitudes",
     "Diverged",
+    "Ensemble",
+    "Fit",
+    "FitPoint",
+    "FittedRun",
+    "Followed",
+    "Lyapunov",
+    "Orbit",
+    "OrbitSearch",
+    "ParameterMap",
+    "Texture",
+    "Trajectory",
+    "WindowRows",
     "__version__",
     "acceleration",
     "advance",
@@ -41,26 +60,13 @@ class Diverged(ValueError): ...  # noqa: N818
 
 __version__: str
 
-_FormulaParameter: TypeAlias = tuple[
-    str, float, int | None, str, tuple[float, float], tuple[float, float], str, str | None
-]
-_Formula: TypeAlias = tuple[str, str, str, Sequence[_FormulaParameter]]
-_Parameters: TypeAlias = tuple[
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    float,
-    Sequence[tuple[str | _Formula, Sequence[float]]],
-]
 _Axis: TypeAlias = tuple[float, float, int]
-_Range: TypeAlias = tuple[int, Sequence[float]]
+_Range: TypeAlias = tuple[str, Sequence[float]]
 _Floats: TypeAlias = NDArray[np.float64]
+_Places: TypeAlias = NDArray[np.int32]
 _Progress: TypeAlias = Callable[[int, int], object]
 
-_Free: TypeAlias = tuple[Sequence[tuple[int, int]], float]
+_Free: TypeAlias = tuple[Sequence[tuple[int, str]], float]
 _Window: TypeAlias = tuple[int, int, int, float, float]
 
 class _Choices(TypedDict):
@@ -78,18 +84,195 @@ class _ExponentChoices(TypedDict):
     threads: int
     seed: int
 
+_Pair: TypeAlias = tuple[float, float]
+
+class Attractor:
+    name: str
+    kind: str
+    n: int | None
+    w: int | None
+    points: list[_Pair]
+    multipliers: list[_Pair]
+    exponent: float
+    exponent_stderr: float
+    period: float | None
+    twin: int | None
+    fraction: float
+
+@final
+class Orbit(Attractor):
+    residual: float
+    stable: bool
+
+@final
+class OrbitSearch:
+    orbits: list[Orbit]
+    begun: int
+    friction: bool
+
+@final
+class Texture:
+    basin_entropy: float
+    boundary_basin_entropy: float
+    boundary_stderr: float
+    boxes: int
+    boundary_boxes: int
+    neighbours_agree: float
+    chance: float
+
+@final
+class BasinMap:
+    attractors: list[Attractor]
+    undecided: float
+    failed: float
+    mean_periods: float
+    plane: str
+    chaos_bound: int
+    searched_starts: int
+    layer_periods: int
+    bound: int
+    steps_per_period: int
+    reached_error: float
+    simd: str
+    texture: Texture
+    uncertainty_eps: _Floats
+    uncertain: NDArray[np.uint64]
+    uncertainty_tried: NDArray[np.uint64]
+    unreliable: float
+    unreliable_half_step: float
+    unreliable_mirror: float | None
+    labels_sampled: int
+    label: NDArray[np.int16]
+    settle: NDArray[np.int32]
+    turns: NDArray[np.int32]
+    finite_time_exponent: NDArray[np.float32] | None
+
+@final
+class Trajectory:
+    time: _Floats
+    theta: _Floats
+    velocity: _Floats
+    reached_error: float
+    end_error: float
+    steps_per_period: int
+    exponent: _Pair | None
+    stuck: bool
+    interrupted: bool
+    event_time: _Floats
+    event_theta: _Floats
+    event_kind: list[str]
+
+class ParameterMap:
+    cell: _Places
+    kind: list[str]
+    n: _Places
+    w: _Places
+    theta: _Floats
+    velocity: _Floats
+    exponent: _Floats
+    exponent_stderr: _Floats
+    share: _Floats
+    undecided: _Floats
+    failed: _Floats
+    chaos_periods: NDArray[np.uint32]
+    reached_error: float
+    searched_again: int
+    simd: str
+
+@final
+class Followed:
+    on: _Places
+    value: _Places
+    theta: _Floats
+    velocity: _Floats
+
+@final
+class Bifurcation(ParameterMap):
+    point_entry: _Places
+    point_theta: _Floats
+    point_velocity: _Floats
+    up: Followed
+    down: Followed
+
+@final
+class Lyapunov:
+    end: str
+    attractor: Attractor | None
+    transient: int | None
+    lost: int
+    course: _Floats
+    bound: int
+    chaos_bound: int
+    steps_per_period: int
+    reached_error: float
+    simd: str
+    window: int
+    ensemble: Ensemble | None
+
+@final
+class Ensemble:
+    growth: _Floats
+    dropped: int
+    exponent: _Pair
+    sum: _Pair
+
+@final
+class CriticalAmplitudes:
+    rest: bool
+    p: list[float]
+    multiplier: list[float]
+    stable: list[bool]
+    moved: bool
+    fold: tuple[float, float, float] | None
+    @staticmethod
+    def no_rest() -> CriticalAmplitudes: ...
+
+class FitPoint:
+    values: _Floats
+    chi2: float
+    samples: int
+    degrees: int
+    information: _Floats
+    pull: _Floats
+    windows: list[_Window]
+    runs: list[FittedRun]
+
+@final
+class Fit(FitPoint):
+    covariance: _Floats
+    intervals: list[_Pair]
+    widening: float
+    steps: int
+    stages: int
+    converged: bool
+    given_up: bool
+
+@final
+class FittedRun:
+    theta: _Floats
+    velocity: _Floats
+    residual: _Floats
+    white: _Floats
+
+@final
+class WindowRows:
+    free: list[int]
+    rows: _Floats
+    residuals: _Floats
+    weights: _Floats
+
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
 def reckon(what: str, count: int, each: int) -> None: ...
 def default_threads() -> int: ...
 def roles() -> list[str]: ...
 def effects() -> list[dict[str, Any]]: ...
-def formula(given: _Formula) -> tuple[dict[str, Any], bool]: ...
-def period(parameters: _Parameters) -> float: ...
-def counts_turns(parameters: _Parameters) -> bool: ...
-def bounds(parameters: _Parameters) -> tuple[int, int, int]: ...
+def formula(given: FormulaKey) -> tuple[dict[str, Any], bool]: ...
+def period(model: Pendulum) -> float: ...
+def counts_turns(model: Pendulum) -> bool: ...
+def bounds(model: Pendulum) -> tuple[int, int, int]: ...
 def advance(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     periods: int,
@@ -98,46 +281,44 @@ def advance(
     progress: _Progress | None = None,
 ) -> tuple[_Floats, _Floats, NDArray[np.int64]]: ...
 def choose_steps(
-    parameters: _Parameters, theta: _Floats, velocity: _Floats, tol: float
+    model: Pendulum, theta: _Floats, velocity: _Floats, tol: float
 ) -> tuple[int, float]: ...
-def acceleration(
-    parameters: _Parameters, tau: _Floats, theta: _Floats, velocity: _Floats
-) -> _Floats: ...
+def acceleration(model: Pendulum, tau: _Floats, theta: _Floats, velocity: _Floats) -> _Floats: ...
 def simulate(
-    parameters: _Parameters,
+    model: Pendulum,
     start: tuple[float, float],
     until: float,
     tol: float,
     samples: int,
     lyapunov: bool,
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
-) -> dict[str, Any]: ...
+) -> Trajectory: ...
 def basins_grid(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Axis,
     velocity: _Axis,
     choices: _Choices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> BasinMap: ...
 def basins_list(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     choices: _Choices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
-def texture(labels: NDArray[np.int16], columns: int) -> dict[str, Any]: ...
+) -> BasinMap: ...
+def texture(labels: NDArray[np.int16], columns: int) -> Texture: ...
 def orbits(
-    parameters: _Parameters,
+    model: Pendulum,
     winding: tuple[int, int],
     theta: _Axis,
     velocity: _Axis,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
-def parameter_names(parameters: _Parameters) -> list[str]: ...
+) -> OrbitSearch: ...
+def parameter_names(model: Pendulum) -> list[str]: ...
 def parameter_map(
-    parameters: _Parameters,
+    model: Pendulum,
     axes: tuple[_Range, _Range],
     theta: _Floats,
     velocity: _Floats,
@@ -146,9 +327,9 @@ def parameter_map(
     bound: int | None,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> ParameterMap: ...
 def bifurcation(
-    parameters: _Parameters,
+    model: Pendulum,
     axis: _Range,
     theta: _Floats,
     velocity: _Floats,
@@ -158,15 +339,15 @@ def bifurcation(
     bound: int | None,
     threads: int,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> Bifurcation: ...
 def lyapunov(
-    parameters: _Parameters,
+    model: Pendulum,
     start: tuple[float, float],
     choices: _ExponentChoices,
     progress: _Progress | None = None,
-) -> dict[str, Any]: ...
+) -> Lyapunov: ...
 def growth(
-    parameters: _Parameters,
+    model: Pendulum,
     theta: _Floats,
     velocity: _Floats,
     windows: int,
@@ -176,32 +357,32 @@ def growth(
     progress: _Progress | None = None,
 ) -> _Floats: ...
 def tongues(
-    parameters: _Parameters,
+    model: Pendulum,
     inverted: bool,
     omegas: Sequence[float],
     p_max: float,
     folds: bool,
     threads: int,
     progress: _Progress | None = None,
-) -> list[dict[str, Any]] | None: ...
+) -> list[CriticalAmplitudes]: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     choices: dict[str, Any],
     windows: Sequence[_Window] | None = None,
-) -> dict[str, Any]: ...
+) -> Fit: ...
 def fit_equations(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     tolerance: float,
     windows: Sequence[_Window],
-) -> dict[str, Any]: ...
+) -> FitPoint: ...
 def fit_rows(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],
     tolerance: float,
     windows: Sequence[_Window],
-) -> list[tuple[list[int], _Floats, _Floats, _Floats]]: ...
+) -> list[WindowRows]: ...
 def replay(
     run: dict[str, Any],
     theta: _Floats,

@@ -143,6 +143,15 @@ impl Pendulum {
         all
     }
 
+    /// The place of a parameter in [`Pendulum::parameters`], the first of that name.
+    ///
+    /// # Errors
+    /// [`Error::NoParameter`] if it has none of that name.
+    pub fn place(&self, name: &str) -> Result<usize, Error> {
+        let place = self.parameters().iter().position(|(known, _)| known == name);
+        place.ok_or_else(|| Error::NoParameter { name: name.to_owned() })
+    }
+
     /// Sets the parameter of that place in [`Pendulum::parameters`], without a check: a fit passes
     /// through values that no pendulum has.
     ///

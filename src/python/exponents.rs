@@ -1,17 +1,17 @@
 //! Bindings of Lyapunov exponents.
 
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
+use numpy::{PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
-use super::convert::attractor_dict;
+use super::convert::{Array, Attractor, array};
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, pendulum};
+use crate::attractor::Attractor as Found;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::lanes::Path;
 use crate::maps::control::pool;
-use crate::maps::ensemble::WINDOW;
+use crate::maps::ensemble::{self, WINDOW};
 use crate::maps::growth::Bundle;
 use crate::maps::lyapunov::{End, Request, lyapunov as exponent_of};
 use crate::memory;
@@ -27,57 +27,105 @@ pub struct ExponentChoices {
     seed: u64,
 }
 
+/// The largest Lyapunov exponent of a start.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Lyapunov {
+    /// `captured`, `chaotic`, `undamped`, `undecided` or `failed`.
+    end: &'static str,
+    attractor: Option<Py<Attractor>>,
+    /// Periods until the attractor captured the start.
+    transient: Option<u32>,
+    /// Trajectories of the ensemble that an attractor captured.
+    lost: usize,
+    /// Logarithm of the growth of the start's own tangent in each period.
+    course: Array<f64>,
+    bound: u32,
+    chaos_bound: u32,
+    steps_per_period: usize,
+    reached_error: f64,
+    simd: &'static str,
+    /// Periods of a window.
+    window: usize,
+    ensemble: Option<Py<Ensemble>>,
+}
+
+/// Many trajectories of a chaotic attractor, or of undamped motion.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Ensemble {
+    /// Logarithms of the growth of tangents, by trajectory and window.
+    growth: Py<PyArray2<f64>>,
+    /// Periods before the first window.
+    dropped: u32,
+    /// The exponent and its standard error.
+    exponent: (f64, f64),
+    /// The sum of both exponents and its standard error.
+    sum: (f64, f64),
+}
+
+impl Ensemble {
+    fn new(py: Python<'_>, found: &ensemble::Ensemble) -> PyResult<Self> {
+        Ok(Self {
+            growth: PyArray2::from_vec2(py, &found.growth)?.unbind(),
+            dropped: found.dropped,
+            exponent: (found.exponent, found.stderr),
+            sum: found.sum,
+        })
+    }
+}
+
 /// The largest exponent of the attractor that a start reaches.
 #[pyfunction]
-#[pyo3(signature = (parameters, start, choices, progress=None))]
-pub fn lyapunov<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
+#[pyo3(signature = (model, start, choices, progress=None))]
+pub fn lyapunov(
+    py: Python<'_>,
+    model: Model,
     start: (f64, f64),
     choices: ExponentChoices,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+) -> PyResult<Lyapunov> {
+    let pendulum = model.pendulum()?;
     let ExponentChoices { precision, tol, max_periods, threads, seed } = choices;
     let start = [start.0, start.1];
     let request = Request { start, precision, tol, max_periods, threads, seed };
     let found =
         watched(py, progress.as_ref(), |control| exponent_of(&pendulum, &request, control))?;
-    let dict = PyDict::new(py);
-    let end = match found.end {
-        End::Captured => "captured",
-        End::Chaotic => "chaotic",
-        End::Undamped => "undamped",
-        End::Undecided => "undecided",
-        End::Failed => "failed",
-    };
-    dict.set_item("end", end)?;
-    let attractor = found.attractor.map(|a| attractor_dict(py, &a, f64::NAN)).transpose()?;
-    dict.set_item("attractor", attractor)?;
-    dict.set_item("transient", found.transient)?;
-    dict.set_item("lost", found.lost)?;
-    dict.set_item("course", found.course.into_pyarray(py))?;
-    dict.set_item("bound", found.bound)?;
-    dict.set_item("chaos_bound", found.chaos_bound)?;
-    dict.set_item("steps_per_period", found.steps)?;
-    dict.set_item("reached_error", found.reached_error)?;
-    dict.set_item("simd", found.path.name())?;
-    dict.set_item("window", WINDOW)?;
-    let ensemble = found.ensemble.as_ref();
-    dict.set_item("growth", ensemble.map(|e| PyArray2::from_vec2(py, &e.growth)).transpose()?)?;
-    dict.set_item("dropped", ensemble.map(|e| e.dropped))?;
-    dict.set_item("exponent", ensemble.map(|e| (e.exponent, e.stderr)))?;
-    dict.set_item("sum", ensemble.map(|e| e.sum))?;
-    Ok(dict)
+    let ensemble = found.ensemble;
+    let mut attractor = found.attractor;
+    if let (Some(attractor), Some(ensemble), End::Chaotic) = (&mut attractor, &ensemble, found.end)
+    {
+        (attractor.exponent, attractor.exponent_stderr) = (ensemble.exponent, ensemble.stderr);
+    }
+    let attractor = attractor.map(|a| Attractor::new(&Found { twin: None, ..a }, f64::NAN));
+    let ensemble = ensemble.map(|e| Py::new(py, Ensemble::new(py, &e)?)).transpose()?;
+    Ok(Lyapunov {
+        end: match found.end {
+            End::Captured => "captured",
+            End::Chaotic => "chaotic",
+            End::Undamped => "undamped",
+            End::Undecided => "undecided",
+            End::Failed => "failed",
+        },
+        attractor: attractor.map(|a| Py::new(py, a)).transpose()?,
+        transient: found.transient,
+        lost: found.lost,
+        course: array(py, found.course),
+        bound: found.bound,
+        chaos_bound: found.chaos_bound,
+        steps_per_period: found.steps,
+        reached_error: found.reached_error,
+        simd: found.path.name(),
+        window: WINDOW,
+        ensemble,
+    })
 }
 
 /// Logarithms of the growth of a tangent along each start, `windows` times over `window` periods.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, windows, window, steps_per_period, threads, progress=None))]
+#[pyo3(signature = (model, theta, velocity, windows, window, steps_per_period, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn growth<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     windows: usize,
@@ -86,7 +134,7 @@ pub fn growth<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     pendulum.check_mappable()?;
     if steps_per_period == 0 {
         let allowed = "1 or more";

@@ -6,10 +6,10 @@ use nalgebra::DMatrix;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 
+use super::convert::{Array, array};
+use super::model::Model;
 use super::watch::pooled;
-use super::{Parameters, pendulum};
 use crate::error::Error;
 use crate::fit::descent::Point;
 use crate::fit::normal::linearised;
@@ -27,9 +27,9 @@ const EACH_READING: usize = 40;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
-/// `([(record, place), ...], start)`: which place in the list of parameters it is in which records,
-/// -1 for gravity, -2 and -3 for bias and tilt of a sensor on the rod; where the search starts.
-type FreeTuple = (Vec<(usize, isize)>, f64);
+/// `([(record, name), ...], start)`: the name of the number in each of its records, a parameter of the
+/// pendulum, `gravity`, or `bias` or `tilt` of a sensor on the rod; where the search starts.
+type FreeTuple = (Vec<(usize, String)>, f64);
 
 /// `(record, first sample, one after the last, angle, velocity)`.
 type WindowTuple = (usize, usize, usize, f64, f64);
@@ -76,7 +76,7 @@ pub struct Sensor<'py> {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Run<'py> {
-    parameters: Parameters,
+    model: Model,
     time: Floats<'py>,
     reading: Floats<'py>,
     weight: Floats<'py>,
@@ -103,7 +103,7 @@ impl Run<'_> {
         let weights = self.weight.as_slice()?.to_vec();
         let counts = self.count.map(|step| Counts::new(step, &weights)).transpose()?;
         Ok(Record {
-            pendulum: pendulum(self.parameters)?,
+            pendulum: self.model.pendulum()?,
             recorded: recorded.map(Arc::new),
             times: self.time.as_slice()?.to_vec(),
             readings: self.reading.as_slice()?.to_vec(),
@@ -133,17 +133,23 @@ pub struct FitChoices {
 }
 
 fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<Problem> {
-    let records = runs.into_iter().map(Run::record).collect::<PyResult<_>>()?;
-    let place = |index: isize| match index {
-        -2 => Slot::Bias,
-        -3 => Slot::Tilt,
-        other => usize::try_from(other).map_or(Slot::Gravity, Slot::Parameter),
+    let records = runs.into_iter().map(Run::record).collect::<PyResult<Vec<_>>>()?;
+    let slot = |(record, name): &(usize, String)| {
+        let pendulum = records.get(*record).map(|record| &record.pendulum);
+        let slot = match (name.as_str(), pendulum) {
+            ("bias", _) => Slot::Bias,
+            ("tilt", _) => Slot::Tilt,
+            (name, Some(pendulum)) if name != "gravity" => Slot::Parameter(pendulum.place(name)?),
+            _ => Slot::Gravity,
+        };
+        Ok((*record, slot))
     };
     let free = free.iter().map(|(places, start)| {
-        let places = places.iter().map(|(record, index)| (*record, place(*index))).collect();
-        Free { places, start: *start }
+        let places = places.iter().map(slot).collect::<Result<_, Error>>()?;
+        Ok(Free { places, start: *start })
     });
-    Ok(Problem::new(records, free.collect(), tolerance)?)
+    let free = free.collect::<Result<_, Error>>()?;
+    Ok(Problem::new(records, free, tolerance)?)
 }
 
 fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> {
@@ -160,16 +166,102 @@ fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> 
     given.into_iter().map(window).collect()
 }
 
+/// The equations at some values of the free parameters.
+#[pyclass(frozen, get_all, subclass, module = "pendmap._core")]
+pub struct FitPoint {
+    values: Array<f64>,
+    chi2: f64,
+    samples: usize,
+    degrees: usize,
+    /// Half the curvature of the sum of squares by the free parameters, the states following ...
+    information: Py<PyArray2<f64>>,
+    /// ... and half its slope.
+    pull: Array<f64>,
+    windows: Vec<WindowTuple>,
+    runs: Vec<Py<FittedRun>>,
+}
+
+/// The best values of the free parameters.
+#[pyclass(frozen, get_all, extends = FitPoint, module = "pendmap._core")]
+pub struct Fit {
+    covariance: Py<PyArray2<f64>>,
+    /// Of the profiled parameters.
+    intervals: Vec<(f64, f64)>,
+    widening: f64,
+    steps: usize,
+    stages: usize,
+    converged: bool,
+    given_up: bool,
+}
+
+/// The model at each sample of a record; no numbers where there is no window.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct FittedRun {
+    theta: Array<f64>,
+    velocity: Array<f64>,
+    residual: Array<f64>,
+    /// The residual over its standard error.
+    white: Array<f64>,
+}
+
+/// The derivatives in one window.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct WindowRows {
+    /// The free parameters of its record.
+    free: Vec<usize>,
+    /// Of each sample the derivatives of the model, times its weight, by these parameters and by the
+    /// initial angle and velocity.
+    rows: Py<PyArray2<f64>>,
+    residuals: Array<f64>,
+    weights: Array<f64>,
+}
+
+impl FitPoint {
+    fn new(py: Python<'_>, problem: &Problem, at: &Point) -> PyResult<Self> {
+        let (information, pull) = at.normal.reduced(0.0);
+        let window = |w: &Window| (w.record, w.from, w.to, w.start[0], w.start[1]);
+        let runs =
+            (0..problem.records.len()).map(|k| Py::new(py, FittedRun::new(py, problem, at, k)));
+        Ok(Self {
+            values: array(py, at.values.clone()),
+            chi2: at.normal.chi2,
+            samples: problem.samples(),
+            degrees: at.degrees(problem),
+            information: matrix(py, &information)?,
+            pull: array(py, pull.as_slice().to_vec()),
+            windows: at.windows.iter().map(window).collect(),
+            runs: runs.collect::<PyResult<_>>()?,
+        })
+    }
+}
+
+impl FittedRun {
+    fn new(py: Python<'_>, problem: &Problem, at: &Point, record: usize) -> Self {
+        let mut curve = [(); 4].map(|()| vec![f64::NAN; problem.records[record].times.len()]);
+        for (place, window) in at.windows.iter().enumerate().filter(|(_, w)| w.record == record) {
+            let (apart, white) = (&at.normal.apart[place], &at.normal.white[place]);
+            for (k, state) in at.normal.states[place].iter().enumerate() {
+                let values = [state[0], state[1], apart[k], white[k]];
+                for (column, value) in curve.iter_mut().zip(values) {
+                    column[window.from + k] = value;
+                }
+            }
+        }
+        let [theta, velocity, residual, white] = curve.map(|column| array(py, column));
+        Self { theta, velocity, residual, white }
+    }
+}
+
 /// The best values of the free parameters, and what follows from them.
 #[pyfunction]
 #[pyo3(signature = (runs, free, choices, windows=None))]
-pub fn fit_runs<'py>(
-    py: Python<'py>,
-    runs: Vec<Run<'py>>,
+pub fn fit_runs(
+    py: Python<'_>,
+    runs: Vec<Run<'_>>,
     free: Vec<FreeTuple>,
     choices: FitChoices,
     windows: Option<Vec<WindowTuple>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Py<Fit>> {
     let problem = problem(runs, &free, choices.tolerance)?;
     let given = windows.map(|given| self::windows(given, &problem)).transpose()?;
     let FitChoices { shortest, growth, steps, gain, hold, target, .. } = choices;
@@ -180,57 +272,57 @@ pub fn fit_runs<'py>(
         let ends = intervals(&problem, &found.point, &choices.profiled, level, control.flag())?;
         Ok((found, ends))
     })?;
-    let dict = point(py, &problem, &found.point)?;
-    dict.set_item("covariance", matrix(py, &found.point.normal.covariance())?)?;
-    dict.set_item("intervals", ends.iter().map(|[a, b]| (*a, *b)).collect::<Vec<_>>())?;
-    dict.set_item("widening", found.widening(&problem, choices.doubt))?;
-    dict.set_item("steps", found.steps)?;
-    dict.set_item("stages", found.stages)?;
-    dict.set_item("converged", found.converged)?;
-    dict.set_item("given_up", found.given_up)?;
-    Ok(dict)
+    let own = Fit {
+        covariance: matrix(py, &found.point.normal.covariance())?,
+        intervals: ends.iter().map(|[a, b]| (*a, *b)).collect(),
+        widening: found.widening(&problem, choices.doubt),
+        steps: found.steps,
+        stages: found.stages,
+        converged: found.converged,
+        given_up: found.given_up,
+    };
+    Py::new(py, (own, FitPoint::new(py, &problem, &found.point)?))
 }
 
 /// The equations at the starts of the free parameters and of the windows, without a step.
 #[pyfunction]
-pub fn fit_equations<'py>(
-    py: Python<'py>,
-    runs: Vec<Run<'py>>,
+pub fn fit_equations(
+    py: Python<'_>,
+    runs: Vec<Run<'_>>,
     free: Vec<FreeTuple>,
     tolerance: f64,
     windows: Vec<WindowTuple>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<FitPoint> {
     let problem = problem(runs, &free, tolerance)?;
     let windows = self::windows(windows, &problem)?;
     let at = pooled(py, 0, None, |_| Point::new(&problem, problem.start(), windows))?;
-    point(py, &problem, &at)
+    FitPoint::new(py, &problem, &at)
 }
 
-/// The derivatives behind the equations, window by window: `(free parameters, rows, residuals,
-/// weights)`, a row for each sample with the derivatives of the model, times its weight, by these
-/// parameters and by the initial angle and velocity.
+/// The derivatives behind the equations, window by window.
 #[pyfunction]
-pub fn fit_rows<'py>(
-    py: Python<'py>,
-    runs: Vec<Run<'py>>,
+pub fn fit_rows(
+    py: Python<'_>,
+    runs: Vec<Run<'_>>,
     free: Vec<FreeTuple>,
     tolerance: f64,
     windows: Vec<WindowTuple>,
-) -> PyResult<Bound<'py, PyList>> {
+) -> PyResult<Vec<WindowRows>> {
     let problem = problem(runs, &free, tolerance)?;
     let windows = self::windows(windows, &problem)?;
     let all = pooled(py, 0, None, |_| {
         linearised(&problem, &problem.start(), &windows).ok_or(Error::Diverges)
     })?;
-    let list = PyList::empty(py);
-    for (linear, window) in all.into_iter().zip(&windows) {
-        let places: Vec<usize> = problem.columns(window.record).places().collect();
+    let each = all.into_iter().zip(&windows).map(|(linear, window)| {
         let rows = linear.rows.into_pyarray(py).reshape([linear.residuals.len(), linear.width])?;
-        let arrays = [linear.residuals, linear.weights].map(|values| values.into_pyarray(py));
-        let [residuals, weights] = arrays;
-        list.append((places, rows, residuals, weights))?;
-    }
-    Ok(list)
+        Ok(WindowRows {
+            free: problem.columns(window.record).places().collect(),
+            rows: rows.unbind(),
+            residuals: array(py, linear.residuals),
+            weights: array(py, linear.weights),
+        })
+    });
+    each.collect()
 }
 
 /// What a record's sensor of the angle would have read at `times` from each start, all at the first of
@@ -266,41 +358,7 @@ pub fn replay<'py>(
     flat.into_pyarray(py).reshape([starts.len(), times.len()])
 }
 
-fn point<'py>(py: Python<'py>, problem: &Problem, at: &Point) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    let (information, pull) = at.normal.reduced(0.0);
-    dict.set_item("values", at.values.clone().into_pyarray(py))?;
-    dict.set_item("chi2", at.normal.chi2)?;
-    dict.set_item("samples", problem.samples())?;
-    dict.set_item("degrees", at.degrees(problem))?;
-    dict.set_item("information", matrix(py, &information)?)?;
-    dict.set_item("pull", pull.as_slice().to_vec().into_pyarray(py))?;
-    let window = |w: &Window| (w.record, w.from, w.to, w.start[0], w.start[1]);
-    dict.set_item("windows", at.windows.iter().map(window).collect::<Vec<_>>())?;
-    let runs = PyList::empty(py);
-    for (index, record) in problem.records.iter().enumerate() {
-        // Where no window is, nothing is known.
-        let mut curve = [(); 4].map(|()| vec![f64::NAN; record.times.len()]);
-        for (place, window) in at.windows.iter().enumerate().filter(|(_, w)| w.record == index) {
-            let (apart, white) = (&at.normal.apart[place], &at.normal.white[place]);
-            for (k, state) in at.normal.states[place].iter().enumerate() {
-                let values = [state[0], state[1], apart[k], white[k]];
-                for (column, value) in curve.iter_mut().zip(values) {
-                    column[window.from + k] = value;
-                }
-            }
-        }
-        let run = PyDict::new(py);
-        for (name, column) in ["theta", "velocity", "residual", "white"].into_iter().zip(curve) {
-            run.set_item(name, column.into_pyarray(py))?;
-        }
-        runs.append(run)?;
-    }
-    dict.set_item("runs", runs)?;
-    Ok(dict)
-}
-
-fn matrix<'py>(py: Python<'py>, matrix: &DMatrix<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn matrix(py: Python<'_>, matrix: &DMatrix<f64>) -> PyResult<Py<PyArray2<f64>>> {
     let rows: Vec<Vec<f64>> = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
-    Ok(PyArray2::from_vec2(py, &rows)?)
+    Ok(PyArray2::from_vec2(py, &rows)?.unbind())
 }

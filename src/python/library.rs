@@ -1,67 +1,91 @@
 //! The library of effects, as Python sees it.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 
-use super::{FormulaTuple, formula_of};
+use super::model::GivenFormula;
 use crate::model::Kind;
-use crate::model::effects::{Power, Role};
+use crate::model::effects::{Definition as Of, Parameter as OfParameter, Power, Role};
 
-/// Name, group, family, formula, parameters and the rest of every effect.
-#[pyfunction]
-pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
-    let list = PyList::empty(py);
-    for &kind in Kind::ALL {
-        list.append(entry(py, kind)?)?;
-    }
-    Ok(list)
+/// An effect, as a dictionary.
+#[derive(IntoPyObject)]
+pub struct Definition {
+    name: &'static str,
+    group: &'static str,
+    family: &'static str,
+    formula: &'static str,
+    revealed_by: &'static str,
+    mappable: &'static str,
+    parameters: Vec<Parameter>,
 }
 
-/// The words for what a parameter may do.
+/// A parameter of an effect, as a dictionary.
+#[derive(IntoPyObject)]
+struct Parameter {
+    name: &'static str,
+    role: &'static str,
+    unit: &'static str,
+    power_of_w0: Number,
+    /// The parameter whose value is subtracted from the power.
+    power_of_w0_less: Option<&'static str>,
+    range: [f64; 2],
+    typical: [f64; 2],
+    meaning: &'static str,
+}
+
+/// A whole number, or any.
+#[derive(IntoPyObject)]
+enum Number {
+    Whole(i32),
+    Real(f64),
+}
+
+impl From<&'static Of> for Definition {
+    fn from(own: &'static Of) -> Self {
+        let parameter = |parameter: &OfParameter| {
+            let (power_of_w0, less) = match parameter.power {
+                Power::Of(power) => (Number::Whole(power), None),
+                Power::Real(power) => (Number::Real(power), None),
+                Power::TwoMinus(place) => (Number::Whole(2), Some(own.parameters[place].name)),
+            };
+            Parameter {
+                name: parameter.name,
+                role: parameter.role.words(),
+                unit: parameter.unit,
+                power_of_w0,
+                power_of_w0_less: less,
+                range: parameter.range,
+                typical: parameter.typical,
+                meaning: parameter.meaning,
+            }
+        };
+        Self {
+            name: own.name,
+            group: own.group.word(),
+            family: own.family.words(),
+            formula: own.formula,
+            revealed_by: own.revealed_by,
+            mappable: own.mappable.word(),
+            parameters: own.parameters.iter().map(parameter).collect(),
+        }
+    }
+}
+
+/// The definitions of all effects.
+#[pyfunction]
+pub fn effects() -> Vec<Definition> {
+    Kind::ALL.iter().map(|kind| kind.definition().into()).collect()
+}
+
+/// The roles that a parameter may have.
 #[pyfunction]
 pub fn roles() -> Vec<&'static str> {
     Role::ALL.into_iter().map(Role::words).collect()
 }
 
-/// The same of a user's own effect, which is checked; and whether it is proportional to its first
+/// The definition of a formula, which is checked; and whether it is proportional to its first
 /// parameter.
 #[pyfunction]
-pub fn formula(py: Python<'_>, given: FormulaTuple) -> PyResult<(Bound<'_, PyDict>, bool)> {
-    let formula = formula_of(given)?;
-    Ok((entry(py, Kind::Formula(formula))?, formula.is_proportional()))
-}
-
-fn entry(py: Python<'_>, kind: Kind) -> PyResult<Bound<'_, PyDict>> {
-    let definition = kind.definition();
-    let dict = PyDict::new(py);
-    dict.set_item("name", definition.name)?;
-    dict.set_item("group", definition.group.word())?;
-    dict.set_item("family", kind.family().words())?;
-    dict.set_item("formula", definition.formula)?;
-    dict.set_item("revealed_by", definition.revealed_by)?;
-    dict.set_item("mappable", definition.mappable.word())?;
-    let parameters = PyList::empty(py);
-    for parameter in definition.parameters {
-        let entry = PyDict::new(py);
-        entry.set_item("name", parameter.name)?;
-        entry.set_item("role", parameter.role.words())?;
-        entry.set_item("unit", parameter.unit)?;
-        // w0 to this power, or to 2 less the value of the parameter of that name.
-        let mut exponent = None;
-        match parameter.power {
-            Power::Of(power) => entry.set_item("power_of_w0", power)?,
-            Power::Real(power) => entry.set_item("power_of_w0", power)?,
-            Power::TwoMinus(index) => {
-                exponent = Some(definition.parameters[index].name);
-                entry.set_item("power_of_w0", 2)?;
-            }
-        }
-        entry.set_item("power_of_w0_less", exponent)?;
-        entry.set_item("range", parameter.range)?;
-        entry.set_item("typical", parameter.typical)?;
-        entry.set_item("meaning", parameter.meaning)?;
-        parameters.append(entry)?;
-    }
-    dict.set_item("parameters", parameters)?;
-    Ok(dict)
+pub fn formula(given: GivenFormula) -> PyResult<(Definition, bool)> {
+    let formula = given.formula()?;
+    Ok((formula.definition().into(), formula.is_proportional()))
 }

@@ -2,15 +2,16 @@
 
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use super::convert::{Array, Attractor, array};
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, convert, pendulum};
 use crate::error::Error;
-use crate::maps::basins::{Options, basins};
+use crate::maps::basins::{BasinMap as Found, Options, Plane, basins};
 use crate::maps::control::pool;
 use crate::maps::starts::{Axis, Starts};
-use crate::maps::texture::of_cells;
+use crate::maps::texture::{Texture as Entropies, of_cells};
+use crate::maps::uncertainty::Uncertainty;
 use crate::memory;
 
 /// `(low, high, count)` as Python hands it over.
@@ -35,33 +36,129 @@ impl From<Choices> for Options {
     }
 }
 
+/// Entropies of a plane of labels, and how often neighbours agree.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Texture {
+    basin_entropy: f64,
+    boundary_basin_entropy: f64,
+    boundary_stderr: f64,
+    boxes: usize,
+    boundary_boxes: usize,
+    neighbours_agree: f64,
+    /// How often neighbours would agree by chance.
+    chance: f64,
+}
+
+impl Texture {
+    fn new(found: &Entropies) -> Self {
+        Self {
+            basin_entropy: found.basin_entropy,
+            boundary_basin_entropy: found.boundary_basin_entropy,
+            boundary_stderr: found.boundary_stderr,
+            boxes: found.boxes,
+            boundary_boxes: found.boundary_boxes,
+            neighbours_agree: found.neighbours_agree,
+            chance: found.chance,
+        }
+    }
+}
+
+/// Basins of attraction; arrays have one entry for each start.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct BasinMap {
+    attractors: Vec<Py<Attractor>>,
+    /// Shares of the starts that are undecided, and that failed.
+    undecided: f64,
+    failed: f64,
+    mean_periods: f64,
+    /// `basins`, `conservative` or `only_chaos`.
+    plane: &'static str,
+    chaos_bound: u32,
+    searched_starts: usize,
+    layer_periods: u32,
+    bound: u32,
+    steps_per_period: usize,
+    reached_error: f64,
+    simd: &'static str,
+    texture: Py<Texture>,
+    uncertainty_eps: Array<f64>,
+    uncertain: Array<u64>,
+    uncertainty_tried: Array<u64>,
+    unreliable: f64,
+    unreliable_half_step: f64,
+    unreliable_mirror: Option<f64>,
+    labels_sampled: usize,
+    label: Array<i16>,
+    settle: Array<i32>,
+    turns: Array<i32>,
+    finite_time_exponent: Option<Array<f32>>,
+}
+
+impl BasinMap {
+    fn new(py: Python<'_>, map: Found) -> PyResult<Self> {
+        let each = map.attractors.iter().zip(&map.fractions);
+        let attractors = each.map(|(one, fraction)| Py::new(py, Attractor::new(one, *fraction)));
+        let Uncertainty { eps, uncertain, tried } = map.uncertainty.clone().unwrap_or_default();
+        Ok(Self {
+            attractors: attractors.collect::<PyResult<_>>()?,
+            undecided: if map.plane == Plane::Conservative { 1.0 } else { map.share(0) },
+            failed: map.share(-1),
+            mean_periods: map.mean_periods(),
+            plane: match map.plane {
+                Plane::Basins => "basins",
+                Plane::Conservative => "conservative",
+                Plane::OnlyChaos => "only_chaos",
+            },
+            chaos_bound: map.chaos_bound,
+            searched_starts: map.searched,
+            layer_periods: map.layer_periods,
+            bound: map.bound,
+            steps_per_period: map.steps,
+            reached_error: map.reached_error,
+            simd: map.path.name(),
+            texture: Py::new(py, Texture::new(&map.texture))?,
+            uncertainty_eps: array(py, eps),
+            uncertain: array(py, uncertain),
+            uncertainty_tried: array(py, tried),
+            unreliable: map.reliability.either,
+            unreliable_half_step: map.reliability.half_step,
+            unreliable_mirror: map.reliability.mirror,
+            labels_sampled: map.reliability.sampled,
+            label: array(py, map.labels.label),
+            settle: array(py, map.labels.settle),
+            turns: array(py, map.labels.turns),
+            finite_time_exponent: map.layers.map(|layers| array(py, layers.exponent)),
+        })
+    }
+}
+
 /// Basins over a grid.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
-pub fn basins_grid<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
+#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
+pub fn basins_grid(
+    py: Python<'_>,
+    model: Model,
     theta: AxisTuple,
     velocity: AxisTuple,
     choices: Choices,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<BasinMap> {
     let theta = Axis::new("theta", theta.0, theta.1, theta.2)?;
     let velocity = Axis::new("velocity", velocity.0, velocity.1, velocity.2)?;
-    run(py, parameters, Starts::Grid { theta, velocity }, choices, progress)
+    run(py, model, Starts::Grid { theta, velocity }, choices, progress)
 }
 
 /// Basins of a list of starts.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, choices, progress=None))]
-pub fn basins_list<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
-    theta: PyReadonlyArray1<'py, f64>,
-    velocity: PyReadonlyArray1<'py, f64>,
+#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
+pub fn basins_list(
+    py: Python<'_>,
+    model: Model,
+    theta: PyReadonlyArray1<'_, f64>,
+    velocity: PyReadonlyArray1<'_, f64>,
     choices: Choices,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<BasinMap> {
     let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
     if theta.len() != velocity.len() {
         let given = (theta.len(), velocity.len());
@@ -74,33 +171,31 @@ pub fn basins_list<'py>(
     // Angle and velocity, and all that a map and its dataset have of a start.
     memory::reckon("starts", theta.len(), 100)?;
     let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
-    run(py, parameters, Starts::List(states), choices, progress)
+    run(py, model, Starts::List(states), choices, progress)
 }
 
-/// Texture of labels in rows of so many columns.
+/// The texture of labels in rows of `columns` cells.
 #[pyfunction]
-pub fn texture<'py>(
-    py: Python<'py>,
-    labels: PyReadonlyArray1<'py, i16>,
+pub fn texture(
+    py: Python<'_>,
+    labels: PyReadonlyArray1<'_, i16>,
     columns: usize,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Texture> {
     let cells = labels.as_slice()?.to_vec();
     let found = watched(py, None, |_| Ok(of_cells(&cells, columns, &pool(0)?)))?;
-    let dict = PyDict::new(py);
-    convert::texture(&dict, &found)?;
-    Ok(dict)
+    Ok(Texture::new(&found))
 }
 
-fn run<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
+fn run(
+    py: Python<'_>,
+    model: Model,
     starts: Starts,
     choices: Choices,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+) -> PyResult<BasinMap> {
+    let pendulum = model.pendulum()?;
     let options = Options::from(choices);
     let map =
         watched(py, progress.as_ref(), |control| basins(&pendulum, &starts, &options, control))?;
-    convert::basin_map(py, map)
+    BasinMap::new(py, map)
 }

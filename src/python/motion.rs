@@ -6,10 +6,11 @@ use std::sync::Mutex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyTuple;
 
+use super::convert::{Array, array};
+use super::model::Model;
 use super::watch::{stopped, watched};
-use super::{Parameters, convert, pendulum};
 use crate::error::Error;
 use crate::integrate::trajectory::{self, Request};
 use crate::integrate::{State, Strobe, accuracy};
@@ -24,12 +25,12 @@ type Advanced<'py> =
 #[pyfunction]
 pub fn acceleration<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     tau: PyReadonlyArray1<'py, f64>,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
     let states = tau.iter().zip(theta).zip(velocity);
     let all: Vec<f64> = states.map(|((t, x), v)| pendulum.acceleration(*t, *x, *v)).collect();
@@ -38,11 +39,11 @@ pub fn acceleration<'py>(
 
 /// Many starts, the same number of forcing periods on.
 #[pyfunction]
-#[pyo3(signature = (parameters, theta, velocity, periods, steps_per_period, threads, progress=None))]
+#[pyo3(signature = (model, theta, velocity, periods, steps_per_period, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn advance<'py>(
     py: Python<'py>,
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     periods: usize,
@@ -50,7 +51,7 @@ pub fn advance<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Advanced<'py>> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     if steps_per_period == 0 {
         let allowed = "1 or more";
         return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
@@ -68,12 +69,12 @@ pub fn advance<'py>(
 /// The fewest steps a period that reach `tol` on these starts, and the error reached.
 #[pyfunction]
 pub fn choose_steps(
-    parameters: Parameters,
+    model: Model,
     theta: PyReadonlyArray1<'_, f64>,
     velocity: PyReadonlyArray1<'_, f64>,
     tol: f64,
 ) -> PyResult<(usize, f64)> {
-    let pendulum = pendulum(parameters)?;
+    let pendulum = model.pendulum()?;
     pendulum.check_mappable()?;
     let states: Vec<State> =
         theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
@@ -81,27 +82,65 @@ pub fn choose_steps(
     Ok((strobe.steps(), error))
 }
 
+/// A trajectory; arrays have one entry for each sample, or for each event.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Trajectory {
+    time: Array<f64>,
+    theta: Array<f64>,
+    velocity: Array<f64>,
+    reached_error: f64,
+    end_error: f64,
+    steps_per_period: usize,
+    /// The exponent and its standard error.
+    exponent: Option<(f64, f64)>,
+    stuck: bool,
+    interrupted: bool,
+    event_time: Array<f64>,
+    event_theta: Array<f64>,
+    event_kind: Vec<&'static str>,
+}
+
+impl Trajectory {
+    fn new(py: Python<'_>, run: trajectory::Trajectory) -> Self {
+        let events = &run.events;
+        Self {
+            event_time: array(py, events.iter().map(|event| event.tau).collect()),
+            event_theta: array(py, events.iter().map(|event| event.theta).collect()),
+            event_kind: events.iter().map(|event| event.kind.words()).collect(),
+            time: array(py, run.time),
+            theta: array(py, run.theta),
+            velocity: array(py, run.velocity),
+            reached_error: run.reached_error,
+            end_error: run.end_error,
+            steps_per_period: run.steps,
+            exponent: run.exponent,
+            stuck: run.stuck,
+            interrupted: run.interrupted,
+        }
+    }
+}
+
 /// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
 /// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
-#[pyo3(signature = (parameters, start, until, tol, samples, lyapunov, live=None))]
+#[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
-pub fn simulate<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
+pub fn simulate(
+    py: Python<'_>,
+    model: Model,
     start: (f64, f64),
     until: f64,
     tol: f64,
     samples: usize,
     lyapunov: bool,
     live: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+) -> PyResult<Trajectory> {
+    let pendulum = model.pendulum()?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
     let Some(live) = live else {
         let run =
             watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
-        return convert::trajectory(py, run);
+        return Ok(Trajectory::new(py, run));
     };
     let seen = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
     let hand_over = |py: Python<'_>| {
@@ -129,5 +168,5 @@ pub fn simulate<'py>(
     }
     let run = result?;
     hand_over(py)?;
-    convert::trajectory(py, run)
+    Ok(Trajectory::new(py, run))
 }

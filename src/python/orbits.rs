@@ -1,30 +1,47 @@
 //! Bindings of closed orbits.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
 
-use super::convert::attractor_dict;
+use super::convert::Attractor;
 use super::maps::AxisTuple;
+use super::model::Model;
 use super::watch::watched;
-use super::{Parameters, pendulum};
-use crate::attractor::Attractor;
+use crate::attractor;
 use crate::attractor::catalogue::arrange;
 use crate::maps::orbits::{Request, orbits as search};
 use crate::maps::starts::Axis;
 
+/// A closed orbit.
+#[pyclass(frozen, get_all, extends = Attractor, module = "pendmap._core")]
+pub struct Orbit {
+    /// How far it is from closing.
+    residual: f64,
+    stable: bool,
+}
+
+/// The closed orbits that a search found.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct OrbitSearch {
+    orbits: Vec<Py<Orbit>>,
+    /// States from which Newton's method began.
+    begun: usize,
+    /// Whether the pendulum has friction.
+    friction: bool,
+}
+
 /// All closed orbits of period `n` and winding `w` in a box, with where the search began.
 #[pyfunction]
-#[pyo3(signature = (parameters, winding, theta, velocity, threads, progress=None))]
-pub fn orbits<'py>(
-    py: Python<'py>,
-    parameters: Parameters,
+#[pyo3(signature = (model, winding, theta, velocity, threads, progress=None))]
+pub fn orbits(
+    py: Python<'_>,
+    model: Model,
     winding: (usize, i64),
     theta: AxisTuple,
     velocity: AxisTuple,
     threads: usize,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let pendulum = pendulum(parameters)?;
+) -> PyResult<OrbitSearch> {
+    let pendulum = model.pendulum()?;
     let request = Request {
         n: winding.0,
         w: winding.1,
@@ -33,23 +50,21 @@ pub fn orbits<'py>(
         threads,
     };
     let found = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
-    let closed = found.closed.iter().map(|orbit| Attractor::periodic(&pendulum, orbit));
-    let all: Vec<Attractor> = closed.chain(found.running.iter().map(Attractor::running)).collect();
+    let closed = found.closed.iter().map(|orbit| attractor::Attractor::periodic(&pendulum, orbit));
+    let all: Vec<attractor::Attractor> =
+        closed.chain(found.running.iter().map(attractor::Attractor::running)).collect();
     let (all, place) = arrange(&pendulum, all);
     let mut residuals = vec![0.0; all.len()];
     for (orbit, at) in found.closed.iter().zip(&place) {
         residuals[*at] = orbit.residual;
     }
-    let listed = PyList::empty(py);
-    for (orbit, residual) in all.iter().zip(residuals) {
-        let dict = attractor_dict(py, orbit, f64::NAN)?;
-        dict.set_item("residual", residual)?;
-        dict.set_item("stable", orbit.is_stable(&pendulum))?;
-        listed.append(dict)?;
-    }
-    let dict = PyDict::new(py);
-    dict.set_item("orbits", listed)?;
-    dict.set_item("begun", found.begun)?;
-    dict.set_item("friction", pendulum.has_friction())?;
-    Ok(dict)
+    let listed = all.iter().zip(residuals).map(|(orbit, residual)| {
+        let own = Orbit { residual, stable: orbit.is_stable(&pendulum) };
+        Py::new(py, (own, Attractor::new(orbit, f64::NAN)))
+    });
+    Ok(OrbitSearch {
+        orbits: listed.collect::<PyResult<_>>()?,
+        begun: found.begun,
+        friction: pendulum.has_friction(),
+    })
 }

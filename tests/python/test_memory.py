@@ -40,7 +40,7 @@ calls = {
     "basins_of": lambda: pendmap.basins_of(pendulum, *np.broadcast_to(0.5, (2, 10**9))),
     "advance": lambda: pendmap.advance(pendulum, *np.broadcast_to(0.5, (2, 10**9)), 1),
     "growth": lambda: _core.growth(
-        pendulum.parameters, np.zeros(10**4), np.zeros(10**4), 10**6, 1, 20, 1
+        pendulum, np.zeros(10**4), np.zeros(10**4), 10**6, 1, 20, 1
     ),
 }
 for name, call in calls.items():

@@ -219,7 +219,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     low, high, count = grid.velocity.as_tuple
     axes = grid.theta.as_tuple, (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.basins_grid(bare.parameters, *axes, choices, progress)
+        raw = _core.basins_grid(bare, *axes, choices, progress)
     dataset = xr.Dataset(
         {
             **_cells(raw, ("velocity", "theta"), (count, grid.theta.count), units),
@@ -282,7 +282,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     angles, speeds = starts(theta, velocity)
     with core_errors():
         raw = _core.basins_list(
-            bare.parameters, angles, units.bare(speeds, VELOCITY), choices, progress
+            bare, angles, units.bare(speeds, VELOCITY), choices, progress
         )
     dataset = xr.Dataset(
         {
@@ -300,38 +300,38 @@ def _choices(numerics: Numerics, layer_periods: int | None, *, check: bool) -> _
 
 
 def _cells(
-    raw: dict[str, Any], dims: tuple[str, ...], shape: tuple[int, ...], units: Units
+    raw: _core.BasinMap, dims: tuple[str, ...], shape: tuple[int, ...], units: Units
 ) -> dict[str, Any]:
     """Return the variables with one value a start, over ``dims`` of ``shape``."""
-    finite_time = _LAYERS[raw["plane"]] == "finite_time"
+    finite_time = _LAYERS[raw.plane] == "finite_time"
     when = "until settled"
     if finite_time:
-        when = f"after {counted(raw['layer_periods'], 'period')}"
-    elif not (raw["settle"] >= 0).any():
-        when = f"after {counted(raw['bound'], 'period')}"
+        when = f"after {counted(raw.layer_periods, 'period')}"
+    elif not (raw.settle >= 0).any():
+        when = f"after {counted(raw.bound, 'period')}"
     cells: dict[str, Any] = {
         "label": variable(
             dims,
-            raw["label"].reshape(shape),
+            raw.label.reshape(shape),
             long_name="attractor",
             comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
         ),
         "settle_periods": variable(
             dims,
-            raw["settle"].reshape(shape),
+            raw.settle.reshape(shape),
             "1",
             "periods until an attractor's trap holds the trajectory",
             "-1 where no attractor captured it",
         ),
         "net_turns": variable(
             dims,
-            raw["turns"].reshape(shape),
+            raw.turns.reshape(shape),
             "1",
             f"net turns {when}",
             "the angle's displacement over 2 pi, rounded",
         ),
     }
-    exponent = raw["finite_time_exponent"]
+    exponent = raw.finite_time_exponent
     if exponent is not None:
         values = units.given(exponent, RATE).reshape(shape)
         name = f"finite-time Lyapunov exponent {when}"
@@ -339,21 +339,21 @@ def _cells(
     return cells
 
 
-def _uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
+def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
     """Return counts of starts whose label changes nearby; none without a boundary."""
-    if not raw["uncertainty_eps"].size:
+    if not raw.uncertainty_eps.size:
         return {}
     what = "distance in sides of the window"
     return {
-        "uncertainty_eps": variable("distance", raw["uncertainty_eps"], "1", what),
+        "uncertainty_eps": variable("distance", raw.uncertainty_eps, "1", what),
         "uncertain": variable(
             "distance",
-            raw["uncertain"].astype(np.int64),
+            raw.uncertain.astype(np.int64),
             long_name="starts with another label at this distance on one side or the other",
         ),
         "uncertainty_tried": variable(
             "distance",
-            raw["uncertainty_tried"].astype(np.int64),
+            raw.uncertainty_tried.astype(np.int64),
             long_name="starts with known ends, drawn anew for each distance; where drawn by "
             "strata, as many drawn evenly as tell the share as precisely",
         ),
@@ -361,11 +361,11 @@ def _uncertain_starts(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _complete(
-    dataset: xr.Dataset, raw: dict[str, Any], model: Pendulum | Rig, numerics: Numerics
+    dataset: xr.Dataset, raw: _core.BasinMap, model: Pendulum | Rig, numerics: Numerics
 ) -> xr.Dataset:
     """Add the table of attractors, all attributes and the summary to the cells."""
-    count, attractors = dataset["label"].size, raw["attractors"]
-    fraction = np.array([a["fraction"] for a in attractors], dtype=float)
+    count, attractors = dataset["label"].size, raw.attractors
+    fraction = np.array([a.fraction for a in attractors], dtype=float)
     stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))
     dataset = dataset.assign(
         {
@@ -373,17 +373,17 @@ def _complete(
             "fraction": ("attractor", fraction),
             "stderr": ("attractor", stderr),
         }
-    ).assign_coords(attractor=("attractor", np.array([a["name"] for a in attractors], dtype=str)))
+    ).assign_coords(attractor=("attractor", np.array([a.name for a in attractors], dtype=str)))
     settle = dataset["settle_periods"].values
     settled = settle[settle >= 0]
     values = {
         **numerics.provenance(),
         **_boundary(dataset, raw),
-        "layers": _LAYERS[raw["plane"]],
+        "layers": _LAYERS[raw.plane],
         "cells": count,
         "mean_settle": float(settled.mean()) if settled.size else -1.0,
         "longest_settle": int(settled.max()) if settled.size else -1,
-        "labels_reliable": int(raw["unreliable"] <= RELIABLE),
+        "labels_reliable": int(raw.unreliable <= RELIABLE),
     }
     SCHEMA.complete(dataset, model, values, raw)
     pendulum, _ = without_dimensions(model)
@@ -392,13 +392,13 @@ def _complete(
     return dataset
 
 
-def _boundary(dataset: xr.Dataset, raw: dict[str, Any]) -> dict[str, float | None]:
+def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
     """Return the measures of a fractal boundary; None or nothing where there is no boundary."""
     found: dict[str, float | None] = {"boundary_basin_entropy": None, "boundary_boxes": None}
-    if raw["boundary_boxes"]:
-        entropy, stderr = raw["boundary_basin_entropy"], raw["boundary_stderr"]
+    if raw.texture.boundary_boxes:
+        entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr
         found["boundary_basin_entropy"] = entropy
-        found["boundary_boxes"] = raw["boundary_boxes"]
+        found["boundary_boxes"] = raw.texture.boundary_boxes
         found["boundary_basin_entropy_stderr"] = stderr if math.isfinite(stderr) else None
         found["log2_criterion"] = int(passes_log2(entropy, stderr))
     law = fitted_map(dataset) if "uncertainty_eps" in dataset else None

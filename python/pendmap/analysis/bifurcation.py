@@ -126,7 +126,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         first = (angle, units.bare(speed, VELOCITY))
     with core_errors():
         raw = _core.bifurcation(
-            pendulum.parameters,
+            pendulum,
             axis.kernel,
             *search.initial(units),
             starts,
@@ -149,20 +149,20 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
+def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     names = [
         kind_of(kind, int(n), int(w))
-        for kind, n, w in zip(raw["kind"], raw["n"], raw["w"], strict=True)
+        for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
     ]
     kinds = sorted(set(names))
     which = np.array([kinds.index(name) for name in names], dtype=np.intp)
     of_entry, members = _linked(raw, axis.values.size)
-    owner = raw["point_entry"]
-    value = axis.values[raw["cell"]] if raw["cell"].size else np.empty(0)
+    owner = raw.point_entry
+    value = axis.values[raw.cell] if raw.cell.size else np.empty(0)
     speed = {"units": units.of_velocity}
     ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
     loose = {
-        key: np.concatenate([raw[f"up_{key}"], raw[f"down_{key}"]])
+        key: np.concatenate([getattr(raw.up, key), getattr(raw.down, key)])
         for key in ("value", "theta", "velocity")
     }
     data: dict[str, Any] = {
@@ -170,21 +170,21 @@ def _dataset(raw: dict[str, Any], axis: Varied, units: Units) -> xr.Dataset:
         "entry_value": ("entry", value, axis.attributes),
         "entry_branch": ("entry", of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
-        "branch_w": ("branch", raw["w"][ends[:, 0]]),
+        "branch_w": ("branch", raw.w[ends[:, 0]]),
         "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
         "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
         "point_entry": ("point", owner),
         "point_value": ("point", value[owner], axis.attributes),
-        "point_theta": ("point", raw["point_theta"], {"units": "rad"}),
-        "point_velocity": ("point", units.given(raw["point_velocity"], VELOCITY), speed),
-        "up": (axis.name, raw["up"], {"comment": "entry, -1: none"}),
-        "down": (axis.name, raw["down"], {"comment": "entry, -1: none"}),
-        "undecided": (axis.name, raw["undecided"]),
-        "failed": (axis.name, raw["failed"]),
-        "chaos_periods": (axis.name, raw["chaos_periods"], {"comment": CHAOS_PERIODS}),
+        "point_theta": ("point", raw.point_theta, {"units": "rad"}),
+        "point_velocity": ("point", units.given(raw.point_velocity, VELOCITY), speed),
+        "up": (axis.name, raw.up.on, {"comment": "entry, -1: none"}),
+        "down": (axis.name, raw.down.on, {"comment": "entry, -1: none"}),
+        "undecided": (axis.name, raw.undecided),
+        "failed": (axis.name, raw.failed),
+        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": CHAOS_PERIODS}),
         "loose_sweep": (
             "loose",
-            np.repeat([1, -1], [raw["up_value"].size, raw["down_value"].size]),
+            np.repeat([1, -1], [raw.up.value.size, raw.down.value.size]),
         ),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
@@ -273,14 +273,14 @@ def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
     return bool(apart.min() < _SAME)
 
 
-def _linked(raw: dict[str, Any], values: int) -> tuple[NDArray[np.int32], list[list[int]]]:
+def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], list[list[int]]]:
     """Return the branch of each entry, and the entries of each branch, value by value."""
-    cell = raw["cell"]
+    cell = raw.cell
     bounds = np.searchsorted(cell, np.arange(values + 1))
-    first = np.searchsorted(raw["point_entry"], np.arange(cell.size + 1))
-    plane = np.stack([raw["point_theta"], raw["point_velocity"]], axis=1)
+    first = np.searchsorted(raw.point_entry, np.arange(cell.size + 1))
+    plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
     key = [
-        (kind, int(n), int(w)) for kind, n, w in zip(raw["kind"], raw["n"], raw["w"], strict=True)
+        (kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
     ]
     of_entry = np.full(cell.size, -1, dtype=np.int32)
     members: list[list[int]] = []

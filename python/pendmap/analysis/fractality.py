@@ -360,11 +360,11 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     cells, _ = numbered(labels)
     found = _core.texture(np.ascontiguousarray(cells).ravel(), cells.shape[1])
     return BasinEntropy(
-        value=found["basin_entropy"],
-        boundary=found["boundary_basin_entropy"],
-        boundary_stderr=found["boundary_stderr"],
-        boxes=found["boxes"],
-        boundary_boxes=found["boundary_boxes"],
+        value=found.basin_entropy,
+        boundary=found.boundary_basin_entropy,
+        boundary_stderr=found.boundary_stderr,
+        boxes=found.boxes,
+        boundary_boxes=found.boundary_boxes,
     )
 
 

@@ -161,24 +161,22 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
-        raw = _core.lyapunov(pendulum.parameters, start, choices, progress)
-    found = raw["attractor"]
+        raw = _core.lyapunov(pendulum, start, choices, progress)
+    found, members = raw.attractor, raw.ensemble
     exponent, stderr = _value(raw)
     regular = _regular(raw, pendulum.period)
     if exponent < _CLEAR * regular:
         stderr = math.nan
-    if found is not None and raw["end"] == "chaotic":
-        found = found | {"exponent": exponent, "exponent_stderr": stderr}
-    attractors = [] if found is None else [found | {"twin": None}]
+    attractors = [] if found is None else [found]
     dataset = xr.Dataset(
         {
             **orbit_table.table(attractors, units, "attractor"),
             **_course(raw),
             **_ensemble(raw, pendulum.period, units),
         },
-        coords={"attractor": ("attractor", np.array([a["name"] for a in attractors], dtype=str))},
+        coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
     )
-    growth = np.empty((0, 0)) if raw["growth"] is None else raw["growth"]
+    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     values = {
         **numerics.provenance(),
         **_second(raw, exponent, pendulum, units),
@@ -190,10 +188,10 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         "regular": units.given(regular, RATE),
         "per_period": exponent * pendulum.period,
         "per_period_stderr": stderr * pendulum.period,
-        "transient_periods": -1 if raw["transient"] is None else raw["transient"],
+        "transient_periods": -1 if raw.transient is None else raw.transient,
         "trajectories": growth.shape[0],
-        "periods": growth.shape[1] * raw["window"],
-        "dropped_periods": raw["dropped"] or 0,
+        "periods": growth.shape[1] * raw.window,
+        "dropped_periods": 0 if members is None else members.dropped,
         "precision": precision,
     }
     SCHEMA.complete(dataset, model, values, raw)
@@ -201,39 +199,37 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _value(raw: dict[str, Any]) -> tuple[float, float]:
+def _value(raw: _core.Lyapunov) -> tuple[float, float]:
     """Return the exponent per unit of tau and its standard error; nan where there is none."""
-    if raw["end"] in {"chaotic", "undamped"}:
-        exponent, stderr = raw["exponent"]
-        return float(exponent), float(stderr)
-    if raw["end"] == "captured":
-        own = raw["attractor"]
-        return float(own["exponent"]), float(own["exponent_stderr"])
+    if raw.attractor is not None:
+        return raw.attractor.exponent, raw.attractor.exponent_stderr
+    if raw.ensemble is not None and raw.end == "undamped":
+        return raw.ensemble.exponent
     return math.nan, math.nan
 
 
-def _regular(raw: dict[str, Any], period: float) -> float:
+def _regular(raw: _core.Lyapunov, period: float) -> float:
     """Return the exponent of regular undamped motion, whose deviations grow as tau; else nan."""
-    if raw["end"] != "undamped":
+    if raw.ensemble is None or raw.end != "undamped":
         return math.nan
-    averaged = float(raw["growth"].shape[1] * raw["window"])
-    return math.log1p(averaged / raw["dropped"]) / (averaged * period)
+    averaged = float(raw.ensemble.growth.shape[1] * raw.window)
+    return math.log1p(averaged / raw.ensemble.dropped) / (averaged * period)
 
 
 def _second(
-    raw: dict[str, Any], exponent: float, pendulum: Pendulum, units: Units
+    raw: _core.Lyapunov, exponent: float, pendulum: Pendulum, units: Units
 ) -> dict[str, Any]:
     """Return the other exponent, the sum of both, and the dimension that they give."""
-    own = raw["attractor"]
-    if raw["end"] in {"chaotic", "undamped"}:
-        total, error = raw["sum"]
+    own = raw.attractor
+    if raw.ensemble is not None and raw.end in {"chaotic", "undamped"}:
+        total, error = raw.ensemble.sum
         total += 0.0  # no minus zero
         second, dimension = total - exponent, math.nan
-        if raw["end"] == "chaotic" and second < 0 < exponent:
+        if raw.end == "chaotic" and second < 0 < exponent:
             dimension = 1 + exponent / abs(second)
-    elif own is not None and len(own["multipliers"]) > 1:
-        sizes = [math.hypot(*pair) for pair in own["multipliers"]]
-        period, error = own["n"] * pendulum.period, 0.0
+    elif own is not None and own.n is not None and len(own.multipliers) > 1:
+        sizes = [math.hypot(*pair) for pair in own.multipliers]
+        period, error = own.n * pendulum.period, 0.0
         second = math.log(sizes[1]) / period if sizes[1] else -math.inf
         total, dimension = exponent + second, 0.0
     else:
@@ -246,8 +242,8 @@ def _second(
     }
 
 
-def _course(raw: dict[str, Any]) -> dict[str, Any]:
-    growth = np.concatenate([[0.0], np.cumsum(raw["course"])])
+def _course(raw: _core.Lyapunov) -> dict[str, Any]:
+    growth = np.concatenate([[0.0], np.cumsum(raw.course)])
     text = "logarithm of the growth of a deviation along the start's own trajectory"
     return {
         "growth": ("elapsed", growth, {"units": "1", "long_name": text}),
@@ -259,11 +255,11 @@ def _course(raw: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _ensemble(raw: dict[str, Any], period: float, units: Units) -> dict[str, Any]:
+def _ensemble(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
     """Return the running mean over all trajectories, and the exponents of all windows."""
-    growth = np.empty((0, 0)) if raw["growth"] is None else raw["growth"]
+    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     count, windows = growth.shape
-    time = raw["window"] * period
+    time = raw.window * period
     averaged = np.arange(1, windows + 1)
     means: Floats = np.cumsum(growth, axis=1) / (averaged * time)
     deviation = means.std(axis=0, ddof=1) if count > 1 else np.zeros(windows)
@@ -273,13 +269,13 @@ def _ensemble(raw: dict[str, Any], period: float, units: Units) -> dict[str, Any
         "finite_time_exponent": (
             ("trajectory", "window"),
             units.given(growth / time, RATE),
-            rate | {"long_name": f"finite-time exponent over {raw['window']} periods"},
+            rate | {"long_name": f"finite-time exponent over {raw.window} periods"},
         ),
         "running_exponent": ("window", units.given(mean, RATE), rate),
         "running_stderr": ("window", units.given(deviation / math.sqrt(max(count, 1)), RATE), rate),
         "averaged": (
             "window",
-            (averaged * raw["window"]).astype(np.int32),
+            (averaged * raw.window).astype(np.int32),
             {"long_name": "periods that each trajectory has been averaged for"},
         ),
     }

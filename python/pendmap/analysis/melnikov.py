@@ -199,7 +199,7 @@ def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
     """Return the power of all that the orbit's own equation lacks: a row for each phase."""
     theta, speed = (np.tile(column, at.size) for column in (orbit.theta, orbit.speed))
     tau = (orbit.time + at[:, None]).ravel()
-    acceleration = _core.acceleration(pendulum.parameters, tau, theta, speed)
+    acceleration = _core.acceleration(pendulum, tau, theta, speed)
     return (speed * (acceleration + np.sin(theta) - orbit.torque)).reshape(at.size, -1)
 
 

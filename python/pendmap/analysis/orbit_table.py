@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+    from pendmap import _core
 
-def table(orbits: Sequence[dict[str, Any]], units: Units, one: str) -> dict[str, Any]:
+
+def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
     """Return orbits as variables over the dimension ``one``, their points over ``point``."""
 
     def column(key: str, none: float) -> list[float]:
-        return [none if a[key] is None else a[key] for a in orbits]
+        return [none if getattr(a, key) is None else getattr(a, key) for a in orbits]
 
     def measured(key: str, power: int) -> NDArray[np.float64]:
         values: NDArray[np.float64] = np.array(column(key, np.nan), dtype=float)
@@ -27,17 +29,17 @@ def table(orbits: Sequence[dict[str, Any]], units: Units, one: str) -> dict[str,
 
     multipliers = np.full((len(orbits), 2, 2), np.nan)
     for pairs, orbit in zip(multipliers, orbits, strict=True):
-        for k, pair in enumerate(orbit["multipliers"]):
+        for k, pair in enumerate(orbit.multipliers):
             pairs[k] = pair
-    closed = [a["points"][0] if a["n"] is not None else (np.nan, np.nan) for a in orbits]
-    points = [(k + 1, *p) for k, a in enumerate(orbits) for p in a["points"]]
+    closed = [a.points[0] if a.n is not None else (np.nan, np.nan) for a in orbits]
+    points = [(k + 1, *p) for k, a in enumerate(orbits) for p in a.points]
     flat = np.array(points, dtype=float).reshape(-1, 3)
     flat[:, 2] = units.given(flat[:, 2], VELOCITY)
     speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
     of_velocity = {"units": units.of_velocity}
     return {
         "id": (one, np.arange(1, len(orbits) + 1, dtype=np.int32)),
-        "kind": (one, np.array([a["kind"] for a in orbits], dtype=str)),
+        "kind": (one, np.array([a.kind for a in orbits], dtype=str)),
         "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
         "w": (one, np.array(column("w", 0), dtype=np.int32)),
         "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),

@@ -155,18 +155,18 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
         raw = _core.orbits(
-            pendulum.parameters, (n, w), grid.theta.as_tuple, box, numerics.workers, progress
+            pendulum, (n, w), grid.theta.as_tuple, box, numerics.workers, progress
         )
-        paths = _paths(pendulum, raw["orbits"], units)
-    found = raw["orbits"]
+        paths = _paths(pendulum, raw.orbits, units)
+    found = raw.orbits
     dataset = xr.Dataset(
         {
             **orbit_table.table(found, units, "orbit"),
-            "stable": ("orbit", np.array([o["stable"] for o in found], dtype=np.int8)),
-            "residual": ("orbit", np.array([o["residual"] for o in found], dtype=float)),
+            "stable": ("orbit", np.array([o.stable for o in found], dtype=np.int8)),
+            "residual": ("orbit", np.array([o.residual for o in found], dtype=float)),
             **paths,
         },
-        coords={"orbit": ("orbit", np.array([o["name"] for o in found], dtype=str))},
+        coords={"orbit": ("orbit", np.array([o.name for o in found], dtype=str))},
     )
     values = {
         **numerics.provenance(),
@@ -175,26 +175,26 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "w": w,
         "cells": grid.cells,
     }
-    SCHEMA.complete(dataset, model, values, {"begun": raw["begun"]})
-    summarised(dataset, _summary(dataset, pendulum, friction=raw["friction"]), model, "orbits are")
+    SCHEMA.complete(dataset, model, values, {"begun": raw.begun})
+    summarised(dataset, _summary(dataset, pendulum, friction=raw.friction), model, "orbits are")
     return dataset
 
 
-def _paths(pendulum: Pendulum, found: list[dict[str, Any]], units: Units) -> dict[str, Any]:
+def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[str, Any]:
     """The motion along each orbit, a piece from each of its points on: errors do not grow."""
     pieces = []
     for number, orbit in enumerate(found, start=1):
-        period = orbit["period"] or pendulum.period
-        length = period / len(orbit["points"])
+        period = orbit.period or pendulum.period
+        length = period / len(orbit.points)
         samples = max(1, round(_SAMPLES * pendulum.period / length))
-        if orbit["kind"] in {"rest", "inverted_rest"}:
+        if orbit.kind in {"rest", "inverted_rest"}:
             continue
-        for k, point in enumerate(orbit["points"]):
+        for k, point in enumerate(orbit.points):
             run = _core.simulate(
-                pendulum.parameters, tuple(point), length, _TOLERANCE, samples, lyapunov=False
+                pendulum, point, length, _TOLERANCE, samples, lyapunov=False
             )
-            own = (np.full(run["time"].size, x, dtype=np.int32) for x in (number, k))
-            pieces.append((*own, run["theta"], units.given(run["velocity"], VELOCITY)))
+            own = (np.full(run.time.size, x, dtype=np.int32) for x in (number, k))
+            pieces.append((*own, run.theta, units.given(run.velocity, VELOCITY)))
     empty = tuple(np.empty(0, dtype=t) for t in (np.int32, np.int32, float, float))
     columns = [np.concatenate(c) for c in zip(*(pieces or [empty]), strict=True)]
     return {

@@ -181,7 +181,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         over = _curves(model, columns, rows, first)
     with core_errors():
         raw = _core.parameter_map(
-            pendulum.parameters,
+            pendulum,
             (columns.kernel, rows.kernel),
             *search.initial(units),
             starts,
@@ -204,15 +204,15 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
+def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
     columns, rows = axes
     shape = (rows.values.size, columns.values.size)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
-    cell, n, w, own = raw["cell"], raw["n"], raw["w"], raw["share"]
+    cell, n, w, own = raw.cell, raw.n, raw.w, raw.share
     names = [
         kind_of(kind, int(period), int(turns))
-        for kind, period, turns in zip(raw["kind"], n, w, strict=True)
+        for kind, period, turns in zip(raw.kind, n, w, strict=True)
     ]
     sets, regime, frequency = regimes(names, cell, cells)
     kinds = sorted({name for one in sets for name in one if name in set(names)})
@@ -221,7 +221,7 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
     which = np.array([place[name] for name in names], dtype=np.intp)
     np.add.at(share, (which, cell), own)
     exponent = np.full(cells, np.nan)
-    np.fmax.at(exponent, cell, raw["exponent"])
+    np.fmax.at(exponent, cell, raw.exponent)
     period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
     # The kind that most starts end on; of equals the one that comes first.
     leading = share[which, cell]
@@ -239,11 +239,11 @@ def _dataset(raw: dict[str, Any], axes: tuple[Varied, Varied], units: Units) -> 
             units.given(exponent, RATE).reshape(shape),
             {"units": units.of_rate},
         ),
-        "undecided": (dims, raw["undecided"].reshape(shape)),
-        "failed": (dims, raw["failed"].reshape(shape)),
+        "undecided": (dims, raw.undecided.reshape(shape)),
+        "failed": (dims, raw.failed.reshape(shape)),
         "chaos_periods": (
             dims,
-            raw["chaos_periods"].reshape(shape),
+            raw.chaos_periods.reshape(shape),
             {"comment": CHAOS_PERIODS},
         ),
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
@@ -305,20 +305,20 @@ def _curves(
     }
 
 
-def entries(raw: dict[str, Any], kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
+def entries(raw: _core.ParameterMap, kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
     """Return all attractors, each with the index of its kind, over ``entry``."""
     rate = {"units": units.of_rate}
     speed = {"units": units.of_velocity}
     return {
-        "entry_cell": ("entry", raw["cell"], {"comment": "of the whole result, row by row"}),
+        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
         "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
-        "entry_n": ("entry", raw["n"], {"comment": "0: no meaning"}),
-        "entry_w": ("entry", raw["w"]),
-        "entry_theta": ("entry", raw["theta"], {"units": "rad"}),
-        "entry_velocity": ("entry", units.given(raw["velocity"], VELOCITY), speed),
-        "entry_exponent": ("entry", units.given(raw["exponent"], RATE), rate),
-        "entry_exponent_stderr": ("entry", units.given(raw["exponent_stderr"], RATE), rate),
-        "entry_share": ("entry", raw["share"]),
+        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
+        "entry_w": ("entry", raw.w),
+        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
+        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
+        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
+        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
+        "entry_share": ("entry", raw.share),
     }
 
 

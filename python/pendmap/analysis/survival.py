@@ -183,7 +183,7 @@ def growth_on_saddle(
     end = np.minimum(end[chosen], _LONGEST)
     speeds = units.bare(found["start_velocity"].values[chosen], VELOCITY)
     growth = _core.growth(
-        pendulum.parameters,
+        pendulum,
         found["start_theta"].values[chosen].copy(),
         np.ascontiguousarray(speeds),
         int(end.max()),

@@ -49,17 +49,17 @@ class Varied:
     """As for :func:`pendmap.parameter_map`."""
     values: NDArray[np.float64]
     """In the parameter's own units."""
-    index: int
-    """Place in the core's list of parameters."""
+    parameter: str
+    """Its name in the core."""
     bare: NDArray[np.float64]
     """The values without dimensions."""
     unit: str
     """Unit of the values; empty where they have none."""
 
     @property
-    def kernel(self) -> tuple[int, list[float]]:
-        """Index and values as the core takes them."""
-        return self.index, self.bare.tolist()
+    def kernel(self) -> tuple[str, list[float]]:
+        """It as the core takes it."""
+        return self.parameter, self.bare.tolist()
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -98,8 +98,7 @@ def varied(
         few = dict(list(example.items())[:count])
         raise InputError(f"what varies must be a mapping like {few}, got {given or 'nothing'}")
     found = tuple(_one(model, name, given) for name, given in ranges.items())
-    places = [one.index for one in found]
-    if len(set(places)) < len(places):
+    if len({one.parameter for one in found}) < len(found):
         raise InputError(
             f"{found[0].name} and {found[1].name} must be two parameters, they are one"
         )
@@ -113,8 +112,7 @@ def varied(
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
     """Return the model in one line, and what varies in it."""
     spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
-    known = _core.parameter_names(without_dimensions(model)[0].parameters)
-    rest = title_without(model, *(known[a.index] for a in axes))
+    rest = title_without(model, *(a.parameter for a in axes))
     return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
 
 
@@ -130,8 +128,7 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
 def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     """Return a line where some of these pendulums have no damping at all, and nothing attracts."""
     pendulum, _ = without_dimensions(model)
-    known = _core.parameter_names(pendulum.parameters)
-    least = {known[axis.index]: float(axis.bare[0]) for axis in axes}
+    least = {axis.parameter: float(axis.bare[0]) for axis in axes}
     if any(effect.brakes for effect in model.effects):
         return []
     if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
@@ -141,7 +138,7 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
-    known = _core.parameter_names(pendulum.parameters)
+    known = _core.parameter_names(pendulum)
     powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
     laboratory = _laboratory(model) if isinstance(model, Rig) else {}
     if units.si:
@@ -179,7 +176,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
     for value in (plain[0], plain[-1]):
         _check(pendulum, bare, float(value), name)
-    return Varied(name, values, known.index(bare), plain, unit)
+    return Varied(name, values, bare, plain, unit)
 
 
 def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
@@ -264,15 +261,15 @@ class CellSearch:
         theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
         return theta, units.bare(velocity, VELOCITY)
 
-    def attributes(self, raw: dict[str, Any], units: Units) -> dict[str, Any]:
+    def attributes(self, raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
         """Return the attributes of the search whose result is ``raw``."""
         return {
             **self.numerics.provenance(),
             **self.within(units).attributes,
             "starts": self.starts,
-            "undecided": float(raw["undecided"].mean()),
-            "chaos_periods": min((int(n) for n in raw["chaos_periods"] if n), default=0),
-            "failed": float(raw["failed"].mean()),
+            "undecided": float(raw.undecided.mean()),
+            "chaos_periods": min((int(n) for n in raw.chaos_periods if n), default=0),
+            "failed": float(raw.failed.mean()),
         }
 
 

@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_Row: TypeAlias = "dict[str, Any]"
+_Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
 """Frequencies and largest amplitude where none are given."""
 MOST_P = 100.0
 """Largest amplitude that may be asked for."""
 _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
-_NO_REST: _Row = {"p": [], "multiplier": [], "stable": [False]}
+_NO_REST = _core.CriticalAmplitudes.no_rest()
 """Result for a rest that is no solution."""
 _TIPS = 8
 """Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping."""
@@ -205,14 +205,14 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     frequencies, looked, (found, undamped, upright) = _solved(
         pendulum, asked, p_max, numerics, inverted=inverted, refine=refine
     )
-    moved = bool(found[0]["moved"])
+    moved = bool(found[0].moved)
     if moved:
         undamped = [_NO_REST] * len(found)
     of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
         **_variables(found, undamped, upright),
         **{
-            f"{table}_omega": (table, np.repeat(frequencies, [len(row["p"]) for row in rows]))
+            f"{table}_omega": (table, np.repeat(frequencies, [len(row.p) for row in rows]))
             for table, rows in (("critical", found), ("undamped", undamped), ("inverted", upright))
         },
         **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
@@ -231,7 +231,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "plane": plane,
         "p_max": p_max,
         "moved": int(moved),
-        "inverted": int(upright[0] is not _NO_REST),
+        "inverted": int(upright[0].rest),
         "own_p": pendulum.p,
         "own_omega": pendulum.omega,
     }
@@ -255,18 +255,17 @@ def _solved(  # noqa: PLR0913 (as for tongues)
 
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
         run = numerics.workers, numerics.progress
-        found = _core.tongues(one.parameters, upright, at.tolist(), p_max, folds, *run)
-        return [_NO_REST] * at.size if found is None else found
+        return _core.tongues(one, upright, at.tolist(), p_max, folds, *run)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
         found = solve(at, pendulum, upright=False, folds=folds)
-        undamped = solve(at, free, upright=False) if free and not found[0]["moved"] else found
+        undamped = solve(at, free, upright=False) if free and not found[0].moved else found
         above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
         return list(zip(found, undamped, above, strict=True))
 
     def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
         # The end of what is looked for bounds the last strip.
-        return [(np.array([*r["p"], p_max]), np.array([*r["multiplier"], 0.0])) for r in rows]
+        return [(np.array([*r.p, p_max]), np.array([*r.multiplier, 0.0])) for r in rows]
 
     looked = np.ones(asked.size, dtype=bool)
     with core_errors():
@@ -292,7 +291,7 @@ def _folds_to_their_ends(
     looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)
-        folded = np.array([found[k]["fold"] is not None for k in places])
+        folded = np.array([found[k].fold is not None for k in places])
         change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
         middles = ((places[:-1] + places[1:]) // 2)[change]
         if not middles.size:
@@ -311,27 +310,27 @@ def _usual(plane: str) -> Floats:
 
 
 def _variables(found: list[_Row], undamped: list[_Row], upright: list[_Row]) -> dict[str, Any]:
-    folds = [row["fold"] or (np.nan, np.nan, np.nan) for row in found]
+    folds = [row.fold or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     variables: dict[str, Any] = {
         **_columns(found, "critical", ""),
         **_columns(undamped, "undamped", "undamped_"),
         **_columns(upright, "inverted", "inverted_"),
-        "stable_at_first": ("omega", np.array([row["stable"][0] for row in found], dtype=np.int8)),
+        "stable_at_first": ("omega", np.array([row.stable[0] for row in found], dtype=np.int8)),
         "fold": ("omega", fold, _OF_P | {"comment": "of the oscillation born at the first loss"}),
         "fold_theta": ("omega", theta, {"units": "rad"}),
         "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
     }
     for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
-        above = [stable for row in rest for stable in row["stable"][1:]]
+        above = [stable for row in rest for stable in row.stable[1:]]
         variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
     return variables
 
 
-def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, Any]:
-    count = [len(row["p"]) for row in found]
-    p = np.array([p for row in found for p in row["p"]], dtype=float)
-    multiplier = np.array([m for row in found for m in row["multiplier"]], dtype=np.int8)
+def _columns(found: list[_Row], one: str, prefix: str) -> dict[str, Any]:
+    count = [len(row.p) for row in found]
+    p = np.array([p for row in found for p in row.p], dtype=float)
+    multiplier = np.array([m for row in found for m in row.multiplier], dtype=np.int8)
     index = np.repeat(np.arange(len(found), dtype=np.int32), count)
     return {
         f"{prefix}index": (one, index, {"comment": "place of its frequency in omega"}),
@@ -341,7 +340,7 @@ def _columns(found: list[dict[str, Any]], one: str, prefix: str) -> dict[str, An
 
 
 def _asymptotic(
-    found: list[dict[str, Any]],
+    found: list[_Row],
     omega: Floats,
     gamma: float,
     p_max: float,
@@ -353,7 +352,7 @@ def _asymptotic(
         p[p > p_max] = np.nan
         error = np.full_like(p, np.nan)
         for k, row in enumerate(found):
-            exact = [q for q, m in zip(row["p"], row["multiplier"], strict=True) if m == multiplier]
+            exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
             if exact and np.isfinite(p[k]):
                 nearest = min(exact, key=lambda q: abs(q - p[k]))
                 error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan

@@ -203,18 +203,18 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         end = units.bare(until, TIME)
         shown = None if live is None else _in_units(live, units)
         raw = _core.simulate(
-            pendulum.parameters, start, end, numerics.tol, samples, lyapunov, shown
+            pendulum, start, end, numerics.tol, samples, lyapunov, shown
         )
-    time, speed = units.given(raw["time"], TIME), units.given(raw["velocity"], VELOCITY)
-    event_time = units.given(raw["event_time"], TIME)
+    time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
+    event_time = units.given(raw.event_time, TIME)
     once = np.arange(0, time.size, samples)
-    if raw["time"][once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
+    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
         once = once[:-1]  # the end, between two samples
-    angle = raw["theta"][once]
+    angle = raw.theta[once]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
     dataset = xr.Dataset(
         {
-            "theta": ("time", raw["theta"], {"units": "rad", "long_name": "angle, not wrapped"}),
+            "theta": ("time", raw.theta, {"units": "rad", "long_name": "angle, not wrapped"}),
             "velocity": (
                 "time",
                 speed,
@@ -222,33 +222,33 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             ),
             "energy": (
                 "time",
-                energy(raw["theta"], speed, model.attributes),
+                energy(raw.theta, speed, model.attributes),
                 {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
             ),
             "section_theta": ("period", wrapped, {"units": "rad"}),
             "section_velocity": ("period", speed[once], {"units": units.of_velocity}),
             "section_time": ("period", time[once], {"units": units.of_time}),
             "event_time": ("event", event_time, {"units": units.of_time}),
-            "event_kind": ("event", np.array(raw["event_kind"], dtype="U14")),
-            "event_theta": ("event", raw["event_theta"], {"units": "rad"}),
+            "event_kind": ("event", np.array(raw.event_kind, dtype="U14")),
+            "event_theta": ("event", raw.event_theta, {"units": "rad"}),
         },
         coords={
             "time": ("time", time, {"units": units.of_time, "long_name": units.clock}),
             "period": ("period", np.arange(wrapped.size)),
         },
     )
-    turns = math.trunc((float(raw["theta"][-1]) - theta) / math.tau)
+    turns = math.trunc((float(raw.theta[-1]) - theta) / math.tau)
     values = {
         **numerics.provenance(),
         **_exponent(raw, time, units),
         "theta0": theta,
         "velocity0": velocity,
-        "until": float(time[-1]) if raw["interrupted"] else until,
+        "until": float(time[-1]) if raw.interrupted else until,
         "turns": turns,
-        "stuck": int(raw["stuck"]),
+        "stuck": int(raw.stuck),
         "lyapunov": int(lyapunov),
     }
-    if raw["interrupted"]:
+    if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
     SCHEMA.complete(dataset, model, values, raw)
     summarised(dataset, [_summary(dataset, units)], model, "angle and velocity here are")
@@ -275,16 +275,16 @@ def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
     return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
 
 
-def _exponent(raw: dict[str, Any], time: Floats, units: Units) -> dict[str, float | None]:
+def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, float | None]:
     """Return the exponent with its standard error, and the times between which it was measured."""
-    if raw["exponent"] is None:
+    if raw.exponent is None:
         return {"exponent": None}
     first = int(_ALIGNMENT * time.size)
     size = max(1, (time.size - first) // _BATCHES)
     last = first + (time.size - first) // size * size - 1
     return {
-        "exponent": units.given(raw["exponent"][0], RATE),
-        "exponent_stderr": units.given(raw["exponent"][1], RATE),
+        "exponent": units.given(raw.exponent[0], RATE),
+        "exponent_stderr": units.given(raw.exponent[1], RATE),
         "exponent_from": float(time[max(first - 1, 0)]),
         "exponent_to": float(time[last]),
     }
@@ -390,9 +390,9 @@ def advance(  # noqa: PLR0913
         if steps is None:
             every = max(1, angles.size // 400)
             sample = angles[::every].copy(), speeds[::every].copy()
-            steps, _ = _core.choose_steps(pendulum.parameters, *sample, numerics.tol)
+            steps, _ = _core.choose_steps(pendulum, *sample, numerics.tol)
         end, speed, turns = _core.advance(
-            pendulum.parameters, angles, speeds, periods, steps, numerics.workers, progress
+            pendulum, angles, speeds, periods, steps, numerics.workers, progress
         )
     return end, units.given(speed, VELOCITY), turns
 

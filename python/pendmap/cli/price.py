@@ -10,7 +10,6 @@ import click
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from pendmap import _core
     from pendmap.model import Pendulum, Rig
 
 _TYPICAL: Final = 20
@@ -28,12 +27,12 @@ def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) 
     from pendmap import _core
     from pendmap.model import without_dimensions
 
-    parameters = without_dimensions(model)[0].parameters
+    pendulum = without_dimensions(model)[0]
     try:
-        bound, _, least = _core.bounds(parameters)
+        bound, _, least = _core.bounds(pendulum)
         if bound == least:
             return
-        speed = _speed(parameters, tol, threads or 0)
+        speed = _speed(pendulum, tol, threads or 0)
     except ValueError:
         return
     typical = bound // _TYPICAL
@@ -46,7 +45,7 @@ def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) 
     )
 
 
-def _speed(parameters: _core._Parameters, tol: float, threads: int) -> float:
+def _speed(pendulum: Pendulum, tol: float, threads: int) -> float:
     """Return the periods of single trajectories that are computed in a second."""
     import numpy as np
 
@@ -54,11 +53,11 @@ def _speed(parameters: _core._Parameters, tol: float, threads: int) -> float:
 
     draw = np.random.default_rng(0)
     theta, velocity = draw.uniform(-np.pi, np.pi, _SAMPLE), draw.uniform(-3.0, 3.0, _SAMPLE)
-    steps, _ = _core.choose_steps(parameters, theta[:100], velocity[:100], tol)
+    steps, _ = _core.choose_steps(pendulum, theta[:100], velocity[:100], tol)
     periods = 4
     while True:
         began = time.perf_counter()
-        _core.advance(parameters, theta, velocity, periods, steps, threads)
+        _core.advance(pendulum, theta, velocity, periods, steps, threads)
         seconds = time.perf_counter() - began
         if seconds > _LEAST_SECONDS:
             return _SAMPLE * periods / seconds

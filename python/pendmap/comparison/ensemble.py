@@ -66,7 +66,7 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
         found = _core.fit_rows(
             given, unknown.start, tolerance_of([run]), bare_windows(first, units)
         )
-    rows = found[0][1][:, -2:]
+    rows = found[0].rows[:, -2:]
     scale = np.array([1.0, float(units.given(1.0, 1))])
     covariance = np.linalg.pinv(rows.T @ rows, hermitian=True) * np.outer(scale, scale)
     _, begin, _, theta, velocity = first[0]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap import _core
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
@@ -141,8 +142,8 @@ def score(
     with core_errors(FitDiverged):
         windows = bare_windows(fit.windows, units)
         at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
-    pull = unknown.columns(at["pull"][None], at["values"])[0]
-    information = unknown.columns(unknown.columns(at["information"], at["values"]).T, at["values"])
+    pull = unknown.columns(at.pull[None], at.values)[0]
+    information = unknown.columns(unknown.columns(at.information, at.values).T, at.values)
     new = np.array([name not in fit.estimates for name in unknown.names])
     old = ~new
     through = information[np.ix_(new, old)] @ np.linalg.pinv(
@@ -170,22 +171,22 @@ def prepared(
 
 
 def _result(
-    found: Mapping[str, Any], model: Rig, unknown: Conversion, chosen: Sequence[int]
+    found: _core.Fit, model: Rig, unknown: Conversion, chosen: Sequence[int]
 ) -> TrajectoryFit:
-    units, bare = unknown.units, found["values"]
+    units, bare = unknown.units, found.values
     values = unknown.given(bare)
-    covariance = unknown.covariance(found["covariance"], bare)
+    covariance = unknown.covariance(found.covariance, bare)
     errors = [math.sqrt(variance) for variance in np.diag(covariance)]
     # Sizes with a free exponent have no profile: their intervals follow from the covariance.
-    wide = math.sqrt(LEVEL * found["widening"])
+    wide = math.sqrt(LEVEL * found.widening)
     intervals = {
         k: interval(float(values[k]), wide * errors[k], mixed=True)
         for k in unknown.mixed
         if k in chosen
     }
     profiled = [k for k in chosen if k not in unknown.mixed]
-    for k, ends in zip(profiled, found["intervals"], strict=True):
-        both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in ends]
+    for k, pair in zip(profiled, found.intervals, strict=True):
+        both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in pair]
         # The unit of a bias may be negative; an end that was not found is NaN.
         low = next((end for end in both if end < values[k]), math.nan)
         high = next((end for end in both if end > values[k]), math.nan)
@@ -201,30 +202,30 @@ def _result(
     except InputError as error:
         raise FitDiverged(f"the fit ends at values that no model may have: {error}") from None
     curves, residuals, squares = [], [], 0.0
-    for curve in found["runs"]:
-        curves.append(np.stack([curve["theta"], units.given(curve["velocity"], 1)]))
-        residuals.append(curve["residual"])
+    for curve in found.runs:
+        curves.append(np.stack([curve.theta, units.given(curve.velocity, 1)]))
+        residuals.append(curve.residual)
         squares += float(np.nansum(residuals[-1] ** 2))
     return TrajectoryFit(
         estimates=estimates,
         ends=ends,
         names=tuple(estimates),
         covariance=covariance,
-        chi2=found["chi2"],
-        samples=found["samples"],
-        degrees=found["degrees"],
-        rms=math.sqrt(squares / max(found["samples"], 1)),
+        chi2=found.chi2,
+        samples=found.samples,
+        degrees=found.degrees,
+        rms=math.sqrt(squares / max(found.samples, 1)),
         model=found_model,
         curves=tuple(curves),
         residuals=tuple(residuals),
-        white=tuple(curve["white"] for curve in found["runs"]),
+        white=tuple(curve.white for curve in found.runs),
         windows=tuple(
-            (r, a, b, theta, float(units.given(v, 1))) for r, a, b, theta, v in found["windows"]
+            (r, a, b, theta, float(units.given(v, 1))) for r, a, b, theta, v in found.windows
         ),
-        steps=found["steps"],
-        converged=found["converged"],
-        given_up=found["given_up"],
-        widening=found["widening"],
+        steps=found.steps,
+        converged=found.converged,
+        given_up=found.given_up,
+        widening=found.widening,
         mixed=tuple(unknown.names[k] for k in unknown.mixed),
     )
 

@@ -1,4 +1,4 @@
-"""Free parameters: their names in SI, their places in the core's list, conversion between both."""
+"""Free parameters: their names in SI and in the core."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-PLACES: Final[Mapping[str, int]] = {
-    "w0": -1,
-    "c_over_m": 0,
-    "Tr": 1,
-    "torque": 2,
-    "p": 3,
-    "Omega": 4,
-    "phi": 5,
+PLACES: Final[Mapping[str, str]] = {
+    "w0": "gravity",
+    "c_over_m": "gamma",
+    "Tr": "theta_r",
+    "torque": "torque",
+    "p": "p",
+    "Omega": "omega",
+    "phi": "phase",
 }
-"""Places in the core's list of parameters; those of effects follow. -1 is gravity."""
+"""Names in the core of a rig's parameters; those of effects have one name in both."""
 
-SENSOR: Final[Mapping[str, int]] = {"bias": -2, "tilt": -3}
-"""Places of a rod sensor's own parameters, run by run: they are always fitted."""
+SENSOR: Final = ("bias", "tilt")
+"""Parameters of a sensor on the rod, run by run: they are always fitted."""
 
 PER_RUN: Final = ("p", "Omega", "phi")
 """Parameters of the drive of one run."""
@@ -48,7 +48,7 @@ class Quantity:
 
     name: str  # in SI
     power: float  # of w0 in the SI value
-    places: list[tuple[int, int]]  # run and place
+    places: list[tuple[int, str]]  # run and place
     start: float
     unit: float = 1.0  # further factor of the SI value
     less: str | None = None  # free parameter whose value is subtracted from the power
@@ -77,7 +77,7 @@ def free_quantities(
 
     def add(
         name: str,
-        places: list[tuple[int, int]],
+        places: list[tuple[int, str]],
         power: float = 0,
         unit: float = 1.0,
         less: str | None = None,
@@ -103,28 +103,23 @@ def free_quantities(
         add("phi" + of_run[k], [(k, PLACES["phi"])])
     sensors = [(k, run.rod_sensor) for k, run in enumerate(runs) if run.rod_sensor is not None]
     for k, sensor in sensors:
-        add("bias" + of_run[k], [(k, SENSOR["bias"])], unit=sensor.unit)
+        add("bias" + of_run[k], [(k, "bias")], unit=sensor.unit)
         if sensor.leans:
-            add("tilt" + of_run[k], [(k, SENSOR["tilt"])])
+            add("tilt" + of_run[k], [(k, "tilt")])
     return quantities
 
 
-def _effect(name: str, rig: Rig) -> tuple[int, Effect, str] | None:
-    """Return an effect's first place, the effect and the parameter, by ``effect.parameter``."""
-    place = len(PLACES) - 1
+def _effect(name: str, rig: Rig) -> tuple[Effect, str] | None:
+    """Return the effect and the parameter of ``effect.parameter``."""
     effect_name, _, parameter = name.rpartition(".")
     for effect in rig.effects:
         if effect.name == effect_name and parameter in effect.parameters:
-            return place, effect, parameter
-        place += len(effect.parameters)
+            return effect, parameter
     return None
 
 
-def _place_of(name: str, rig: Rig) -> int | None:
-    if name in PLACES:
-        return PLACES[name]
-    found = _effect(name, rig)
-    return None if found is None else found[0] + list(found[1].parameters).index(found[2])
+def _place_of(name: str, rig: Rig) -> str | None:
+    return PLACES.get(name, None if _effect(name, rig) is None else name)
 
 
 def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | None]:
@@ -137,7 +132,7 @@ def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | No
     found = _effect(name, rig)
     if found is None:
         raise InputError(f"free has {short_repr(name)}: the model has no such effect")
-    _, effect, parameter = found
+    effect, parameter = found
     entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
     less = entry["power_of_w0_less"]
     if less is None:
@@ -154,7 +149,7 @@ def _value_of(name: str, rig: Rig) -> float:
     if name in PLACES:
         return float(getattr(rig, name))
     found = _effect(name, rig)
-    return math.nan if found is None else found[1].parameters[found[2]]
+    return math.nan if found is None else found[0].parameters[found[1]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,8 +171,8 @@ class Conversion:
         return tuple(q.name for q in self.quantities)
 
     @property
-    def start(self) -> list[tuple[list[tuple[int, int]], float]]:
-        """Place and start of each, as the core takes them."""
+    def start(self) -> list[tuple[list[tuple[int, str]], float]]:
+        """Names and start of each, as the core takes them."""
         starts = [q.start for q in self.quantities]
         scales = self._scales(starts)
         return [

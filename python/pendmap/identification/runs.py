@@ -113,7 +113,7 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     if longest is None:
         longest = FORCED_WINDOW_SWINGS * math.tau / rig.w0 if run.forced else math.inf
     return {
-        "parameters": rig.pendulum.parameters,
+        "model": rig.pendulum,
         "time": units.bare(time, -1),
         "reading": theta,
         "weight": np.ascontiguousarray(weight),

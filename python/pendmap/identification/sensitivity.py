@@ -98,14 +98,14 @@ def window_slopes(
     begin = unknown.start
     with core_errors(FitDiverged):
         found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
-    ends = np.cumsum([len(rows) for _, rows, _, _ in found])
+    ends = np.cumsum([len(one.rows) for one in found])
     bare = np.zeros((int(ends[-1]), len(begin)))
-    for (places, rows, _, _), end in zip(found, ends, strict=True):
-        bare[end - len(rows) : end, places] = rows[:, :-STATE]
+    for one, end in zip(found, ends, strict=True):
+        bare[end - len(one.rows) : end, one.free] = one.rows[:, :-STATE]
     columns = np.split(unknown.columns(bare, [value for _, value in begin]), ends[:-1])
     return unknown.names, [
-        WindowSlopes(*window[:2], own, rows[:, -STATE:], residual, weight)
-        for (_, rows, residual, weight), window, own in zip(
+        WindowSlopes(*window[:2], own, one.rows[:, -STATE:], one.residuals, one.weights)
+        for one, window, own in zip(
             found, fit.windows, columns, strict=True
         )
     ]

@@ -7,7 +7,7 @@ import difflib
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 from pendmap.errors import InputError, check_flag, check_number, short_repr
 
@@ -18,10 +18,27 @@ if TYPE_CHECKING:
 
 _NO_SHAPE: Final = ("size", "phase")
 
-_Bounds = tuple[float, float]
-ParameterKey = tuple[str, float, int | None, str, _Bounds, _Bounds, str, str | None]
-FormulaKey = tuple[str, str, str, tuple[ParameterKey, ...]]
-"""A formula as the kernel takes it: name, term, revealed_by, parameters."""
+
+class ParameterKey(NamedTuple):
+    """A parameter of a formula as the core takes it; ``less`` is a place among the parameters."""
+
+    name: str
+    power: float
+    less: int | None
+    unit: str
+    range: tuple[float, float]
+    typical: tuple[float, float]
+    meaning: str
+    role: str | None
+
+
+class FormulaKey(NamedTuple):
+    """A formula as the core takes it."""
+
+    name: str
+    term: str
+    revealed_by: str
+    parameters: tuple[ParameterKey, ...]
 
 
 class Described(Protocol):
@@ -157,11 +174,6 @@ class Effect:
     def definition(self) -> dict[str, Any]:
         """The definition by the library, or by the formula."""
         return definition(self.name) if self.formula is None else self.formula.entry
-
-    @property
-    def kernel(self) -> tuple[str | FormulaKey, list[float]]:
-        """The arguments of the kernel."""
-        return (self.name if self.formula is None else self.formula.key), self.values
 
     @classmethod
     def blank(cls, name: str, units: Units) -> Effect:

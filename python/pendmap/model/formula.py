@@ -116,10 +116,10 @@ class Formula:
                 f"formula '{self.name}': the name must be another, a pendulum has a parameter of "
                 "that name"
             )
-        key = (self.name, self.term, self.revealed_by, parts)
+        key = FormulaKey(self.name, self.term, self.revealed_by, parts)
         with core_errors():
             entry, proportional = _core.formula(key)
-        kept = {part[0]: _said(part, names) for part in parts}
+        kept = {part.name: _said(part, names) for part in parts}
         found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
         for what, value in found.items():
             object.__setattr__(self, what, value)
@@ -253,7 +253,7 @@ def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
     typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
     allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
     role = None if "role" not in said else _role(name, said["role"], first=name == names[0])
-    return name, power, less, unit, allowed, typical, meaning, role
+    return ParameterKey(name, power, less, unit, allowed, typical, meaning, role)
 
 
 def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
 from pendmap.model.covariance import said_of
-from pendmap.model.effects import Effect, FormulaKey
+from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS
 from pendmap.model.tables import in_file, read_arguments
@@ -18,11 +18,6 @@ from pendmap.units import NONDIMENSIONAL, Units
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
-
-Kernel = tuple[
-    float, float, float, float, float, float, float, list[tuple[str | FormulaKey, list[float]]]
-]
-"""Arguments of the kernel: the six of eqs. 1.2 and 2.1, time in the laboratory, effects."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,13 +121,7 @@ class Pendulum:
         from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
         with core_errors():
-            return _core.period(self.parameters)
-
-    @property
-    def parameters(self) -> Kernel:
-        """The arguments of the kernel."""
-        own = (self.gamma, self.p, self.omega, self.phase, self.torque, self.theta_r)
-        return (*own, self.lab_time, [effect.kernel for effect in self.effects])
+            return _core.period(self)
 
     @property
     def angle_attributes(self) -> dict[str, float | str]:
@@ -146,7 +135,7 @@ class Pendulum:
             return False
         from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
-        return _core.counts_turns(self.parameters)
+        return _core.counts_turns(self)
 
     @property
     def attributes(self) -> dict[str, float | str]:

@@ -7,7 +7,7 @@
 //! is an error of the drive's amplitude.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -17,6 +17,7 @@ impl Law for AddedMass {
     const DEFINITION: Definition = Definition {
         name: "added_mass",
         group: Group::Torque,
+        family: Family::Drive,
         action: Action::Driven,
         formula: "-e a sin(theta), a the pivot's acceleration over gravity, all per whole inertia",
         parameters: &[Parameter {

@@ -5,7 +5,7 @@
 //! constant torque `-d`, for as long as `|d| <= theta_r`. No record of one rig tells it from a bias torque.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for AsymmetricCoulomb {
     const DEFINITION: Definition = Definition {
         name: "asymmetric_coulomb",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Position,
         formula: "-d |sign(v)|",
         parameters: &[Parameter {

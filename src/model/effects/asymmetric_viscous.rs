@@ -1,7 +1,7 @@
 //! Viscous damping that differs between the two senses of rotation.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for AsymmetricViscous {
     const DEFINITION: Definition = Definition {
         name: "asymmetric_viscous",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Kinked,
         formula: "-b |v|",
         parameters: &[Parameter {

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -14,6 +14,7 @@ impl Law for BaseSway {
     const DEFINITION: Definition = Definition {
         name: "base_sway",
         group: Group::Torque,
+        family: Family::Drive,
         action: Action::Timed,
         formula: "-w0^2 amplitude cos(ws t + psi) cos(theta), t time in the laboratory",
         parameters: &[

@@ -1,7 +1,7 @@
 //! A torque that repeats with the angle: the poles of a motor, an oval race.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -13,6 +13,7 @@ impl Law for BearingHarmonic {
     const DEFINITION: Definition = Definition {
         name: "bearing_harmonic",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Position,
         formula: "+amplitude sin(n theta + psi)",
         parameters: &[

@@ -1,7 +1,7 @@
 //! A constant torque: a motor's, a tilted magnet's, a twisted cable's.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for BiasTorque {
     const DEFINITION: Definition = Definition {
         name: "bias_torque",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Position,
         formula: "+torque",
         parameters: &[Parameter {

@@ -1,7 +1,7 @@
 //! Coulomb friction that changes as the rig warms up or wears.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for CoulombDrift {
     const DEFINITION: Definition = Definition {
         name: "coulomb_drift",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Friction,
         formula: "-r t sign(v), t time in the laboratory",
         parameters: &[Parameter {

@@ -1,7 +1,7 @@
 //! Dry friction of constant magnitude, the paper's `theta_r = Tr / w0^2`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for CoulombFriction {
     const DEFINITION: Definition = Definition {
         name: "coulomb_friction",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Friction,
         formula: "-theta_r sign(v)",
         parameters: &[Parameter {

@@ -4,7 +4,7 @@
 //! what depends on it, comes to its end exponentially (Newton's law of cooling).
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -14,6 +14,7 @@ impl Law for CoulombWarmUp {
     const DEFINITION: Definition = Definition {
         name: "coulomb_warm_up",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Friction,
         formula: "+f (1 - exp(-t/tau)) sign(v), t time in the laboratory",
         parameters: &[

@@ -1,7 +1,7 @@
 //! The next odd power of the velocity after viscous damping.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for CubicDamping {
     const DEFINITION: Definition = Definition {
         name: "cubic_damping",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Velocity,
         formula: "-k3 v^3",
         parameters: &[Parameter {

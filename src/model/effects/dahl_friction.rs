@@ -7,7 +7,7 @@
 //! motion begins with `z = 0`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -17,6 +17,7 @@ impl Law for DahlFriction {
     const DEFINITION: Definition = Definition {
         name: "dahl_friction",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Kinked,
         formula: "-f z, z' = (v - |v| z)/zc",
         parameters: &[

@@ -1,6 +1,6 @@
 //! A drive whose amplitude is not what it was set to.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -10,6 +10,7 @@ impl Law for DriveAmplitude {
     const DEFINITION: Definition = Definition {
         name: "drive_amplitude",
         group: Group::Drive,
+        family: Family::Drive,
         action: Action::Drive,
         formula: "p (1 + e)",
         parameters: &[Parameter {

@@ -1,6 +1,6 @@
 //! A drive whose frequency creeps.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -10,6 +10,7 @@ impl Law for DriveChirp {
     const DEFINITION: Definition = Definition {
         name: "drive_chirp",
         group: Group::Drive,
+        family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "phase omega t + r t^2/2 + phi, t since the run began",
         parameters: &[Parameter {

@@ -1,6 +1,6 @@
 //! A drive whose phase is not what it was taken for; the same as a trigger that comes late.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -10,6 +10,7 @@ impl Law for DrivePhase {
     const DEFINITION: Definition = Definition {
         name: "drive_phase",
         group: Group::Drive,
+        family: Family::Drive,
         action: Action::Drive,
         formula: "phase + d",
         parameters: &[Parameter {

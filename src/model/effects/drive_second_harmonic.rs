@@ -1,6 +1,6 @@
 //! A drive that is not quite harmonic: a crank of finite length, a shaker at its limit.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -10,6 +10,7 @@ impl Law for DriveSecondHarmonic {
     const DEFINITION: Definition = Definition {
         name: "drive_second_harmonic",
         group: Group::Drive,
+        family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "a = p cos(x) + e p cos(2 x + phase), x the drive's phase",
         parameters: &[

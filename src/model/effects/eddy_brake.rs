@@ -5,7 +5,7 @@
 //! (1991), IEE Proc. B 138, 153).
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for EddyBrake {
     const DEFINITION: Definition = Definition {
         name: "eddy_brake",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Velocity,
         formula: "-b v/(1 + (v/vc)^2)",
         parameters: &[

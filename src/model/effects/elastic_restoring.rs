@@ -1,7 +1,7 @@
 //! A cable or a spiral spring that winds up turn by turn.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -12,6 +12,7 @@ impl Law for ElasticRestoring {
     const DEFINITION: Definition = Definition {
         name: "elastic_restoring",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Position,
         formula: "-k theta, theta not wrapped",
         parameters: &[Parameter {

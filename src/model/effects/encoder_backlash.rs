@@ -5,7 +5,7 @@
 //! since. A motion begins in the middle of the play.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for EncoderBacklash {
     const DEFINITION: Definition = Definition {
         name: "encoder_backlash",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Play,
         formula: "reading y, |theta - y| <= b/2, moved only when pushed",
         parameters: &[Parameter {

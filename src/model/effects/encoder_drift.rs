@@ -1,6 +1,6 @@
 //! A sensor whose zero drifts: a warming potentiometer, a gyroscope's rate integrated with its own zero.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderDrift;
@@ -9,6 +9,7 @@ impl Law for EncoderDrift {
     const DEFINITION: Definition = Definition {
         name: "encoder_drift",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta + r t, t time in the laboratory",
         parameters: &[Parameter {

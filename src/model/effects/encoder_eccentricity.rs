@@ -1,6 +1,6 @@
 //! A sensor whose disc does not turn about its centre.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 
@@ -10,6 +10,7 @@ impl Law for EncoderEccentricity {
     const DEFINITION: Definition = Definition {
         name: "encoder_eccentricity",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta + e sin(theta + psi)",
         parameters: &[

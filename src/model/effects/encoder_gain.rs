@@ -1,6 +1,6 @@
 //! A sensor with a wrong scale.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderGain;
@@ -9,6 +9,7 @@ impl Law for EncoderGain {
     const DEFINITION: Definition = Definition {
         name: "encoder_gain",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Reading,
         formula: "reading (1 + e) theta",
         parameters: &[Parameter {

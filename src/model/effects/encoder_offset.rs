@@ -1,6 +1,6 @@
 //! A sensor whose zero is not where the pendulum hangs; in one free decay equal to a tilt of the rig.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderOffset;
@@ -9,6 +9,7 @@ impl Law for EncoderOffset {
     const DEFINITION: Definition = Definition {
         name: "encoder_offset",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta + d",
         parameters: &[Parameter {

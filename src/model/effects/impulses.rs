@@ -4,7 +4,7 @@
 //! for a step of the integrator. The velocity changes by `J`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -19,6 +19,7 @@ impl Law for Impulses {
     const DEFINITION: Definition = Definition {
         name: "impulses",
         group: Group::Torque,
+        family: Family::Drive,
         action: Action::Timed,
         formula: "+J exp(-s^2/2)/(w sqrt(2 pi)), s = (t - t0)/w, w = 0.05/w0, t time in the laboratory",
         parameters: &[

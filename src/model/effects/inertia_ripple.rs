@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -17,6 +17,7 @@ impl Law for InertiaRipple {
     const DEFINITION: Definition = Definition {
         name: "inertia_ripple",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Inertia,
         formula: "inertia 1 + e cos(n theta + psi): -e cos(n theta + psi) th'' + e n sin(n theta + psi) v^2/2",
         parameters: &[

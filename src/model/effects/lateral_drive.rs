@@ -1,6 +1,6 @@
 //! A pivot that also moves sideways, at the drive's frequency.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -10,6 +10,7 @@ impl Law for LateralDrive {
     const DEFINITION: Definition = Definition {
         name: "lateral_drive",
         group: Group::Drive,
+        family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "-e p cos(x + phase) cos(theta), x the drive's phase",
         parameters: &[

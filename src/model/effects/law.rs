@@ -38,6 +38,38 @@ impl Group {
     }
 }
 
+/// The family of an effect: effects of one family are easily mistaken for each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Damping by the velocity.
+    Damping,
+    /// Friction that jumps with the sign of the velocity.
+    DryFriction,
+    /// A torque, or an inertia, of the angle.
+    PositionTorque,
+    /// Motion of the pivot.
+    Drive,
+    /// Sensor and clock.
+    Reading,
+    /// A formula of the user.
+    Own,
+}
+
+impl Family {
+    /// The words for it.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Damping => "damping",
+            Self::DryFriction => "dry friction",
+            Self::PositionTorque => "position torque",
+            Self::Drive => "drive",
+            Self::Reading => "reading",
+            Self::Own => "own",
+        }
+    }
+}
+
 /// What of the motion an effect's torque depends on: it decides which path of the kernel runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
@@ -189,6 +221,8 @@ pub struct Definition {
     pub name: &'static str,
     /// Where it acts.
     pub group: Group,
+    /// Its family.
+    pub family: Family,
     /// What it depends on.
     pub action: Action,
     /// The term on the right of `th'' = ...`, per inertia, or the reading, or the drive.

@@ -5,7 +5,7 @@
 //! passes zero the friction has a corner: steps end there.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,6 +15,7 @@ impl Law for LoadDependentFriction {
     const DEFINITION: Definition = Definition {
         name: "load_dependent_friction",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::LoadedFriction,
         formula: "-k (|(1 + a) cos(theta) + v^2/w0^2| - 1) sign(v)",
         parameters: &[Parameter {

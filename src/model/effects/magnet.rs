@@ -4,7 +4,7 @@
 //! widths that are allowed.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -14,6 +14,7 @@ impl Law for Magnet {
     const DEFINITION: Definition = Definition {
         name: "magnet",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Position,
         formula: "-amplitude (x/width) exp(-x^2/(2 width^2)), x = theta wrapped",
         parameters: &[

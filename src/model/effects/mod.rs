@@ -4,12 +4,11 @@
 //! below; Python, the command line, model files, maps and fits read it from here. A user's own
 //! effect needs neither: it is a [`Formula`].
 
-pub mod family;
 pub mod law;
 
-pub use family::Family;
 pub use law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
+    Role,
 };
 
 use super::drive::Motion;

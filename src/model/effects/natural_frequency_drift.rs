@@ -1,7 +1,7 @@
 //! A natural frequency that changes as the rod's length does with the temperature, or a mass creeps.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for NaturalFrequencyDrift {
     const DEFINITION: Definition = Definition {
         name: "natural_frequency_drift",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Driven,
         formula: "-r t (1 + a) sin(theta), in SI times w0^2, t time in the laboratory, \
                   a the pivot's acceleration over gravity",

@@ -12,7 +12,7 @@
 //! pulls at it, and may so release it.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -22,6 +22,7 @@ impl Law for PivotCompliance {
     const DEFINITION: Definition = Definition {
         name: "pivot_compliance",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Inertia,
         formula: "-x'' cos theta, x'' + 2 z wx x' + wx^2 x = -mu (theta'' cos theta - v^2 sin theta)",
         parameters: &[

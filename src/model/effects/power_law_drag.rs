@@ -5,7 +5,7 @@
 //! are dry friction in all but name, too abrupt for steps without events of their own.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -18,6 +18,7 @@ impl Law for PowerLawDrag {
     const DEFINITION: Definition = Definition {
         name: "power_law_drag",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Kinked,
         formula: "-q |v|^n sign(v)",
         parameters: &[

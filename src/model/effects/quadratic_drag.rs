@@ -1,7 +1,7 @@
 //! Drag in proportion to the square of the velocity: air at high speed.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for QuadraticDrag {
     const DEFINITION: Definition = Definition {
         name: "quadratic_drag",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Kinked,
         formula: "-q v |v|",
         parameters: &[Parameter {

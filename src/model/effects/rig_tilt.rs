@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -16,6 +16,7 @@ impl Law for RigTilt {
     const DEFINITION: Definition = Definition {
         name: "rig_tilt",
         group: Group::Torque,
+        family: Family::PositionTorque,
         action: Action::Position,
         formula: "-(sin(theta + d) - sin(theta)), in SI times w0^2",
         parameters: &[Parameter {

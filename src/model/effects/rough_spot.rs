@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -14,6 +14,7 @@ impl Law for RoughSpot {
     const DEFINITION: Definition = Definition {
         name: "rough_spot",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::Friction,
         formula: "-f exp(-(1 - cos(theta - th0))/w^2) sign(v)",
         parameters: &[

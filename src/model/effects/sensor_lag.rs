@@ -3,7 +3,7 @@
 //! What is kept is the first power of `tau`; the next is `tau^2 th''`, smaller by `tau w0`. A free decay
 //! read late is one that began late: only what has a clock of its own, a drive, shows it.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 
 pub struct SensorLag;
@@ -12,6 +12,7 @@ impl Law for SensorLag {
     const DEFINITION: Definition = Definition {
         name: "sensor_lag",
         group: Group::Reading,
+        family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta - tau v",
         parameters: &[Parameter {

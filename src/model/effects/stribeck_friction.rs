@@ -3,7 +3,7 @@
 //! The Gaussian form of Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30, 1083.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -13,6 +13,7 @@ impl Law for StribeckFriction {
     const DEFINITION: Definition = Definition {
         name: "stribeck_friction",
         group: Group::Damping,
+        family: Family::DryFriction,
         action: Action::SlidingFriction,
         formula: "-a exp(-(v/vs)^2) sign(v)",
         parameters: &[

@@ -3,7 +3,7 @@
 //! Its seconds are what all rates are counted in, `w0` and damping too: only the drive, which has a clock
 //! of its own, has another frequency in them. That is an error of the drive's frequency, exactly.
 
-use super::law::{Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
@@ -13,6 +13,7 @@ impl Law for Timebase {
     const DEFINITION: Definition = Definition {
         name: "timebase",
         group: Group::Drive,
+        family: Family::Reading,
         action: Action::Drive,
         formula: "omega/(1 + e), the record's time being (1 + e) t",
         parameters: &[Parameter {

@@ -1,7 +1,7 @@
 //! Damping in proportion to the velocity, the paper's `gamma`.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for ViscousDamping {
     const DEFINITION: Definition = Definition {
         name: "viscous_damping",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Velocity,
         formula: "-gamma v",
         parameters: &[Parameter {

@@ -1,7 +1,7 @@
 //! Viscous damping that changes as the rig warms up or wears.
 
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -11,6 +11,7 @@ impl Law for ViscousDrift {
     const DEFINITION: Definition = Definition {
         name: "viscous_drift",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Velocity,
         formula: "-r t v, t time in the laboratory",
         parameters: &[Parameter {

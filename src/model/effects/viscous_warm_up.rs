@@ -2,7 +2,7 @@
 
 use super::coulomb_warm_up::{TIME_CONSTANT, cooled};
 use super::law::{
-    Action, Definition, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -12,6 +12,7 @@ impl Law for ViscousWarmUp {
     const DEFINITION: Definition = Definition {
         name: "viscous_warm_up",
         group: Group::Damping,
+        family: Family::Damping,
         action: Action::Velocity,
         formula: "+b (1 - exp(-t/tau)) v, t time in the laboratory",
         parameters: &[

@@ -24,7 +24,7 @@ use self::program::{Kinks, Program, SLOTS};
 use self::tree::{Function, Tree, Variable};
 use super::effects::law::NOT_PERIODIC;
 use super::effects::{
-    Action, Definition, Group, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
 };
 use crate::error::Error;
 use crate::lanes::Real;
@@ -151,6 +151,7 @@ impl Formula {
         let definition = Definition {
             name: kept(&spec.name),
             group,
+            family: Family::Own,
             action,
             formula: kept(&spec.term),
             parameters: Box::leak(parameters.into_boxed_slice()),
