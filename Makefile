@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all fuzz lint bench clean develop
+.PHONY: demo test test-all fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -49,6 +49,14 @@ bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 	for script in speed.integration speed.friction speed.exponents speed.parameters speed.maps speed.autonomous \
 			speed.threads_memory speed.rig statistics.coverage; do \
 		$(BIN)/python -m benchmarks.$$script || exit 1; done
+
+TIMED := bash -c 'TIMEFORMAT="$$0: %R s, %U s + %S s of processors"; time maturin develop --release --locked --quiet'
+build-times: $(VENV)/.develop ## how long the crate takes to build: from nothing, and after a change in src/python
+	cargo clean --quiet --release --package pendmap
+	. $(BIN)/activate && $(TIMED) 'the crate'
+	touch src/python/mod.rs
+	. $(BIN)/activate && $(TIMED) 'the crate again after a change in src/python'
+	touch $(VENV)/.develop $(VENV)/.demo
 
 $(VENV)/bin/maturin:
 	$(PYTHON) -m venv $(VENV)

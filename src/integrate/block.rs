@@ -129,6 +129,8 @@ impl Strobe {
     }
 
     /// The same for a block of any width, one trajectory at a time with the arithmetic of a lane.
+    // Compiled where it is called: in tests alone.
+    #[inline]
     pub fn period_singly(&self, block: &mut Block) {
         dispatch::run(self.path, Singly(Steps { strobe: self, block, range: 0..self.steps() }));
     }

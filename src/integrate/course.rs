@@ -154,7 +154,7 @@ impl<N: Number> Course<N> {
         if !self.field.sways() {
             return past;
         }
-        let x = self.field.equation.aside(&self.field.point(tau, state, [1.0; 2], past).1);
+        let x = self.field.equation.aside(&self.field.place(tau, state, [1.0; 2], past));
         let [rate, _] = self.field.sway(state, past);
         [state[0], zero, zero, x, -rate]
     }
@@ -171,7 +171,7 @@ impl<N: Number> Course<N> {
         if !self.keeps() {
             return past;
         }
-        let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
+        let at = self.field.place(0.0, [theta; 2], [sense, 1.0], past);
         let kept = self.field.equation.kept(0, &at).unwrap_or(past[1]);
         [theta, kept, self.played(theta, sense, past) - theta, past[3], past[4]]
     }
@@ -183,7 +183,7 @@ impl<N: Number> Course<N> {
             return theta;
         }
         let past = [turned, played, played, x, y];
-        let (_, at) = self.field.point(0.0, [theta; 2], [sense, 1.0], past);
+        let at = self.field.place(0.0, [theta; 2], [sense, 1.0], past);
         self.field.equation.kept(1, &at).map_or(theta, |apart| theta + apart)
     }
 
@@ -285,6 +285,14 @@ impl<N: Number> Field<N> {
         (forcing, Point { past: [past[0], past[1]], sway: [past[3], past[4]], ..at })
     }
 
+    /// Where the formulas are evaluated, of single states.
+    #[inline(never)]
+    fn place(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> Point<N> {
+        let mut at = Point::nowhere(state[0]);
+        state[0].aside(Placing { field: self, tau, state, signs, past, into: &mut at });
+        at
+    }
+
     /// Whether a mode of the rig moves with the pendulum.
     #[inline(always)]
     #[must_use]
@@ -293,13 +301,14 @@ impl<N: Number> Field<N> {
     }
 
     /// The rates of that mode's displacement and momentum; 0 where there is none.
-    #[inline(always)]
+    #[inline(never)]
     #[must_use]
     pub fn sway(&self, state: [N; 2], past: Past<N>) -> [N; 2] {
-        if !self.sways() {
-            return [state[0].like(0.0); 2];
+        let mut rates = [state[0].like(0.0); 2];
+        if self.sways() {
+            state[0].aside(Swaying { field: self, state, past, into: &mut rates });
         }
-        self.equation.sway(&self.point(0.0, state, [1.0; 2], past).1)
+        rates
     }
 
     /// The acceleration at time `tau`, moving in the sense and on the side of a corner that `signs`
@@ -335,6 +344,40 @@ impl<N: Number> Work for Accelerating<'_, N> {
     fn run(self) {
         let Self { field, tau, state, signs, past, into } = self;
         *into = field.at(tau, state, signs, past);
+    }
+}
+
+/// Where formulas are evaluated, in a function of its own.
+struct Placing<'a, N> {
+    field: &'a Field<N>,
+    tau: f64,
+    state: [N; 2],
+    signs: [f64; 2],
+    past: Past<N>,
+    into: &'a mut Point<N>,
+}
+
+impl<N: Number> Work for Placing<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { field, tau, state, signs, past, into } = self;
+        *into = field.point(tau, state, signs, past).1;
+    }
+}
+
+/// The rates of a mode of the rig, in a function of its own.
+struct Swaying<'a, N> {
+    field: &'a Field<N>,
+    state: [N; 2],
+    past: Past<N>,
+    into: &'a mut [N; 2],
+}
+
+impl<N: Number> Work for Swaying<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { field, state, past, into } = self;
+        *into = field.equation.sway(&field.point(0.0, state, [1.0; 2], past).1);
     }
 }
 

@@ -33,6 +33,8 @@ pub struct Sensitivities {
 ///
 /// Time in the laboratory goes on. At a turn, a stick or a release that is itself within rounding of
 /// another event the derivatives belong to one side.
+// Compiled where it is called: in tests alone.
+#[inline]
 #[must_use]
 pub fn sensitivities(
     pendulum: &Pendulum,
@@ -56,9 +58,7 @@ pub fn sensitivities(
     while first < count {
         // The narrowest numbers that hold what is left.
         first += match count - first {
-            ..=2 => pass.run::<2>(first, &mut all),
-            3..=5 => pass.run::<5>(first, &mut all),
-            6..=8 => pass.run::<8>(first, &mut all),
+            ..=8 => pass.run::<8>(first, &mut all),
             _ => pass.run::<WIDEST>(first, &mut all),
         };
     }

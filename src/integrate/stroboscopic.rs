@@ -109,6 +109,8 @@ impl Strobe {
     ///
     /// # Errors
     /// As [`Strobe::advance`].
+    // Compiled where it is called: in tests alone.
+    #[inline]
     pub fn advance_singly(
         &self,
         theta: &mut [f64],

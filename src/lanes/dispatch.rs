@@ -152,31 +152,54 @@ impl<J: Job, S: Isa> WithSimd for Entry<J, S> {
     }
 }
 
+// A module each: the compiler shares work among the processors by the module that a function stands in.
+macro_rules! entries {
+    ($($(#[$condition:meta])* $module:ident: $isa:ty;)*) => {$(
+        $(#[$condition])*
+        mod $module {
+            use super::{Entry, Job, Simd};
+
+            #[inline(never)]
+            pub(super) fn run<J: Job>(isa: $isa, job: J) -> J::Output {
+                Simd::vectorize(isa, Entry(job, isa))
+            }
+        }
+    )*};
+}
+
+entries! {
+    #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+    avx512: pulp::x86::V4;
+    #[cfg(target_arch = "x86_64")]
+    avx2: pulp::x86::V3;
+    #[cfg(all(target_arch = "x86_64", feature = "sse"))]
+    sse: pulp::x86::V2;
+    portable: pulp::Scalar;
+}
+
 /// Runs `job` on `path`, or on the portable one where the processor lacks it.
 pub fn run<J: Job>(path: Path, job: J) -> J::Output {
     #[cfg(target_arch = "x86_64")]
-    {
-        match path {
-            #[cfg(feature = "avx512")]
-            Path::Avx512 => {
-                if let Some(isa) = pulp::x86::V4::try_new() {
-                    return Simd::vectorize(isa, Entry(job, isa));
-                }
+    match path {
+        #[cfg(feature = "avx512")]
+        Path::Avx512 => {
+            if let Some(isa) = pulp::x86::V4::try_new() {
+                return avx512::run(isa, job);
             }
-            Path::Avx2 => {
-                if let Some(isa) = pulp::x86::V3::try_new() {
-                    return Simd::vectorize(isa, Entry(job, isa));
-                }
-            }
-            #[cfg(feature = "sse")]
-            Path::Sse => {
-                if let Some(isa) = pulp::x86::V2::try_new() {
-                    return Simd::vectorize(isa, Entry(job, isa));
-                }
-            }
-            _ => {}
         }
+        Path::Avx2 => {
+            if let Some(isa) = pulp::x86::V3::try_new() {
+                return avx2::run(isa, job);
+            }
+        }
+        #[cfg(feature = "sse")]
+        Path::Sse => {
+            if let Some(isa) = pulp::x86::V2::try_new() {
+                return sse::run(isa, job);
+            }
+        }
+        _ => {}
     }
     let _ = path;
-    Scalar::new().vectorize(Entry(job, Scalar::new()))
+    portable::run(Scalar::new(), job)
 }

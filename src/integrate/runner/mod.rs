@@ -2,6 +2,7 @@
 //! velocity passes zero or that meet a corner.
 
 use std::f64::consts::{FRAC_1_PI, PI};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::integrate::block::{Block, Held};
@@ -9,8 +10,8 @@ use crate::integrate::corner::{self, Corner};
 use crate::integrate::general::{Clock, Running, STEP, Shared, Stages, Stepping};
 use crate::integrate::step::{Moving, Rubbing};
 use crate::integrate::stroboscopic::Strobe;
-use crate::lanes::Lane;
 use crate::lanes::sine::{Coarse, Degree, Fine};
+use crate::lanes::{Lane, Work};
 use crate::model::Equation;
 use crate::model::pendulum::Route;
 use crate::model::rest::{Release, release};
@@ -31,30 +32,36 @@ pub(super) fn smooth<L: Lane>(
     range: Range<usize>,
 ) {
     if strobe.fine {
-        smooth_by::<L, Fine>(strobe, token, block, range);
+        L::apart(token, Smooth::<L, Fine> { strobe, token, block, range, degree: PhantomData });
     } else {
-        smooth_by::<L, Coarse>(strobe, token, block, range);
+        L::apart(token, Smooth::<L, Coarse> { strobe, token, block, range, degree: PhantomData });
     }
 }
 
-#[inline(always)]
-fn smooth_by<L: Lane, D: Degree>(
-    strobe: &Strobe,
+struct Smooth<'a, L: Lane, D> {
+    strobe: &'a Strobe,
     token: L::Token,
-    block: &mut Block,
+    block: &'a mut Block,
     range: Range<usize>,
-) {
-    let schedule = &strobe.schedule;
-    let steps = &schedule.steps()[range];
-    let mut at = 0;
-    while at < block.kick.len() {
-        let mut lanes = load::<L>(token, block, at);
-        for loads in steps {
-            lanes.step::<D>(loads, schedule.decay);
+    degree: PhantomData<D>,
+}
+
+impl<L: Lane, D: Degree> Work for Smooth<'_, L, D> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { strobe, token, block, range, .. } = self;
+        let schedule = &strobe.schedule;
+        let steps = &schedule.steps()[range];
+        let mut at = 0;
+        while at < block.kick.len() {
+            let mut lanes = load::<L>(token, block, at);
+            for loads in steps {
+                lanes.step::<D>(loads, schedule.decay);
+            }
+            lanes.half_turns.store(&mut block.half_turns[at..]);
+            lanes.kick.store(&mut block.kick[at..]);
+            at += L::WIDTH;
         }
-        lanes.half_turns.store(&mut block.half_turns[at..]);
-        lanes.kick.store(&mut block.kick[at..]);
-        at += L::WIDTH;
     }
 }
 
@@ -64,6 +71,37 @@ fn load<L: Lane>(token: L::Token, block: &Block, at: usize) -> Moving<L> {
         half_turns: L::load(token, &block.half_turns[at..]),
         kick: L::load(token, &block.kick[at..]),
     }
+}
+
+/// What a step of a block needs.
+struct Step<'a, L: Lane, Q: Lane> {
+    runner: &'a Runner<'a, L, Q>,
+    block: &'a mut Block,
+    k: usize,
+    time: [f64; 2],
+    stages: &'a mut Stages<Q>,
+}
+
+// Each part of a step in a function of its own: the compiler's time grows faster than a function's length.
+macro_rules! apart {
+    ($($name:ident => |$runner:ident, $block:ident, $k:ident, $time:ident, $stages:ident| $call:expr;)*) => {$(
+        struct $name<'a, L: Lane, Q: Lane>(Step<'a, L, Q>);
+
+        impl<L: Lane, Q: Lane> Work for $name<'_, L, Q> {
+            #[inline(always)]
+            fn run(self) {
+                let Step { runner: $runner, block: $block, k: $k, time: $time, stages: $stages } = self.0;
+                $call;
+            }
+        }
+    )*};
+}
+
+apart! {
+    General => |runner, block, k, time, stages| runner.general_step(block, k, time, stages);
+    UnderFriction => |runner, block, k, time, _stages| runner.friction_step(block, k, time);
+    WithEffects => |runner, block, k, time, _stages| runner.step_with_effects(block, k, time);
+    Queue => |runner, block, _k, _time, stages| runner.work_off(block, stages);
 }
 
 /// What runs a block of one pendulum: `Q` is the narrower kind of lanes, for the queue and for
@@ -100,14 +138,18 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         let steps = self.strobe.steps();
         for k in range {
             let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
+            let step = Step { runner: self, block, k, time, stages };
             match (route, extra) {
-                (Route::General, _) => self.general_step(block, k, time, stages),
-                (Route::Friction, false) => self.friction_step(block, k, time),
-                _ => self.step_with_effects(block, k, time),
+                (Route::General, _) => Q::apart(self.tokens.1, General(step)),
+                (Route::Friction, false) => Q::apart(self.tokens.1, UnderFriction(step)),
+                _ => Q::apart(self.tokens.1, WithEffects(step)),
             }
             if events {
                 block.let_go(time);
-                self.work_off(block, stages);
+                if !block.queue.is_empty() {
+                    let step = Step { runner: self, block, k, time, stages };
+                    Q::apart(self.tokens.1, Queue(step));
+                }
             }
         }
     }
