@@ -6,11 +6,14 @@ import doctest
 import importlib
 import inspect
 import pkgutil
-from typing import Any
+from typing import TYPE_CHECKING
 
 import pytest
 
 import pendmap
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MODULES = ["pendmap"] + [
     module.name
@@ -22,12 +25,18 @@ FUNCTIONS = [name for name in pendmap.__all__ if inspect.isfunction(getattr(pend
 
 def examples(name: str) -> list[doctest.DocTest]:
     """The examples of one module."""
-    return [test for test in doctest.DocTestFinder().find(importlib.import_module(name)) if test.examples]
+    return [
+        test
+        for test in doctest.DocTestFinder().find(importlib.import_module(name))
+        if test.examples
+    ]
 
 
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_print_what_they_say(
-    name: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch  # noqa: ANN401
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)

@@ -281,9 +281,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     choices = _choices(numerics, layer_periods, check=check)
     angles, speeds = starts(theta, velocity)
     with core_errors():
-        raw = _core.basins_list(
-            bare, angles, units.bare(speeds, VELOCITY), choices, progress
-        )
+        raw = _core.basins_list(bare, angles, units.bare(speeds, VELOCITY), choices, progress)
     dataset = xr.Dataset(
         {
             **_cells(raw, ("start",), angles.shape, units),

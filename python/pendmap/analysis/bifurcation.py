@@ -151,8 +151,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     names = [
-        kind_of(kind, int(n), int(w))
-        for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
+        kind_of(kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
     ]
     kinds = sorted(set(names))
     which = np.array([kinds.index(name) for name in names], dtype=np.intp)
@@ -279,9 +278,7 @@ def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], lis
     bounds = np.searchsorted(cell, np.arange(values + 1))
     first = np.searchsorted(raw.point_entry, np.arange(cell.size + 1))
     plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
-    key = [
-        (kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
-    ]
+    key = [(kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)]
     of_entry = np.full(cell.size, -1, dtype=np.int32)
     members: list[list[int]] = []
     for value in range(values):

@@ -154,9 +154,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     low, high, count = grid.velocity.as_tuple
     box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.orbits(
-            pendulum, (n, w), grid.theta.as_tuple, box, numerics.workers, progress
-        )
+        raw = _core.orbits(pendulum, (n, w), grid.theta.as_tuple, box, numerics.workers, progress)
         paths = _paths(pendulum, raw.orbits, units)
     found = raw.orbits
     dataset = xr.Dataset(
@@ -190,9 +188,7 @@ def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[s
         if orbit.kind in {"rest", "inverted_rest"}:
             continue
         for k, point in enumerate(orbit.points):
-            run = _core.simulate(
-                pendulum, point, length, _TOLERANCE, samples, lyapunov=False
-            )
+            run = _core.simulate(pendulum, point, length, _TOLERANCE, samples, lyapunov=False)
             own = (np.full(run.time.size, x, dtype=np.int32) for x in (number, k))
             pieces.append((*own, run.theta, units.given(run.velocity, VELOCITY)))
     empty = tuple(np.empty(0, dtype=t) for t in (np.int32, np.int32, float, float))

@@ -202,9 +202,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
         shown = None if live is None else _in_units(live, units)
-        raw = _core.simulate(
-            pendulum, start, end, numerics.tol, samples, lyapunov, shown
-        )
+        raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, shown)
     time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
     event_time = units.given(raw.event_time, TIME)
     once = np.arange(0, time.size, samples)

@@ -105,9 +105,7 @@ def window_slopes(
     columns = np.split(unknown.columns(bare, [value for _, value in begin]), ends[:-1])
     return unknown.names, [
         WindowSlopes(*window[:2], own, one.rows[:, -STATE:], one.residuals, one.weights)
-        for one, window, own in zip(
-            found, fit.windows, columns, strict=True
-        )
+        for one, window, own in zip(found, fit.windows, columns, strict=True)
     ]
 
 
