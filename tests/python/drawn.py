@@ -8,8 +8,8 @@ from unittest import mock
 from matplotlib import rc_context
 from matplotlib.text import Text
 
-from pendmap import figures
-from pendmap.figures import style
+from pendmap import render
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
     made: list[Callable[[float], Figure]] = []
-    with mock.patch.object(figures, "written", lambda _, build, **__: made.append(build)):
-        figures.draw(dataset, "a.png", layer=layer)
+    with mock.patch.object(render, "written", lambda _, build, **__: made.append(build)):
+        render.draw(dataset, "a.png", layer=layer)
     with rc_context(style.RC):
         figure = made[0](100.0)
         figure.canvas.draw()

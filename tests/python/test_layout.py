@@ -18,7 +18,7 @@ import synthetic
 from pendmap import InputError
 from pendmap.charts import basins as layers
 from pendmap.charts import plane
-from pendmap.figures import basins, style
+from pendmap.render import basins, style
 
 MAPS = {
     "usual": synthetic.painted(),

@@ -12,7 +12,7 @@ import xarray as xr
 
 import pendmap
 from drawn import made, named, titles
-from pendmap import Effect, Grid, Pendulum, Rig, figures
+from pendmap import Effect, Grid, Pendulum, Rig, render
 from pendmap.analysis.parameter_map import undecided_cells
 from pendmap.analysis.regimes import kind_of, regimes
 from pendmap.analysis.sweep import spread
@@ -221,7 +221,7 @@ def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
     for name in ("map.nc", "map.zarr"):
         back = pendmap.load(pendmap.save(plane, tmp_path / name))
         assert back.equals(plane)
-    assert figures.draw(back, tmp_path / "map.pdf").stat().st_size > 0
+    assert render.draw(back, tmp_path / "map.pdf").stat().st_size > 0
 
 
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ from markdown_it import MarkdownIt
 from matplotlib import rc_context
 
 from hidden import once
-from pendmap import InputError, figures, report
+from pendmap import InputError, render, report
 from pendmap.diagnosis import FunctionScore
 from pendmap.diagnosis.summary import as_json
-from pendmap.figures import discrepancy, style
-from pendmap.figures.report import FIGURES
+from pendmap.render import discrepancy, style
+from pendmap.render.report import FIGURES
 from pendmap.report.document import (
     Document,
     Formula,
@@ -93,7 +93,7 @@ def of_verdict(verdict: str) -> Discrepancy:
 def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
     found = of_verdict(verdict)
     assert found.verdict == verdict
-    folder = figures.write_report(found, tmp_path / "report")
+    folder = render.write_report(found, tmp_path / "report")
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     markdown = (folder / "report.md").read_text(encoding="utf-8")
     assert f"**{verdict.capitalize()}**" in markdown
@@ -243,15 +243,15 @@ def test_whatever_a_user_wrote_is_shown_as_it_is() -> None:
 
 def test_a_file_of_each_kind(tmp_path: Path) -> None:
     found = once("quadratic_drag")
-    assert figures.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
+    assert render.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
-    figures.write_report(found, tmp_path / "b.md")
+    render.write_report(found, tmp_path / "b.md")
     text = (tmp_path / "b.md").read_text(encoding="utf-8")
     for name in re.findall(r"\]\(<(.*?)>\)", text):
         assert name.startswith("b_")
         assert (tmp_path / name).exists()
     with pytest.raises(InputError, match=r"suffix must be \.html or \.md, .*, got '\.pdf'"):
-        figures.write_report(found, tmp_path / "c.pdf")
+        render.write_report(found, tmp_path / "c.pdf")
 
 
 @pytest.mark.parametrize("name", ["new", "there", "a.md", "a.html"])
@@ -262,7 +262,7 @@ def test_a_report_that_does_not_fit_leaves_nothing(name: str, tmp_path: Path) ->
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))  # most figures fit
     try:
         with pytest.raises(OSError, match="File too large"):
-            figures.write_report(found, tmp_path / name)
+            render.write_report(found, tmp_path / name)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]

@@ -14,7 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made, named
-from pendmap import Effect, Formula, Pendulum, Rig, figures
+from pendmap import Effect, Formula, Pendulum, Rig, render
 from pendmap.analysis import critical_curves
 from pendmap.charts import tongues as drawn
 from recordings import recorded
@@ -407,7 +407,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
 def test_a_file_holds_all_of_it(whole: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
     assert back.equals(whole)
-    assert figures.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
+    assert render.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
 
 
 def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from pendmap.charts import names, plane
 from pendmap.errors import InputError
-from pendmap.figures import sheet as sheets
-from pendmap.figures import style, tongues
-from pendmap.figures.written import written
+from pendmap.render import sheet as sheets
+from pendmap.render import style, tongues
+from pendmap.render.written import written
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def draw_tongues(
     dataset : xarray.Dataset
         What ``pendmap.tongues`` returned.
     path : str or path
-        As of :func:`pendmap.figures.draw`.
+        As of :func:`pendmap.render.draw`.
     title : str
         What stands above.
     marks : sequence of (float, float, str)
@@ -95,7 +95,7 @@ def draw_pendulum(
 ) -> Path:
     """Draw the pendulum with its moving pivot and its equation (eq. 2.1) into a file: figure 3.
 
-    Parameters, result and errors are those of :func:`pendmap.figures.draw_record`; ``title`` stands
+    Parameters, result and errors are those of :func:`pendmap.render.draw_record`; ``title`` stands
     above, by default what is drawn.
     """
     from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
@@ -148,7 +148,7 @@ _ROWS = (0.7, 1.0, 1.0)
 def figure(
     runs: Sequence[xr.Dataset], *, size: tuple[float, float] | None, dpi: float, title: str | None
 ) -> Figure:
-    """Return the figure; see :func:`pendmap.figures.draw_tumbling`.
+    """Return the figure; see :func:`pendmap.render.draw_tumbling`.
 
     Raises
     ------

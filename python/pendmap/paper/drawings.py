@@ -11,9 +11,9 @@ from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
 
 from pendmap.charts.methods import MEASURED, look
 from pendmap.comparison.free import MODEL
-from pendmap.figures import blocks, forced
-from pendmap.figures import sheet as sheets
 from pendmap.formatting import counted
+from pendmap.render import blocks, forced
+from pendmap.render import sheet as sheets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

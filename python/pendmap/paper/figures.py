@@ -125,7 +125,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     OSError
         If the file cannot be written.
     """
-    from pendmap import figures  # noqa: PLC0415
+    from pendmap import render  # noqa: PLC0415
     from pendmap.paper import draw, motions  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
@@ -147,7 +147,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         )
         return draw.draw_motions(runs, path, steady=steady, title=title, subtitle=subtitle)
     found = report(seed)
-    return figures.draw_identification(
+    return render.draw_identification(
         found,
         path,
         parts=(_PARTS[key],),

@@ -115,7 +115,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
         ``pendmap.melnikov`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which. Of a
-        selection the recording shows the cells that are there, as :func:`pendmap.figures.draw`.
+        selection the recording shows the cells that are there, as :func:`pendmap.render.draw`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
