@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 from unittest import mock
 
@@ -30,7 +31,7 @@ def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
 
 def titles(figure: Figure) -> list[str]:
     found = (axes.get_title(loc="left") for axes in figure.axes)
-    return [text.removeprefix(f"({text[1:2]}) ") for text in found if text]
+    return [re.sub(r"\s+", " ", text).removeprefix(f"({text[1:2]}) ") for text in found if text]
 
 
 def named(figure: Figure) -> list[str]:

@@ -147,7 +147,7 @@ def enlarged(dataset: xr.Dataset, side: int) -> xr.Dataset:
 
 def test_neither_library_is_loaded_before_it_is_needed() -> None:
     code = (
-        "import sys; from pendmap import palette; from pendmap.charts import legend, plane;"
+        "import sys; from pendmap.charts import legend, palette, plane;"
         "assert not {'matplotlib', 'rerun'} & set(sys.modules);"
         "from pendmap import render;"
         "assert not {'matplotlib.pyplot', 'rerun'} & set(sys.modules)"

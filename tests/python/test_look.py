@@ -15,8 +15,8 @@ from matplotlib.text import Text
 
 import pendmap
 from pendmap import render
-from pendmap.render import experiment as drawing
-from pendmap.render import style
+from pendmap.charts import record
+from pendmap.render import drawing, style
 from recorded import clean, text
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def test_bad_input_is_one_line_and_exit_2(
 
 def drawn(experiment: pendmap.Experiment, **given: Any) -> Any:  # noqa: ANN401
     with rc_context(style.RC):
-        figure = drawing.figure(experiment, dpi=100.0, **given)
+        figure = drawing.draw(record.sheet(experiment), dpi=100.0, **given)
         figure.canvas.draw()
     return figure
 

@@ -214,7 +214,7 @@ def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: P
         step = np.abs(np.diff(np.asarray(strip), axis=0))
         assert step.max() < 0.2
     legend = str(back.one("/legend", "TextDocument:text"))
-    assert "Black lines: rest: multiplier +1" in legend
+    assert "- rest: multiplier +1: grey" in legend
 
 
 def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
@@ -271,7 +271,7 @@ def test_titles_leave_out_an_effects_parameter_that_varies() -> None:
     found = pendmap.parameter_map(Pendulum(effects=(drag,)), ranges)
     assert "q = 0.2" not in found.attrs["title"]
     assert found.attrs["title"].endswith("quadratic_drag")
-    assert "0.2" not in drawn.subtitle(found)
+    assert "0.2" not in drawn.chart(found).subtitle
 
 
 def test_what_no_damping_holds_has_no_attractors() -> None:

@@ -16,10 +16,11 @@ from matplotlib import rc_context
 
 from hidden import once
 from pendmap import InputError, render, report
+from pendmap.charts import diagnosis
 from pendmap.diagnosis import FunctionScore
 from pendmap.diagnosis.summary import as_json
-from pendmap.render import discrepancy, style
-from pendmap.render.report import FIGURES
+from pendmap.render import drawing, style
+from pendmap.render.report import figures
 from pendmap.report.document import (
     Document,
     Formula,
@@ -199,8 +200,7 @@ def test_the_band_of_all_runs_is_the_interval_that_is_stated(size: float) -> Non
         turned = dataclasses.replace(effect, parameters=parameters, ci95={"q": (-high, -low)})
         found = dataclasses.replace(found, effects=(turned,))
     with rc_context(style.RC):
-        made = FIGURES["runs"](found, 60.0)
-    assert made is not None
+        made = drawing.draw(diagnosis.parts(found)["runs"], dpi=60.0)
     (band,) = made.axes[0].patches
     ends = band.get_window_extent().transformed(made.axes[0].transData.inverted())
     power = 3 * math.floor(math.log10(effect.parameters["q"] * size * size) / 3)
@@ -294,10 +294,8 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
 def test_nothing_of_its_figures_is_cut() -> None:
     found = once("quadratic_drag")
     with rc_context(style.RC):
-        drawn = [draw(found, 60.0) for draw in FIGURES.values()]
-        drawn.append(discrepancy.figure(found, dpi=60.0))
+        drawn = [*figures(found).values(), drawing.draw(diagnosis.sheet(found), dpi=60.0)]
         for figure in drawn:
-            assert figure is not None
             figure.canvas.draw()
             drawn_in = figure.get_tightbbox()
             width, height = figure.get_size_inches()

@@ -16,8 +16,8 @@ from matplotlib import rc_context
 from conftest import COMMAND
 from interrupted import any_file, started
 from pendmap import InputError, render
-from pendmap.render import runs as records
-from pendmap.render import style
+from pendmap.charts import runs as records
+from pendmap.render import drawing, style
 from pendmap.virtual_rig import EFFECTS, PRESETS, Request, make
 from rigs import read_toml, record
 
@@ -246,7 +246,8 @@ def test_a_panel_a_run_and_gaps_where_samples_are_lost() -> None:
     runs.append(render.RunPanel("alone", np.zeros(1), np.ones(1)))
     runs.append(render.RunPanel("long", np.arange(1e5), np.sin(np.arange(1e5))))
     with rc_context(style.RC):
-        figure = records.figure(runs, title="Records", subtitle="seven", dpi=50.0)
+        chart = records.of_runs(runs, title="Records", subtitle="seven")
+        figure = drawing.draw(chart, dpi=50.0)
     assert [axes.get_title(loc="left") for axes in figure.axes] == [one.title for one in runs]
     xy = np.asarray(figure.axes[1].lines[0].get_xydata())
     assert np.flatnonzero(np.isnan(xy[:, 0])).tolist() == [40]

@@ -16,7 +16,7 @@ from drawn import made, named
 from pendmap import InputError, Pendulum, render, viewer
 from pendmap.charts import palette, parameter_map
 from pendmap.charts.selection import shown
-from pendmap.render.trajectory import resting
+from pendmap.charts.trajectory import resting
 from recordings import recorded
 
 if TYPE_CHECKING:

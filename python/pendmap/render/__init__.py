@@ -7,20 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pendmap.charts.basins import refuse_too_large
-from pendmap.charts.selection import shown
-from pendmap.errors import InputError
-from pendmap.render import (
-    basins,
-    diagrams,
-    exponents,
-    lifetimes,
-    melnikov,
-    orbits,
-    planes,
-    tongues,
-    trajectory,
-)
+from pendmap.charts import registry
+from pendmap.charts.runs import RunPanel
+from pendmap.render.drawing import figure
 from pendmap.render.of_records import (
     draw_comparison,
     draw_discrepancy,
@@ -29,7 +18,6 @@ from pendmap.render.of_records import (
     draw_runs,
     write_report,
 )
-from pendmap.render.runs import RunPanel
 from pendmap.render.written import SUFFIXES, written
 
 if TYPE_CHECKING:
@@ -49,18 +37,6 @@ __all__ = [
     "draw_runs",
     "write_report",
 ]
-
-_KINDS = {
-    "basins": basins.figure,
-    "bifurcation": diagrams.figure,
-    "lifetime": lifetimes.figure,
-    "lyapunov": exponents.figure,
-    "melnikov": melnikov.figure,
-    "orbits": orbits.figure,
-    "parameter_map": planes.figure,
-    "tongues": tongues.figure,
-    "trajectory": trajectory.figure,
-}
 
 
 def draw(  # noqa: PLR0913 (all of these a user may choose)
@@ -130,17 +106,11 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     --------
     >>> figures.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
     """
-    kind = dataset.attrs.get("kind")
-    if kind not in _KINDS:
-        known = ", ".join(_KINDS)
-        raise InputError(
-            f"cannot draw a dataset of kind {kind!r}; kinds that can be drawn: {known}"
-        )
-    dataset = shown(dataset)
-    refuse_too_large(dataset)
+    dataset = registry.ready(dataset, "draw")
+
     return written(
         path,
-        lambda dpi: _KINDS[kind](dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),
+        lambda dpi: figure(dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),
         size=size,
         dpi=dpi,
     )

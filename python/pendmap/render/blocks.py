@@ -25,8 +25,6 @@ TITLE: Final = 0.27
 """Inches that a panel's title takes above it."""
 BELOW: Final = 0.46
 """Inches that ticks and the name of an axis take beneath a panel."""
-NOISE: Final = "#d9d9d9"
-"""What the noise of the readings explains."""
 NOISE_SAID: Final = "95 % of the readings' noise"
 
 

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pendmap.charts import names
-from pendmap.charts.methods import MEASURED, look
+from pendmap.charts.methods import MEASURED, NOISE, look
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.formatting import counted
@@ -69,7 +69,7 @@ def figure(comparison: Comparison, *, dpi: float = 200.0) -> Figure:
     said = ", ".join(counted(count, kind) for count, kind in kinds if count)
     if many:
         said += f"; below, {len(rows)} of them: held out first, then those missed most"
-    made = sheets.headed(size, dpi, "Model against record", said, left=0.1)
+    made = sheets.headed(size, dpi, "Model against record", said)
     _legend(made, rows, top + LEGEND)
     letters = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
     if many:
@@ -97,7 +97,7 @@ def _legend(figure: Figure, rows: Sequence[Compared], top: float) -> None:
     texts = ["record", style_of.label, "standard deviation of its noise"]
     decays = [one for one in rows if isinstance(one, RunComparison)]
     if any(one.errors and np.any(one.peaks.turned.stderr_amplitude > 0) for one in decays):
-        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+        handles, texts = [*handles, Patch(color=NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     if driven:
         shades, named = forced.legend()
         handles, texts = [*handles, *shades], [*texts, *named]
@@ -118,7 +118,7 @@ def _overview(figure: Figure, box: Box, runs: Sequence[Compared], letters: Itera
         sides.log_axis(axes, "y", (low / 1.5, high * 1.5), "rms / noise")
     else:
         axes.set_ylim(0, 1.15 * high)
-        style.scale(axes, "y", (0, 1.15 * high), "rms / noise")
+        sides.scale(axes, "y", (0, 1.15 * high), "rms / noise")
     axes.set_xlim(-0.5, len(runs) - 0.5)
     _names(axes, [one.run.name for one in runs])
     held_out = "; orange: held out" if held.any() else ""
@@ -154,7 +154,7 @@ def _row(figure: Figure, box: Box, one: Compared, letters: Iterator[str]) -> Non
     for axes in (left, right):
         ends = (float(run.time[0]), float(run.time[-1]))
         axes.set_xlim(*ends)
-        style.scale(axes, "x", ends, names.clock(_SI))
+        sides.scale(axes, "x", ends, names.clock(_SI))
     if one.errors is None:
         few = "Fewer than three peaks:\nno errors of periods and peaks."
         why = one.table.left_out or next(iter(one.table.lost.values()), "")
@@ -213,4 +213,4 @@ def _over_record(axes: Axes, one: RunComparison) -> None:
     ends = (float(known.min()) - pad, float(known.max()) + pad)
     axes.set_ylim(*ends)
     unit = sensor.unit.replace("s2", "s\u00b2")
-    style.scale(axes, "y", ends, f"acceleration ({unit})")
+    sides.scale(axes, "y", ends, f"acceleration ({unit})")

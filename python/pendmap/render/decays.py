@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.charts import names
-from pendmap.charts.methods import MEASURED, drawn, look
+from pendmap.charts.methods import MEASURED, NOISE, drawn, look
 from pendmap.identification.methods.trajectory import METHOD as BEST
 from pendmap.identification.table1 import first_state, simulated_peaks
-from pendmap.render import blocks, sides, style
+from pendmap.render import blocks, sides
 from pendmap.render.half_cycles import course_of, first_and_last
 from pendmap.units import Units
 
@@ -129,7 +129,7 @@ def _draw(
     dot = Line2D([], [], color=MEASURED, ls="none", marker=".", ms=5)
     handles, texts = [dot, *handles], ["measured", *texts]
     if np.any(report.peaks.turned.stderr_amplitude > 0):
-        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+        handles, texts = [*handles, Patch(color=NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     room = blocks.named(figure, box, title, handles, texts)
     shares, gap = [1.7, 1.35, 1.5], blocks.BELOW + blocks.TITLE + 0.03
     gaps = [blocks.TITLE + 0.1, gap]
@@ -162,7 +162,7 @@ def _draw(
 def _from_to(axes: Axes, ends: tuple[float, float]) -> None:
     pad = 0.01 * (ends[1] - ends[0])
     axes.set_xlim(ends[0] - pad, ends[1] + pad)
-    style.scale(axes, "x", axes.get_xlim(), names.clock(_SI))
+    sides.scale(axes, "x", axes.get_xlim(), names.clock(_SI))
 
 
 def _envelope(axes: Axes, report: IdentificationReport, decays: dict[str, Decay]) -> None:
@@ -173,7 +173,7 @@ def _envelope(axes: Axes, report: IdentificationReport, decays: dict[str, Decay]
         one = look(name)
         axes.plot(made.peak_time, np.abs(made.peak), color=one.colour, ls=one.dash, lw=1.3)
     axes.set_ylim(0, 1.06 * float(size.max()))
-    style.scale(axes, "y", axes.get_ylim(), PEAK)
+    sides.scale(axes, "y", axes.get_ylim(), PEAK)
 
 
 def _differences(axes: Axes, turned: Peaks, decays: dict[str, Decay]) -> None:
@@ -189,7 +189,7 @@ def _differences(axes: Axes, turned: Peaks, decays: dict[str, Decay]) -> None:
         one = look(name)
         axes.plot(turned.time[1:], away[1:], color=one.colour, ls=one.dash, lw=1.2)
     error = 1e3 * Z95 * turned.stderr_amplitude
-    axes.fill_between(turned.time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
+    axes.fill_between(turned.time, -error, error, color=NOISE, lw=0, zorder=0)
     least = 1e3 * float(np.median(turned.stderr_amplitude))
     sides.signed_log_axis(
         axes, curves, "difference (mrad)", least=least if 0 < least < math.inf else 1e-12
@@ -219,7 +219,7 @@ def _near(
     bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
     sides.angle_axis(axes, np.clip(everything, -bound, bound))
     axes.set_xlim(*span)
-    style.scale(axes, "x", span, names.clock(_SI))
+    sides.scale(axes, "x", span, names.clock(_SI))
 
 
 def _over_time(axes: Axes, report: IdentificationReport, letters: Iterator[str]) -> None:

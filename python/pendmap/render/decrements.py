@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pendmap.charts.identification import MINUS
-from pendmap.charts.methods import EVEN, MEASURED, ODD, look
+from pendmap.charts.methods import EVEN, MEASURED, NOISE, ODD, look
 from pendmap.formatting import Estimate, estimate_text
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.methods.decrement import triplets
@@ -139,7 +139,7 @@ def _draw(
         handles.append(Line2D([], [], color=style.QUIET, lw=1.0, ls=":"))
         texts.append("12\N{DEGREE SIGN}")
         if np.any(raw.stderr > 0):
-            handles.append(Patch(color=blocks.NOISE, lw=0))  # type: ignore[arg-type]
+            handles.append(Patch(color=NOISE, lw=0))  # type: ignore[arg-type]
             texts.append(blocks.NOISE_SAID)
     room = blocks.named(figure, box, title, handles, texts)
     columns = [("as recorded", raw, 0.0 if zero is None else zero.value)]
@@ -196,7 +196,7 @@ def _signed_height(axes: Axes, known: Floats, level: float) -> None:
     far = float(np.percentile(np.abs(known), 90)) if known.size else 1.0
     far = max(REACH * far if known.size < 10 else 1.35 * far, 4 * level, 1e-6)  # noqa: PLR2004
     axes.set_ylim(-far, far)
-    style.scale(axes, "y", (-far, far), DELTA)
+    sides.scale(axes, "y", (-far, far), DELTA)
     axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
 
 
@@ -246,7 +246,7 @@ def _model(
         y = np.abs(delta[which]) if absolute else delta[which]
         axes.plot(x, y, color=colour, lw=1.0, zorder=2.5)
         low, high = np.maximum(y - wide[which], floor), y + wide[which]
-        axes.fill_between(x, low, high, color=blocks.NOISE, alpha=0.7, lw=0, zorder=1)
+        axes.fill_between(x, low, high, color=NOISE, alpha=0.7, lw=0, zorder=1)
 
 
 BLOCK: Final = blocks.Block(

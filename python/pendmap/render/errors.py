@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from pendmap.charts import names
-from pendmap.charts.methods import drawn, look
-from pendmap.render import blocks, sides, style
+from pendmap.charts.methods import NOISE, drawn, look
+from pendmap.render import blocks, sides
 from pendmap.render.decays import NOTHING, Z95, handles_of
 from pendmap.units import Units
 
@@ -55,7 +55,7 @@ def draw_errors(  # noqa: PLR0913, PLR0917 (where, what, and how it is named)
         return
     handles, texts = handles_of(list(errors))
     if np.any(peaks.turned.stderr_amplitude > 0):
-        handles, texts = [*handles, Patch(color=blocks.NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
+        handles, texts = [*handles, Patch(color=NOISE, lw=0)], [*texts, blocks.NOISE_SAID]
     room = blocks.named(figure, box, title, handles, texts)
     left, right = (cell.panel(figure) for cell in room.columns(2, 0.85))
     titles = (
@@ -90,7 +90,7 @@ def draw_panels(
         ends = (float(some.period_time[0]), float(some.period_time[-1]))
         pad = 0.02 * (ends[1] - ends[0]) or 0.5
         left.set_xlim(ends[0] - pad, ends[1] + pad)
-        style.scale(left, "x", left.get_xlim(), names.clock(_SI))
+        sides.scale(left, "x", left.get_xlim(), names.clock(_SI))
     sizes = some.peak[1:]
     ends = (max(float(np.min(sizes)), 1e-9) / 1.15, float(np.max(sizes)) * 1.15)
     sides.log_axis(right, "x", ends, PEAK)
@@ -101,10 +101,10 @@ def _noise(left: Axes, right: Axes, turned: Peaks, some: PeakErrors) -> None:
     at = np.searchsorted(turned.time, some.period_time)
     variance = turned.stderr_time**2
     error = Z95 * 100 * np.sqrt(variance[at] + variance[at + 2]) / some.period
-    left.fill_between(some.period_time, -error, error, color=blocks.NOISE, lw=0, zorder=0)
+    left.fill_between(some.period_time, -error, error, color=NOISE, lw=0, zorder=0)
     order = np.argsort(some.peak)
     error = Z95 * 100 * (turned.stderr_amplitude / some.peak)[order]
-    right.fill_between(some.peak[order], -error, error, color=blocks.NOISE, lw=0, zorder=0)
+    right.fill_between(some.peak[order], -error, error, color=NOISE, lw=0, zorder=0)
 
 
 BLOCK: Final = blocks.Block(

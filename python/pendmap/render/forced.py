@@ -12,7 +12,7 @@ from pendmap.charts import names, plane
 from pendmap.charts.methods import MEASURED, look
 from pendmap.comparison.forced_summary import written
 from pendmap.comparison.free import MODEL
-from pendmap.render import style
+from pendmap.render import sides, style
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -60,11 +60,11 @@ def draw_history(axes: Axes, time: Floats, reading: Floats, colour: str) -> None
     axes.plot(time[::every], turns[::every], color=colour, lw=0.6)
     ends = float(time[0]), float(time[-1])
     axes.set_xlim(*ends)
-    style.scale(axes, "x", ends, names.clock(_SI))
+    sides.scale(axes, "x", ends, names.clock(_SI))
     pad = _PAD * max(float(np.ptp(turns)), 0.1)
     limits = float(turns.min()) - pad, float(turns.max()) + pad
     axes.set_ylim(*limits)
-    style.scale(axes, "y", limits, _TURNS)
+    sides.scale(axes, "y", limits, _TURNS)
 
 
 def draw_phase(axes: Axes, path: tuple[Floats, Floats], colour: str, fastest: float) -> None:
@@ -72,7 +72,7 @@ def draw_phase(axes: Axes, path: tuple[Floats, Floats], colour: str, fastest: fl
     curve = plane.broken_at_wrap(path[0][:_MOST], path[1][:_MOST])
     axes.plot(curve[:, 0], curve[:, 1], color=colour, lw=0.4)
     reach = (1 + _PAD) * fastest
-    style.phase_plane(axes, (-math.pi, math.pi), (-reach, reach), _SI)
+    sides.phase_plane(axes, (-math.pi, math.pi), (-reach, reach), _SI)
 
 
 def draw_cycles(axes: Axes, one: ForcedComparison) -> None:
@@ -94,7 +94,7 @@ def draw_cycles(axes: Axes, one: ForcedComparison) -> None:
     turning = found.measured.w != 0
     reach = math.pi if turning else (1 + _PAD) * max(float(np.abs(c.theta).max()) for c in every)
     angles = (-reach, reach)
-    style.phase_plane(axes, angles, plane.padded(speeds), _SI)
+    sides.phase_plane(axes, angles, plane.padded(speeds), _SI)
 
 
 def _closed(theta: Floats, w: int) -> Floats:

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 
 from pendmap.charts import names
 from pendmap.charts.methods import EVEN, MEASURED, ODD
+from pendmap.charts.record import UNUSED
 from pendmap.render import blocks, sides, style
-from pendmap.render.record import UNUSED
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def _near(  # noqa: PLR0913, PLR0917 (where, what of which)
     _sign(panels[-1], peaks)
     for axes in panels:
         axes.set_xlim(*ends)
-        style.scale(axes, "x", ends, names.clock(_SI))
+        sides.scale(axes, "x", ends, names.clock(_SI))
         if axes is not panels[-1]:
             axes.set_xticklabels([])
             axes.set_xlabel("")
@@ -162,7 +162,7 @@ def _whole(axes: Axes, course: Course, peaks: Peaks, title: str, *, thin: bool) 
 def _time(axes: Axes, time: Floats) -> None:
     pad = 0.01 * (time.max() - time.min())
     axes.set_xlim(time.min() - pad, time.max() + pad)
-    style.scale(axes, "x", axes.get_xlim(), names.clock(_SI))
+    sides.scale(axes, "x", axes.get_xlim(), names.clock(_SI))
 
 
 def _coloured(axes: Axes, time: Floats, values: Floats, half: NDArray[np.int64], lw: float) -> None:

@@ -63,7 +63,7 @@ def figure(  # noqa: PLR0913 (all of these may be chosen)
         )
     made = sheets.headed(
         (width, height), dpi, title or f"Identification: {report.run.name}",
-        _said(report) if subtitle is None else subtitle, left=0.1,
+        _said(report) if subtitle is None else subtitle,
     )  # fmt: skip
     letters = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
     wide = width / len(columns)

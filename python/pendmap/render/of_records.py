@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pendmap.charts.runs import of_runs
 from pendmap.errors import InputError
-from pendmap.render.runs import RunPanel, figure
+from pendmap.render import drawing
 from pendmap.render.written import written
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
+    from pendmap.charts.runs import RunPanel
     from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
     from pendmap.identification import IdentificationReport
@@ -55,11 +57,10 @@ def draw_record(
     OSError
         If the file cannot be written.
     """
-    from pendmap.render import experiment  # noqa: PLC0415 (what reads records takes a while)
+    from pendmap.charts import record  # noqa: PLC0415 (what reads records takes a while)
 
-    return written(
-        path, lambda dpi: experiment.figure(records, size=size, dpi=dpi), size=size, dpi=dpi
-    )
+    chart = record.sheet(records, **({"width": size[0]} if size else {}))
+    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
 
 
 def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
@@ -118,9 +119,9 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     OSError
         If the file cannot be written.
     """
-    from pendmap.render import discrepancy  # noqa: PLC0415 (scipy takes a while)
+    from pendmap.charts import diagnosis  # noqa: PLC0415 (scipy takes a while)
 
-    return written(path, lambda dpi: discrepancy.figure(found, dpi=dpi))
+    return written(path, lambda dpi: drawing.draw(diagnosis.sheet(found), dpi=dpi))
 
 
 def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -186,7 +187,8 @@ def draw_runs(
     """
     if not runs:
         raise InputError("runs must hold one record or more, got []")
-    return written(path, lambda dpi: figure(runs, title=title, subtitle=subtitle, dpi=dpi))
+    chart = of_runs(runs, title=title, subtitle=subtitle)
+    return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
 
 
 def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
