@@ -79,17 +79,8 @@ def draw_motions(  # noqa: PLR0913 (what, where, and how)
 ) -> Path:
     """Draw forced runs beside a model: the paper's figures 8 (steady states) and 9 (tumbling).
 
-    Parameters
-    ----------
-    runs : sequence of ForcedComparison
-        Of :func:`pendmap.comparison.free`.
-    steady : bool
-        Whether their steady states are drawn, a phase plane each; else a row for each: histories
-        and phase planes of the record and of a member of the ensemble, and the statistics.
-    title, subtitle : str
-        What stands above.
-    path, dpi
-        As for :func:`draw_pendulum`, whose result and errors are those here.
+    Steady states have a phase plane each; runs that tumble have a row each: histories and phase
+    planes of the record and of a member of the ensemble, and the statistics.
     """
     from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
 

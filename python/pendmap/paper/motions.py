@@ -43,13 +43,6 @@ def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:
 
     The start is the cell of the attractor's basin that is farthest from any other: what the model
     does not know of the rig must not lead elsewhere.
-
-    Parameters
-    ----------
-    model : Rig
-        Identified from the rig's free decay.
-    seed : int
-        Of the noise.
     """
     from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (this module is imported for its numbers)
 
@@ -64,15 +57,7 @@ def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:
 
 
 def tumbling(model: Rig, seed: int = 0) -> list[ForcedComparison]:
-    """Return runs of 300 s from starts that tumble at first, without any pre-iterates.
-
-    Parameters
-    ----------
-    model : Rig
-        Identified from the rig's free decay.
-    seed : int
-        Of the noise.
-    """
+    """Return runs of 300 s from starts that tumble at first, without any pre-iterates."""
     from pendmap.virtual_rig import RunPlan  # noqa: PLC0415 (likewise)
 
     plans = [
@@ -103,19 +88,7 @@ def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
 def beside(
     model: Rig, plans: list[RunPlan], seed: int, members: int = 400
 ) -> list[ForcedComparison]:
-    """Run the virtual rig, read its records as any other, and compare the model with them.
-
-    Parameters
-    ----------
-    model : Rig
-        The model.
-    plans : list of RunPlan
-        The runs.
-    seed : int
-        Of the noise.
-    members : int
-        Starts beside each run.
-    """
+    """Run the virtual rig, read its records as any other, and compare the model with them."""
     from pendmap import virtual_rig  # noqa: PLC0415 (likewise)
     from pendmap.comparison import Ensemble, compare  # noqa: PLC0415 (likewise)
     from pendmap.records import read_experiment  # noqa: PLC0415

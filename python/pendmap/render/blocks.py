@@ -68,19 +68,10 @@ class Box:
 
 @dataclasses.dataclass(frozen=True)
 class Block:
-    """A part of a sheet.
+    """A part of a sheet: its name as a user types it, its title, the inches that it wants.
 
-    Parameters
-    ----------
-    name : str
-        As a user types it.
-    title : str
-        What stands above it.
-    height : callable
-        Inches that it wants, of a report.
-    draw : callable
-        Draws a report into a rectangle of a figure; takes letters for its panels, and the title
-        or nothing.
+    ``draw`` draws a report into a rectangle of a figure; it takes letters for its panels, and the
+    title or nothing.
     """
 
     name: str

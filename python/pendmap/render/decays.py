@@ -53,15 +53,7 @@ _SI: Final = Units(si=True)
 
 @dataclasses.dataclass(frozen=True)
 class Decay:
-    """A model simulated from the first peak of a record, as the sensor would show it.
-
-    Parameters
-    ----------
-    peak_time, peak : array, shape (Q,)
-        s and rad, with sign.
-    time, theta : array, shape (N,)
-        The motion, s and rad.
-    """
+    """A model simulated from the first peak of a record, as the sensor would show it: s, rad."""
 
     peak_time: Floats
     peak: Floats

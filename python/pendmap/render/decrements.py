@@ -43,17 +43,10 @@ REACH: Final = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Triplets:
-    """Decrements of three peaks in a row.
+    """Decrements of three peaks in a row (eq. 2.7), by the size of the middle peak in rad.
 
-    Parameters
-    ----------
-    size : array, shape (M,)
-        Absolute value of the middle peak, rad.
-    delta, stderr : array, shape (M,)
-        Eq. 2.7 of the three; NaN where a peak is not smaller than the one before. Its standard
-        error from those of the peaks.
-    odd : array of bool, shape (M,)
-        Whether the first of the three has an odd number.
+    ``delta`` is NaN where a peak is not smaller than the one before; its standard error is from
+    those of the peaks; ``odd`` says whether the first of the three has an odd number.
     """
 
     size: Floats

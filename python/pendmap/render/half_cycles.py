@@ -43,14 +43,7 @@ _SI: Final = Units(si=True)
 class Course:
     """A record as its peaks count it: the turns that it rests away from its start taken off.
 
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        Samples that are for fitting, s and rad.
-    half : array of int, shape (N,)
-        Number of the half cycle of each; -1 outside all of them.
-    other_time, other_theta : array
-        The samples that are not.
+    Samples for fitting (s, rad), the number of the half cycle of each, -1 outside; all others.
     """
 
     time: Floats

@@ -27,25 +27,9 @@ def written(
     size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> Path:
-    """Write a figure into a file and return its path.
+    """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-    Parameters
-    ----------
-    path : str or path
-        The file; an existing one is replaced.
-    make : callable
-        Makes the figure at so many pixels per inch.
-    size : (float, float), optional
-        What was asked for, inches.
-    dpi : float, optional
-        Pixels per inch, 200 by default.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix, and for an impossible size or resolution.
-    OSError
-        If the file cannot be written.
+    ``size`` and ``dpi`` are what was asked for; impossible ones are refused.
     """
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)

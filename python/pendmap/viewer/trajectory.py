@@ -154,13 +154,7 @@ def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def refuse_beyond(time: Floats, velocity: Floats) -> None:
-    """Refuse what a recording cannot hold: its places are single precision, its times ns.
-
-    Raises
-    ------
-    InputError
-        For a time or a velocity beyond that.
-    """
+    """Refuse what a recording cannot hold: its places are single precision, its times ns."""
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
