@@ -16,17 +16,17 @@ from pendmap import (
     Rig,
     basins,
     bifurcation,
-    figures,
     parameter_map,
     read_experiment,
+    render,
     simulate,
     virtual_rig,
 )
 from pendmap.diagnosis import diagnose
-from pendmap.figures import style
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
 from pendmap.paper.draw import draw_motions
+from pendmap.render import style
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
@@ -92,12 +92,12 @@ def record() -> None:
         path = Path(folder) / "run_00.csv"
         columns = np.column_stack([time + rng.normal(0, 4e-4, time.size), theta])[kept]
         np.savetxt(path, columns, "%.6f", ",", header="t_s,theta_rad", comments="")
-        figures.draw_record(read_experiment(path), HERE / "record.png", dpi=100)
+        render.draw_record(read_experiment(path), HERE / "record.png", dpi=100)
 
 
 def identification() -> None:
     """The decay by each model, and what each misses, on a virtual rig like the paper's."""
-    figures.draw_identification(
+    render.draw_identification(
         paper_figures.report(),
         HERE / "identification.png",
         parts=("decay",),
@@ -114,17 +114,15 @@ def diagnosis() -> None:
         request = virtual_rig.Request("hidden", seed=3, effects=("quadratic_drag",))
         places = virtual_rig.places(Path(folder) / "lab", replace=True)
         virtual_rig.write(virtual_rig.make(request), places)
-        figures.write_report(diagnose(read_experiment(places.experiment)), HERE / "lab.md")
+        render.write_report(diagnose(read_experiment(places.experiment)), HERE / "lab.md")
 
 
 def planes() -> None:
     """The attractors over p and omega, and against p."""
     plane = {"p": (0.05, 2.5, 200), "omega": (0.5, 3.0, 200)}
     found = parameter_map(Pendulum(), plane, curves=True)
-    figures.draw(found, HERE / "plane.png", dpi=90, layer="kinds", size=(9.4, 9.4))
-    figures.draw(
-        bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110
-    )
+    render.draw(found, HERE / "plane.png", dpi=90, layer="kinds", size=(9.4, 9.4))
+    render.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
 
 
 def forced() -> None:
@@ -143,8 +141,8 @@ def forced() -> None:
 if __name__ == "__main__":
     planes()
     forced()
-    figures.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
-    figures.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
+    render.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
+    render.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()
     record()
     identification()

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 from unittest import mock
 
 from matplotlib import rc_context
 from matplotlib.text import Text
 
-from pendmap import figures
-from pendmap.figures import style
+from pendmap import render
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
     made: list[Callable[[float], Figure]] = []
-    with mock.patch.object(figures, "written", lambda _, build, **__: made.append(build)):
-        figures.draw(dataset, "a.png", layer=layer)
+    with mock.patch.object(render, "written", lambda _, build, **__: made.append(build)):
+        render.draw(dataset, "a.png", layer=layer)
     with rc_context(style.RC):
         figure = made[0](100.0)
         figure.canvas.draw()
@@ -30,7 +31,7 @@ def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
 
 def titles(figure: Figure) -> list[str]:
     found = (axes.get_title(loc="left") for axes in figure.axes)
-    return [text.removeprefix(f"({text[1:2]}) ") for text in found if text]
+    return [re.sub(r"\s+", " ", text).removeprefix(f"({text[1:2]}) ") for text in found if text]
 
 
 def named(figure: Figure) -> list[str]:

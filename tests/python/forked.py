@@ -16,7 +16,7 @@ import numpy as np
 
 import decays
 import pendmap
-from pendmap import diagnosis, figures, identification, viewer
+from pendmap import diagnosis, identification, render, viewer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,7 +108,7 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "table1": lambda: identification.table1(time, theta, methods),
         "tongues": lambda: pendmap.tongues(pendulum, [1.0, 2.0]),
         "uncertainty_exponent": lambda: pendmap.uncertainty_exponent(halves),
-        "draw": lambda: figures.draw(basins, folder / "basins.png"),
+        "draw": lambda: render.draw(basins, folder / "basins.png"),
         "record": lambda: viewer.record(basins, folder / "basins.rrd"),
         "save zarr": lambda: pendmap.save(basins, folder / "again.zarr"),
     }

@@ -70,7 +70,7 @@ def import_all() -> None:
     os.environ["MPLBACKEND"] = "agg"
     for name in fuzz_cases.SMALL:
         importlib.import_module(f"pendmap.cli.{name}_command")
-    for name in ("figures", "viewer", "identification", "diagnosis", "virtual_rig", "records"):
+    for name in ("render", "viewer", "identification", "diagnosis", "virtual_rig", "records"):
         importlib.import_module(f"pendmap.{name}")
     for name in ("zarr", "scipy.signal", "scipy.optimize", "pyarrow.parquet"):
         importlib.import_module(name)

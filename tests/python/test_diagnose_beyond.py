@@ -11,7 +11,7 @@ import pytest
 
 import pendmap.diagnosis
 from hidden import once
-from pendmap import InputError, _core, figures, viewer
+from pendmap import InputError, _core, render, viewer
 from pendmap.cli.show import plain
 from pendmap.diagnosis import Discrepancy, diagnosed_model, result, summary
 
@@ -70,8 +70,8 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
     assert "Verdict: named" in text
     for name in unknown:
         assert f"Not computed: {name}: " in text
-    figures.draw_discrepancy(found, tmp_path / "a.png")
-    figures.write_report(found, tmp_path / "a.html")
+    render.draw_discrepancy(found, tmp_path / "a.png")
+    render.write_report(found, tmp_path / "a.html")
     viewer.record_discrepancy(found, tmp_path / "a.rrd")
     report = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert all(name in report for name in unknown)

@@ -10,7 +10,7 @@ import pytest
 
 import pendmap
 from drawn import made, named
-from pendmap import Pendulum, Rig, figures
+from pendmap import Pendulum, Rig, render
 from pendmap.charts import bifurcation as drawn
 from pendmap.charts import palette
 from recordings import recorded
@@ -109,7 +109,7 @@ def test_the_recording(diagram: xr.Dataset, tmp_path: Path) -> None:
 def test_it_comes_back_from_its_file(diagram: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(diagram, tmp_path / "b.nc"))
     assert back.equals(diagram)
-    assert figures.draw(back, tmp_path / "b.svg").stat().st_size > 0
+    assert render.draw(back, tmp_path / "b.svg").stat().st_size > 0
 
 
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import pendmap
-from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, figures, viewer
-from pendmap.figures import style
+from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, render, viewer
 from pendmap.identification import identify_experiment
 from pendmap.identification.experiment import identified_model, provenance
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -166,17 +166,17 @@ def test_every_map_says_what_its_model_is_worth(
         assert said["draws"]["count"] == 3
         assert said["draws"]["parameters"] == ["w0", "c_over_m"]
         assert result.drawn.shape == (3, 2)
-    figures.draw(result, tmp_path / "again.png")
+    render.draw(result, tmp_path / "again.png")
     viewer.record(result, tmp_path / "again.rrd")
 
 
 @pytest.mark.parametrize("layer", ["probability", "entropy"])
 def test_the_layers_over_draws_are_drawn(layer: str, tmp_path: Path) -> None:
     result = pendmap.basins(damped(0.6, 0.01), Grid.square(12), draws=3, seed=SEED)
-    figures.draw(result, tmp_path / "a.png", layer=layer, dpi=50)
-    figures.draw(result.isel(theta=slice(2, 9)), tmp_path / "b.png", layer=layer, dpi=50)
+    render.draw(result, tmp_path / "a.png", layer=layer, dpi=50)
+    render.draw(result.isel(theta=slice(2, 9)), tmp_path / "b.png", layer=layer, dpi=50)
     with pytest.raises(InputError, match="no layer"):
-        figures.draw(pendmap.basins(Pendulum(), 8), tmp_path / "c.png", layer=layer)
+        render.draw(pendmap.basins(Pendulum(), 8), tmp_path / "c.png", layer=layer)
 
 
 @pytest.mark.parametrize("command", [one for one in COMMANDS if one not in WITHOUT])

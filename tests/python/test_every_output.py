@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 import pendmap
-from pendmap import InputError, cli, figures, viewer
-from pendmap.figures import style
+from pendmap import InputError, cli, render, viewer
 from pendmap.model import effects_of
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -86,7 +86,7 @@ def test_every_output_of_every_command_takes_every_model(
     result = pendmap.load(tmp_path / "a.nc")
     known = pendmap.load_model(tmp_path / "model.toml")
     assert effects_of(result.attrs) == known.effects
-    figures.draw(result, tmp_path / "again.png")
+    render.draw(result, tmp_path / "again.png")
 
 
 def test_what_is_refused_while_files_are_written_leaves_none(

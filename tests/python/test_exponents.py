@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from drawn import made, named, titles
-from pendmap import Effect, Pendulum, Rig, figures
+from pendmap import Effect, Pendulum, Rig, render
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -241,4 +241,4 @@ def test_a_model_in_si_with_an_effect_has_a_figure(tmp_path: Path) -> None:
     drag = Effect("quadratic_drag", {"q": 0.01})
     rig = Rig(w0=6.2, c_over_m=0.05, Tr=0.08, p=0.29, Omega=11.9381, effects=(drag,))
     found = pendmap.lyapunov(rig, 1.0, 0.0)
-    assert figures.draw(found, tmp_path / "a.png").stat().st_size > 20_000
+    assert render.draw(found, tmp_path / "a.png").stat().st_size > 20_000

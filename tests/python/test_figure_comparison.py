@@ -14,9 +14,9 @@ from decays import decay, record
 from drawn import written
 from pendmap import Rig, virtual_rig
 from pendmap.comparison import Comparison, Ensemble, compare
-from pendmap.figures import comparison, style
 from pendmap.paper import drawings
 from pendmap.records import Experiment, Run, read_experiment
+from pendmap.render import comparison, style
 from pendmap.virtual_rig import RunPlan
 from test_figure_overlap import overlap, shown
 

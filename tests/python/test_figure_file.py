@@ -16,8 +16,8 @@ import xarray as xr
 import motions
 import synthetic
 from drawn import made, titles
-from pendmap import InputError, figures
-from pendmap.figures import style
+from pendmap import InputError, render
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,27 +32,27 @@ def test_files_are_written_whole_and_the_same_each_time(
     tmp_path: Path, suffix: str, magic: bytes
 ) -> None:
     dataset = synthetic.painted()
-    first = figures.draw(dataset, tmp_path / f"a.{suffix}")
-    second = figures.draw(dataset, str(tmp_path / f"b.{suffix}"))
+    first = render.draw(dataset, tmp_path / f"a.{suffix}")
+    second = render.draw(dataset, str(tmp_path / f"b.{suffix}"))
     assert first.read_bytes().startswith(magic)
     assert first.read_bytes() == second.read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == [f"a.{suffix}", f"b.{suffix}"]
 
 
 def test_size_and_resolution_are_kept(tmp_path: Path) -> None:
-    file = figures.draw(synthetic.painted(), tmp_path / "a.png", size=(7.5, 5.0), dpi=80)
+    file = render.draw(synthetic.painted(), tmp_path / "a.png", size=(7.5, 5.0), dpi=80)
     assert struct.unpack(">II", file.read_bytes()[16:24]) == (600, 400)
 
 
 @pytest.mark.parametrize("layer", ["labels", "label", "settle", "net_turns", "turns"])
 def test_one_layer_alone(tmp_path: Path, layer: str) -> None:
-    figures.draw(synthetic.painted(), tmp_path / "a.png", layer=layer, dpi=50)
+    render.draw(synthetic.painted(), tmp_path / "a.png", layer=layer, dpi=50)
     assert len(titles(made(synthetic.painted(), layer))) == 1
 
 
 def test_the_colour_map_is_used(tmp_path: Path) -> None:
-    plain = figures.draw(synthetic.painted(), tmp_path / "a.png", layer="settle", dpi=50)
-    other = figures.draw(
+    plain = render.draw(synthetic.painted(), tmp_path / "a.png", layer="settle", dpi=50)
+    other = render.draw(
         synthetic.painted(), tmp_path / "b.png", layer="settle", dpi=50, colormap="cividis"
     )
     assert plain.read_bytes() != other.read_bytes()
@@ -79,30 +79,30 @@ def test_bad_input_is_refused_and_leaves_nothing(
     tmp_path: Path, name: str, options: dict[str, object], says: str
 ) -> None:
     with pytest.raises(InputError, match=says):
-        figures.draw(synthetic.painted(), tmp_path / name, **options)  # type: ignore[arg-type]
+        render.draw(synthetic.painted(), tmp_path / name, **options)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
 
 
 def test_a_dataset_of_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"kind None.*basins, .*trajectory"):
-        figures.draw(xr.Dataset(), tmp_path / "a.png")
+        render.draw(xr.Dataset(), tmp_path / "a.png")
     with pytest.raises(InputError, match="list of starts"):
-        figures.draw(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.png")
+        render.draw(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.png")
 
 
 def test_a_trajectory_has_its_own_layers(tmp_path: Path) -> None:
     dataset = motions.swing(periods=3, steps=20)
-    figures.draw(dataset, tmp_path / "a.png", layer="section", dpi=50)
+    render.draw(dataset, tmp_path / "a.png", layer="section", dpi=50)
     with pytest.raises(InputError, match=r"'labels'.*history, energy, phase, section"):
-        figures.draw(dataset, tmp_path / "b.png", layer="labels")
+        render.draw(dataset, tmp_path / "b.png", layer="labels")
 
 
 def test_an_absent_folder_or_a_folder_in_the_way(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="folder does not exist"):
-        figures.draw(synthetic.painted(), tmp_path / "no" / "a.png")
+        render.draw(synthetic.painted(), tmp_path / "no" / "a.png")
     (tmp_path / "b.png").mkdir()
     with pytest.raises(IsADirectoryError, match=r"b\.png"):
-        figures.draw(synthetic.painted(), tmp_path / "b.png")
+        render.draw(synthetic.painted(), tmp_path / "b.png")
 
 
 def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +115,7 @@ def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(style, "write", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        figures.draw(synthetic.painted(), file)
+        render.draw(synthetic.painted(), file)
     assert file.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [file]
 
@@ -124,9 +124,9 @@ def test_large_maps_are_never_converted_whole(tmp_path: Path) -> None:
     peaks = []
     for side in (1200, 4000):
         dataset = enlarged(synthetic.painted(synthetic.USUAL[:3], (10, 10), undecided=4), side)
-        figures.draw(dataset, tmp_path / "warm.png")
+        render.draw(dataset, tmp_path / "warm.png")
         tracemalloc.start()
-        figures.draw(dataset, tmp_path / "a.png")
+        render.draw(dataset, tmp_path / "a.png")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < peaks[0] + 4000 * 4000, "more than one byte a cell beyond the thinned map"
@@ -147,9 +147,9 @@ def enlarged(dataset: xr.Dataset, side: int) -> xr.Dataset:
 
 def test_neither_library_is_loaded_before_it_is_needed() -> None:
     code = (
-        "import sys; from pendmap import palette; from pendmap.charts import legend, plane;"
+        "import sys; from pendmap.charts import legend, palette, plane;"
         "assert not {'matplotlib', 'rerun'} & set(sys.modules);"
-        "from pendmap import figures;"
+        "from pendmap import render;"
         "assert not {'matplotlib.pyplot', 'rerun'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

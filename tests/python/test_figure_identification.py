@@ -15,19 +15,19 @@ from matplotlib.text import Text
 
 import pendmap
 from decays import decay, record
-from pendmap import figures
+from pendmap import render
 from pendmap.charts import identification, methods
-from pendmap.figures import identification as drawing
-from pendmap.figures import style
-from pendmap.figures.decrements import triplets_of
-from pendmap.figures.half_cycles import course_of
-from pendmap.figures.sides import signed_log_axis
 from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.methods.decrement import recursion
 from pendmap.paper import drawings
 from pendmap.paper.draw import draw_pendulum
 from pendmap.records import Experiment, Run
+from pendmap.render import identification as drawing
+from pendmap.render import style
+from pendmap.render.decrements import triplets_of
+from pendmap.render.half_cycles import course_of
+from pendmap.render.sides import signed_log_axis
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -125,14 +125,14 @@ def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
 
 
 def test_files_are_whole(tmp_path: Path) -> None:
-    for suffix in figures.SUFFIXES:
-        path = figures.draw_identification(
+    for suffix in render.SUFFIXES:
+        path = render.draw_identification(
             report("begins under 12 degrees"), tmp_path / f"a{suffix}", parts=("errors",)
         )
         assert path.stat().st_size > 5000
     with pytest.raises(pendmap.InputError, match="suffix must be"):
-        figures.draw_identification(report("begins under 12 degrees"), tmp_path / "a.gif")
-    assert len(list(tmp_path.iterdir())) == len(figures.SUFFIXES)
+        render.draw_identification(report("begins under 12 degrees"), tmp_path / "a.gif")
+    assert len(list(tmp_path.iterdir())) == len(render.SUFFIXES)
 
 
 def test_the_pendulum(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 import pendmap
 from accelerations import GRAVITY, TRUTH, experiment, readings
 from decays import decay, record
-from pendmap import InputError, figures
+from pendmap import InputError, render
 from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify, identify_experiment
@@ -132,7 +132,7 @@ def test_sheet_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
     assert any("bias = " in line for line in as_text(report))
     model = identified_model(report)
     assert not {"bias", "tilt"} & set(model.notes["covariance"]["names"])
-    figures.draw_identification(report, tmp_path / "sheet.png")
+    render.draw_identification(report, tmp_path / "sheet.png")
     # The other methods read the angle that was made, and come near.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)

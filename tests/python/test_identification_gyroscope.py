@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from decays import decay, record
-from pendmap import InputError, figures
+from pendmap import InputError, render
 from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify_experiment
@@ -231,7 +231,7 @@ def test_look_says_noise_and_bias(tmp_path: Path) -> None:
     text = as_text(experiment)
     assert "rad/s (0.2" in text
     assert "+0.0" in next(line for line in text.splitlines() if "  bias " in line)
-    figures.draw_record(experiment, tmp_path / "record.png")
+    render.draw_record(experiment, tmp_path / "record.png")
 
 
 def test_an_angle_beside_it_is_what_counts(tmp_path: Path) -> None:
@@ -261,7 +261,7 @@ def test_sheet_model_and_comparison(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates(release=1.0, seconds=40)))
     report = identify_experiment(there)
     assert report.best.method == "trajectory"
-    figures.draw_identification(report, tmp_path / "sheet.png")
+    render.draw_identification(report, tmp_path / "sheet.png")
     assert "bias" not in identified_model(report).notes["covariance"]["names"]
     # The other methods read the angle that was integrated, and come near.
     for name in ("energy_balance", "combined_repaired"):

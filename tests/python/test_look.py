@@ -14,9 +14,9 @@ from matplotlib import rc_context
 from matplotlib.text import Text
 
 import pendmap
-from pendmap import figures
-from pendmap.figures import experiment as drawing
-from pendmap.figures import style
+from pendmap import render
+from pendmap.charts import record
+from pendmap.render import drawing, style
 from recorded import clean, text
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def test_a_figure_is_written(pendmap_command: Run, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     assert run.stdout == ""
     for suffix in (".svg", ".pdf"):
-        figures.draw_record(pendmap.read_experiment(path), tmp_path / f"a{suffix}")
+        render.draw_record(pendmap.read_experiment(path), tmp_path / f"a{suffix}")
     for suffix in (".png", ".svg", ".pdf"):
         assert (tmp_path / f"a{suffix}").stat().st_size > 5000
 
@@ -121,7 +121,7 @@ def test_bad_input_is_one_line_and_exit_2(
 
 def drawn(experiment: pendmap.Experiment, **given: Any) -> Any:  # noqa: ANN401
     with rc_context(style.RC):
-        figure = drawing.figure(experiment, dpi=100.0, **given)
+        figure = drawing.draw(record.sheet(experiment), dpi=100.0, **given)
         figure.canvas.draw()
     return figure
 

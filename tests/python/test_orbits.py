@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from drawn import made, named
-from pendmap import Axis, Effect, Grid, Pendulum, Rig, figures
+from pendmap import Axis, Effect, Grid, Pendulum, Rig, render
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def test_none_is_an_answer_too(tmp_path: Path) -> None:
     assert found.sizes["orbit"] == 0
     assert found.attrs["summary"].startswith("No orbit of period 3 and 1 net turn forward, 0")
     back = pendmap.load(pendmap.save(found, tmp_path / "none.nc"))
-    assert figures.draw(back, tmp_path / "none.png").stat().st_size > 0
+    assert render.draw(back, tmp_path / "none.png").stat().st_size > 0
     assert "/summary" in recorded(back, tmp_path).columns
 
 

@@ -17,6 +17,7 @@ from pendmap.cli.paper import command
 from pendmap.paper import draw as tumbling
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
+from pendmap.render import drawing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -135,14 +136,14 @@ def test_figure_2_is_persistent_tumbling_chaos_at_the_papers_points() -> None:
 
 def test_figure_2_has_a_column_for_each_point(tmp_path: Path) -> None:
     runs = paper_figures.tumbling(600)
-    sheet = tumbling.figure(runs, size=None, dpi=100, title="Figure 2")
+    sheet = drawing.draw(tumbling.tumbling_chart(runs, "Figure 2"), dpi=100)
     assert len(sheet.axes) == 9
     sections = sheet.axes[6:]
     for axes, run in zip(sections, runs, strict=True):
         drawn = sum(len(line.get_xydata()) for line in axes.lines)
         assert drawn == run.sizes["period"]
     with pytest.raises(pendmap.InputError, match="no room"):
-        tumbling.figure(runs, size=(2.0, 2.0), dpi=100, title=None)
+        drawing.draw(tumbling.tumbling_chart(runs, None), size=(2.0, 2.0), dpi=100)
     assert paper_figures.draw("2", tmp_path / "2.png").stat().st_size > 50_000
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 
 import pendmap
 from drawn import made, named, titles
-from pendmap import Effect, Grid, Pendulum, Rig, figures
+from pendmap import Effect, Grid, Pendulum, Rig, render
 from pendmap.analysis.regimes import kind_of, regimes
 from pendmap.analysis.sweep import spread, undecided_cells
 from pendmap.charts import parameter_map as drawn
@@ -213,14 +213,14 @@ def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: P
         step = np.abs(np.diff(np.asarray(strip), axis=0))
         assert step.max() < 0.2
     legend = str(back.one("/legend", "TextDocument:text"))
-    assert "Black lines: rest: multiplier +1" in legend
+    assert "- rest: multiplier +1: grey" in legend
 
 
 def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
     for name in ("map.nc", "map.zarr"):
         back = pendmap.load(pendmap.save(plane, tmp_path / name))
         assert back.equals(plane)
-    assert figures.draw(back, tmp_path / "map.pdf").stat().st_size > 0
+    assert render.draw(back, tmp_path / "map.pdf").stat().st_size > 0
 
 
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
@@ -270,7 +270,7 @@ def test_titles_leave_out_an_effects_parameter_that_varies() -> None:
     found = pendmap.parameter_map(Pendulum(effects=(drag,)), ranges)
     assert "q = 0.2" not in found.attrs["title"]
     assert found.attrs["title"].endswith("quadratic_drag")
-    assert "0.2" not in drawn.subtitle(found)
+    assert "0.2" not in drawn.chart(found).subtitle
 
 
 def test_what_no_damping_holds_has_no_attractors() -> None:

@@ -130,7 +130,7 @@ def test_a_made_angle_judges_no_model(tmp_path: Path) -> None:
 
 
 def test_figures_of_a_made_angle_say_why_they_judge_none(tmp_path: Path) -> None:
-    from pendmap.figures import comparison, identification  # noqa: PLC0415 (slow to import)
+    from pendmap.render import comparison, identification  # noqa: PLC0415 (slow to import)
 
     time, _, force = readings(release=1.3, seconds=20)
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))

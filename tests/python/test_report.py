@@ -15,11 +15,12 @@ from markdown_it import MarkdownIt
 from matplotlib import rc_context
 
 from hidden import once
-from pendmap import InputError, figures, report
+from pendmap import InputError, render, report
+from pendmap.charts import diagnosis
 from pendmap.diagnosis import FunctionScore
 from pendmap.diagnosis.summary import as_json
-from pendmap.figures import discrepancy, style
-from pendmap.figures.report import FIGURES
+from pendmap.render import drawing, style
+from pendmap.render.report import figures
 from pendmap.report.document import (
     Document,
     Formula,
@@ -91,7 +92,7 @@ def of_verdict(verdict: str) -> Discrepancy:
 def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
     found = of_verdict(verdict)
     assert found.verdict == verdict
-    folder = figures.write_report(found, tmp_path / "report")
+    folder = render.write_report(found, tmp_path / "report")
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     markdown = (folder / "report.md").read_text(encoding="utf-8")
     assert f"**{verdict.capitalize()}**" in markdown
@@ -197,8 +198,7 @@ def test_the_band_of_all_runs_is_the_interval_that_is_stated(size: float) -> Non
         turned = dataclasses.replace(effect, parameters=parameters, ci95={"q": (-high, -low)})
         found = dataclasses.replace(found, effects=(turned,))
     with rc_context(style.RC):
-        made = FIGURES["runs"](found, 60.0)
-    assert made is not None
+        made = drawing.draw(diagnosis.parts(found)["runs"], dpi=60.0)
     (band,) = made.axes[0].patches
     ends = band.get_window_extent().transformed(made.axes[0].transData.inverted())
     power = 3 * math.floor(math.log10(effect.parameters["q"] * size * size) / 3)
@@ -241,15 +241,15 @@ def test_whatever_a_user_wrote_is_shown_as_it_is() -> None:
 
 def test_a_file_of_each_kind(tmp_path: Path) -> None:
     found = once("quadratic_drag")
-    assert figures.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
+    assert render.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
-    figures.write_report(found, tmp_path / "b.md")
+    render.write_report(found, tmp_path / "b.md")
     text = (tmp_path / "b.md").read_text(encoding="utf-8")
     for name in re.findall(r"\]\(<(.*?)>\)", text):
         assert name.startswith("b_")
         assert (tmp_path / name).exists()
     with pytest.raises(InputError, match=r"suffix must be \.html or \.md, .*, got '\.pdf'"):
-        figures.write_report(found, tmp_path / "c.pdf")
+        render.write_report(found, tmp_path / "c.pdf")
 
 
 @pytest.mark.parametrize("name", ["new", "there", "a.md", "a.html"])
@@ -260,7 +260,7 @@ def test_a_report_that_does_not_fit_leaves_nothing(name: str, tmp_path: Path) ->
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))  # most figures fit
     try:
         with pytest.raises(OSError, match="File too large"):
-            figures.write_report(found, tmp_path / name)
+            render.write_report(found, tmp_path / name)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
@@ -292,10 +292,8 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
 def test_nothing_of_its_figures_is_cut() -> None:
     found = once("quadratic_drag")
     with rc_context(style.RC):
-        drawn = [draw(found, 60.0) for draw in FIGURES.values()]
-        drawn.append(discrepancy.figure(found, dpi=60.0))
+        drawn = [*figures(found).values(), drawing.draw(diagnosis.sheet(found), dpi=60.0)]
         for figure in drawn:
-            assert figure is not None
             figure.canvas.draw()
             drawn_in = figure.get_tightbbox()
             width, height = figure.get_size_inches()

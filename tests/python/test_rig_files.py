@@ -15,9 +15,9 @@ from matplotlib import rc_context
 
 from conftest import COMMAND
 from interrupted import any_file, started
-from pendmap import InputError, figures
-from pendmap.figures import runs as records
-from pendmap.figures import style
+from pendmap import InputError, render
+from pendmap.charts import runs as records
+from pendmap.render import drawing, style
 from pendmap.virtual_rig import EFFECTS, PRESETS, Request, make
 from rigs import read_toml, record
 
@@ -242,11 +242,12 @@ def test_records_are_drawn(rig: Run, tmp_path: Path) -> None:
 
 def test_a_panel_a_run_and_gaps_where_samples_are_lost() -> None:
     time = np.delete(np.arange(100) / 100, [40, 41, 42])
-    runs = [figures.RunPanel(f"run {k}", time, np.sin(k * time)) for k in range(5)]
-    runs.append(figures.RunPanel("alone", np.zeros(1), np.ones(1)))
-    runs.append(figures.RunPanel("long", np.arange(1e5), np.sin(np.arange(1e5))))
+    runs = [render.RunPanel(f"run {k}", time, np.sin(k * time)) for k in range(5)]
+    runs.append(render.RunPanel("alone", np.zeros(1), np.ones(1)))
+    runs.append(render.RunPanel("long", np.arange(1e5), np.sin(np.arange(1e5))))
     with rc_context(style.RC):
-        figure = records.figure(runs, title="Records", subtitle="seven", dpi=50.0)
+        chart = records.of_runs(runs, title="Records", subtitle="seven")
+        figure = drawing.draw(chart, dpi=50.0)
     assert [axes.get_title(loc="left") for axes in figure.axes] == [one.title for one in runs]
     xy = np.asarray(figure.axes[1].lines[0].get_xydata())
     assert np.flatnonzero(np.isnan(xy[:, 0])).tolist() == [40]
@@ -254,4 +255,4 @@ def test_a_panel_a_run_and_gaps_where_samples_are_lost() -> None:
     assert figure.axes[0].get_ylabel().endswith("(rad)")
     assert len(figure.axes[6].lines[0].get_xydata()) == 2 * records.BINS
     with pytest.raises(InputError, match="one record or more"):
-        figures.draw_runs([], "a.png", title="", subtitle="")
+        render.draw_runs([], "a.png", title="", subtitle="")

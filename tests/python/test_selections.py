@@ -13,10 +13,10 @@ from matplotlib.colors import to_rgb
 
 import pendmap
 from drawn import made, named
-from pendmap import InputError, Pendulum, figures, viewer
+from pendmap import InputError, Pendulum, render, viewer
 from pendmap.charts import palette, parameter_map
 from pendmap.charts.selection import shown
-from pendmap.figures.trajectory import resting
+from pendmap.charts.trajectory import resting
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
         ),
         (MAP[["label"]], "fraction must be over attractor here, .*, but is missing"),
     ):
-        for write, name in ((figures.draw, "a.png"), (viewer.record, "a.rrd")):
+        for write, name in ((render.draw, "a.png"), (viewer.record, "a.rrd")):
             with pytest.raises(InputError, match=says):
                 write(part, tmp_path / name)
     assert not list(tmp_path.iterdir())

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 import pendmap
 from models import DRAG, SWING
-from pendmap import Effect, Grid, Pendulum, Rig, figures, viewer
+from pendmap import Effect, Grid, Pendulum, Rig, render, viewer
 from pendmap.charts import basins
-from pendmap.figures import style, trajectory
+from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -202,7 +202,7 @@ def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None
         assert effects[0] == {"name": "quadratic_drag", "parameters": {"q": 0.01}}
         assert "quadratic_drag (q = 0.01 1/rad), bearing_harmonic" in back.attrs["title"]
         assert "w0 = 6.2 rad/s" in back.attrs["title"]
-        assert figures.draw(back, tmp_path / f"{name}.svg").stat().st_size > 1000
+        assert render.draw(back, tmp_path / f"{name}.svg").stat().st_size > 1000
         assert viewer.record(back, tmp_path / f"{name}.rrd").stat().st_size > 1000
 
 
@@ -217,7 +217,7 @@ def test_axes_are_named_in_the_units_of_the_result() -> None:
     for model, clock, speed in ((SWING, "t (s)", "dθ/dt (rad/s)"), (SWING.pendulum, "τ", "dθ/dτ")):
         run = pendmap.simulate(model, 1.0, 3.0, 5.0)
         with rc_context(style.RC):
-            sheet = trajectory.figure(run, layer=None, size=None, dpi=50.0, colormap=None)
+            sheet = render.figure(run, dpi=50.0)
             sheet.canvas.draw()
         _, energy, phase, _ = sheet.axes
         assert energy.get_xlabel() == clock

@@ -14,7 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made, named
-from pendmap import Effect, Formula, Pendulum, Rig, figures
+from pendmap import Effect, Formula, Pendulum, Rig, render
 from pendmap.analysis import critical_curves
 from pendmap.charts import tongues as drawn
 from recordings import recorded
@@ -348,15 +348,17 @@ def test_frequencies_are_added_until_curves_turn_where_they_do(finer: xr.Dataset
 
 
 def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
-    chart = drawn.chart(finer, "omega-p", 0.05)
-    tips = [line[np.argmin(line[:, 1])] for line in chart.undamped]
+    panel = drawn.chart(finer).panel("omega-p")
+    (line,) = [mark for mark in panel.marks if mark.path == "undamped"]
+    tips = np.stack([line.x, line.y], axis=1)
     assert any(np.allclose(tip, (2.0, 0.0), atol=1e-3) for tip in tips)
 
 
 def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
     # Between the first tongue and the second a strip climbs by its own width from one to the next.
     omega = np.linspace(0.8, 3.0, 60)
-    areas = [Outline(area) for area in drawn.chart(tongues_of(omega), "omega-p", 0.05).stable]
+    stable = drawn.chart(tongues_of(omega)).panel("omega-p").marks[0]
+    areas = [Outline(area) for area in stable.shapes]
     middles = (omega[:-1] + omega[1:]) / 2
     between = tongues_of(middles)
     index, p = between["index"].values, between["p"].values
@@ -407,7 +409,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
 def test_a_file_holds_all_of_it(whole: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
     assert back.equals(whole)
-    assert figures.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
+    assert render.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
 
 
 def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:

@@ -1,23 +1,26 @@
-"""The layers of a basin map: which of them tell something, which lead, and what each is called."""
+"""Basin maps: the layers that tell something, which of them lead, and the chart of them."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap import _core
-from pendmap.charts import names
+from pendmap.charts import legend, names, palette, plane
+from pendmap.charts.chart import ALARM, INK, QUIET, Chart, Colours, Image, Mark, Panel, Points
 from pendmap.errors import InputError
 from pendmap.formatting import counted, with_error
 from pendmap.model import effects_of
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.units import Units
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
+    import numpy.typing as npt
     import xarray as xr
 
 
@@ -59,6 +62,185 @@ _SI_SYMBOLS = {
 
 LABORATORY = {"stroke_mm": "p", "frequency_hz": "Omega"}
 """What varies in a laboratory, and which of a rig's parameters it is."""
+
+
+SMALL: Final = 0.64
+"""Size of the panel of unreliable labels, relative to those that lead."""
+FLAT: Final = 0.55
+"""Height over width of panels under which they stand below one another."""
+_SHAPES: Final = {"oscillation": "sPXph8", "inverted_rest": "D"}
+"""Markers by kind; the further ones where the colours begin again."""
+_COLOUR_MAPS: Final = {
+    "settle": "viridis",
+    "turns": "RdBu_r",
+    "exponent": "magma",
+    "probability": "cividis",
+    "entropy": "magma",
+}
+
+
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
+    """Return the leading layers: two, or three where the labels are unreliable; or one alone."""
+    shown = (named(dataset, layer),) if layer else _leading(dataset)
+    theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
+    units = Units.of(dataset.attrs)
+    listed = legend.entries(dataset)
+    chaos = [entry for entry in listed if entry.chaotic and len(entry.points)]
+    if "labels" not in shown and not finite_time(dataset):
+        listed = [entry for entry in listed if entry.id < 1 or entry.chaotic]
+    panels = []
+    for one in shown:
+        small = len(shown) > 1 and one == "labels" and not reliable(dataset)
+        alarm = [(warning(dataset), ALARM), (transients(dataset), QUIET)]
+        marks = _layer(dataset, one, cells, (theta, velocity))
+        if one == "labels":
+            marks += _attractors(dataset, listed, theta, velocity)
+        title = what(dataset, one)
+        if shown == ("labels",) and not reliable(dataset):
+            title = f"{title}; {warning(dataset)}"
+        sides = names.phase_plane(theta, velocity, units)
+        share = SMALL if small else 1.0
+        panels.append(Panel(one, title, *sides, marks, share=share, note=alarm if small else ()))
+    if finite_time(dataset) and layer is None and chaos:
+        panels.append(_section(dataset, chaos, units))
+    panels[0] = _with_names(dataset, panels[0], listed, shown)
+    low, high = (units.bare(bound, VELOCITY) for bound in velocity)
+    ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
+    rows, columns = dataset["label"].shape
+    return Chart(
+        _title(dataset, shown),
+        f"{parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
+        panels,
+        rows=[[panel.name] for panel in panels] if ratio < FLAT else (),
+        ratio=ratio,
+    )
+
+
+def _leading(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Return the layers of the standard figure."""
+    every = layers(dataset)
+    return every[:2] if finite_time(dataset) or reliable(dataset) else every[:3]
+
+
+def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
+    if finite_time(dataset):
+        every = [str(name) for name in dataset["attractor"].values]
+        if every:
+            return f"{every[0].capitalize()} takes every start"
+        return "No attractors" + (" without damping" if dataset.attrs.get("gamma") == 0 else "")
+    fractal = not reliable(dataset) and "labels" not in shown[:1]
+    return "Fractal basins of attraction" if fractal else "Basins of attraction"
+
+
+def _with_names(
+    dataset: xr.Dataset, panel: Panel, listed: list[legend.Entry], shown: tuple[str, ...]
+) -> Panel:
+    """Return a panel with the legend: a basin's colour, the attractor's marker upon it."""
+    none = np.empty(0)
+    named: list[Mark] = []
+    for entry in listed:
+        text = entry.text
+        if finite_time(dataset) and entry.chaotic:
+            text = f"{legend.typeset(entry.name)}, {entry.share} of the starts"
+        elif entry.chaotic and "labels" in shown and len(entry.points):
+            text = f"{entry.text} (dots: its points)"
+        look: dict[str, Any] = {"colour": entry.colour, "name": text}
+        named.append(Points(none, none, marker="s", size=9.0, edge=QUIET, edge_width=0.5, **look))
+        if entry.id >= 1 and not entry.chaotic:
+            named.append(_marker(entry, np.empty((0, 2)), text, 5.0))
+    return dataclasses.replace(panel, marks=[*panel.marks, *named])
+
+
+def _marker(
+    entry: legend.Entry, at: npt.NDArray[np.float64], name: str = "", size: float = 5.5
+) -> Points:
+    turn = palette.direction(entry.name, entry.kind)
+    shapes = "^>" if turn > 0 else "v<" if turn < 0 else _SHAPES.get(entry.kind, "o")
+    shape = shapes[palette.lap(entry.name, entry.kind) % len(shapes)]
+    return Points(
+        *at.T, marker=shape, size=size, colour=entry.colour, edge="#ffffff",
+        edge_width=0.17 * size, halo=INK, clip=False, order=5.0, name=name,
+    )  # fmt: skip
+
+
+def _layer(
+    dataset: xr.Dataset, layer: str, cells: int, window: tuple[tuple[float, float], ...]
+) -> list[Mark]:
+    """Return one layer; cells without a value keep the colour of their label."""
+    label = plane.pixels(dataset, dataset["label"], cells)
+    colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
+    classes = [("", colour) for colour in colours]
+    labels = Image(label.astype(np.int16) + 1, *window, classes=classes)
+    if layer == "labels":
+        return [labels]
+    values = plane.pixels(dataset, dataset[VARIABLES[layer]], cells).astype(np.float32)
+    absent = (values < 0) if layer == "settle" else ~np.isfinite(values) | (label < 0)
+    if layer == "settle":
+        np.maximum(values, 1.0, out=values)
+    values[absent] = np.nan
+    look = _colours(dataset, layer, values[~absent])
+    return [*([labels] if absent.any() else []), Image(values, *window, colours=look)]
+
+
+def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -> Colours:
+    """Return the colour scale of a layer.
+
+    Settle time is logarithmic; net turns are symmetric about 0 and leave out the outermost
+    two percent, so that a few long transients do not wash out the rest; so does the exponent.
+    Probabilities reach from 0 to 1, entropies from 0 on.
+    """
+    name, colours = unit(dataset, layer), _COLOUR_MAPS[layer]
+    if values.size == 0 or layer == "probability":
+        return Colours(name, colours, 0.0, 1.0)
+    if layer == "entropy":
+        return Colours(name, colours, 0.0, max(float(values.max()), 1e-3))
+    if layer == "settle":
+        low, high = float(values.min()), float(values.max())
+        high = max(high, low + 1.0)
+        return Colours(name, colours, low, high, "log", ticks=plane.log_ticks(low, high))
+    if layer == "turns":
+        size = np.abs(values)
+        top = max(1.0, float(np.ceil(np.quantile(size, 0.98))))
+        step = next(s for m in (1, 10, 100, 1000, 10**4) for s in (m, 2 * m, 5 * m) if 3 * s >= top)
+        ticks = [float(k) for k in range(-3 * step, 3 * step + 1, step) if abs(k) <= top]
+        over: Any = "both" if size.max() > top else "neither"
+        return Colours(name, colours, -top, top, beyond=over, ticks=ticks)
+    low, high = (float(q) for q in np.quantile(values, [0.005, 0.995]))
+    if high <= low:
+        low, high = low - 0.5, high + 0.5
+    ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    beyond: Any = ends.get((bool(values.min() < low), bool(values.max() > high)), "neither")
+    return Colours(name, colours, low, high, beyond=beyond)
+
+
+def _attractors(
+    dataset: xr.Dataset,
+    listed: list[legend.Entry],
+    theta: tuple[float, float],
+    velocity: tuple[float, float],
+) -> list[Mark]:
+    """Return the points of all attractors, with their copies 2 pi further."""
+    marks: list[Mark] = []
+    for entry in listed:
+        at = plane.copies(dataset, entry.points, *theta)
+        at = at[(at[:, 1] >= velocity[0]) & (at[:, 1] <= velocity[1])]
+        if entry.chaotic:
+            marks.append(Points(*at.T, size=1.1, order=4.0))
+        elif len(at):
+            marks.append(_marker(entry, at))
+    return marks
+
+
+def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Panel:
+    """Return the stroboscopic points of chaotic attractors on a plane of their own."""
+    dots = [Points(*entry.points.T, size=1.1, colour=entry.colour) for entry in chaos]
+    points = np.concatenate([entry.points for entry in chaos])
+    pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
+    speeds = float(points[:, 1].min()) - pad, float(points[:, 1].max()) + pad
+    sides = names.phase_plane(plane.angles(dataset, points[:, 0]), speeds, units)
+    note = [(exponents(dataset), QUIET)]
+    title = "its attractor, once a period"
+    return Panel("section", title, *sides, dots, share=SMALL, note=note)
 
 
 def reliable(dataset: xr.Dataset) -> bool:

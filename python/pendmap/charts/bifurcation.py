@@ -1,40 +1,40 @@
-"""Bifurcation diagrams as they are drawn: points, exponents and sweeps, coloured by attractor."""
+"""Bifurcation diagrams: points, sweeps up and down, exponents, coloured by attractor."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts import basins, palette, plane
+from pendmap.charts import basins, names, palette, plane
+from pendmap.charts.chart import QUIET, Axis, Chart, Image, Level, Mark, Panel, Points
 from pendmap.charts.legend import typeset
+from pendmap.errors import InputError
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
 
-MOST = 16
+MOST: Final = 16
 """Families that a legend names; the rest are drawn in the grey of what has no name."""
+_LAYERS: Final = ("theta", "velocity")
+_SIZE: Final = (7.4, 6.8)
+"""Inches of the figure."""
+_HEIGHTS: Final = (2.4, 0.42, 1.6)
+"""Heights of points, sweeps and exponents beside one another."""
+_SWEEPS: Final = (("up", 0.025), ("down", 0.055))
+"""Sweeps, and how far above the angles a recording has them, over the range of these."""
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
     """All attractors of a kind, period and winding.
 
-    Attributes
-    ----------
-    name : str
-        ``"rotation 1:+1"``.
-    colour : str
-        ``"#rrggbb"``.
-    points : ndarray, shape (m, 3)
-        Value, angle, velocity.
-    exponents : ndarray, shape (k, 2)
-        Value, largest exponent.
-    up, down : ndarray of bool
-        The values at which the sweeps are on one of them.
+    ``points``, shape (m, 3), are value, angle and velocity; ``exponents``, shape (k, 2), value and
+    largest exponent; ``up`` and ``down`` mark the values at which the sweeps are on one of them.
     """
 
     name: str
@@ -44,20 +44,97 @@ class Family:
     up: npt.NDArray[np.bool_]
     down: npt.NDArray[np.bool_]
 
-    @property
-    def shade(self) -> str:
-        """The colour in words."""
-        return palette.describe(self.name) if self.colour != palette.UNNAMED else "grey"
 
-    @property
-    def rgb(self) -> tuple[int, int, int]:
-        """The colour as red, green and blue."""
-        return palette.parts(self.colour)
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return angles and velocities of the points, the sweeps, the exponents."""
+    del cells
+    shown = layer or _LAYERS[0]
+    if shown not in _LAYERS:
+        raise InputError(f"layer must be one of {', '.join(_LAYERS)} in a diagram, got {shown!r}")
+    own = str(dataset.attrs["varied"])
+    name = basins.symbol(own, str(dataset[own].attrs.get("units", "1")))
+    ends = plane.outer_edges(dataset, own)
+    every = families(dataset)
+    units = Units.of(dataset.attrs)
+    theta = plane.angles(dataset, dataset["point_theta"].values)
+    speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
+    known = dataset["entry_exponent"].values
+    growth = plane.padded(np.append(known[np.isfinite(known)], 0.0))
+    across, bare = Axis(name, ends), Axis("", ends, ticks=())
+    rate = Axis(f"exponent {names.per_time(units)}", growth)
+    exponents: list[Mark] = [Level(0.0, colour=QUIET)]
+    exponents += [
+        _dots(one, one.exponents, 1.6, f"{k}/points") for k, one in reversed([*enumerate(every)])
+    ]
+    angle, speed = Axis(names.ANGLE, theta, "angle"), Axis(names.speed(units), speeds)
+    panels = [
+        Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
+        Panel("velocity", "", bare, speed, _points(dataset, every, "velocity")),
+        Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends)),
+        Panel("exponent", "", across, rate, exponents),
+    ]
+    count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
+    fixed = basins.parameters(dataset.attrs, [own])
+    return Chart(
+        f"Bifurcations over {name.split(' (')[0]}",
+        f"{fixed};   {count} values, {starts} starts each",
+        panels,
+        rows=[[shown], ["sweeps"], ["exponent"]],
+        heights=_HEIGHTS,
+        size=_SIZE,
+        letters=False,
+        tabs=True,
+        remark="The two lines above the angles: on which attractor the sweep up (lower) and the"
+        " sweep down (upper) are.",
+    )
 
-    @property
-    def text(self) -> str:
-        """Its line in a legend."""
-        return typeset(self.name)
+
+_STRIP: Final = Axis(
+    "",
+    (-1.0, 1.0),
+    ticks=((0.5, "up \N{RIGHTWARDS ARROW}"), (-0.5, "\N{LEFTWARDS ARROW} down")),
+)
+
+
+def _dots(one: Family, at: npt.NDArray[np.float64], size: float, path: str) -> Points:
+    return Points(*at.T, colour=one.colour, size=size, path=path)
+
+
+def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
+    """Return the stroboscopic points: those of orbits larger than those of chaos."""
+    column = 1 + _LAYERS.index(which)
+    values = dataset[str(dataset.attrs["varied"])].values
+    # Where values are far apart a point must be seen.
+    size = min(3.0, max(0.9, 200.0 / values.size))
+    loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
+    grey: dict[str, Any] = {"colour": palette.UNNAMED}
+    said = "sweep, undecided" if loose[0].size else ""
+    drawn: list[Mark] = [Points(*loose, size=0.45, order=1.0, name=said, **grey)]
+    for k, one in reversed([*enumerate(every)]):
+        of = 0.45 if "chaos" in one.name else size
+        drawn.append(_dots(one, one.points[:, [0, column]], of, f"{k}/points"))
+    low, high = plane.angles(dataset, dataset["point_theta"].values)
+    for name, height in _SWEEPS if which == "theta" else ():
+        for k, one in enumerate(every):
+            on = values[getattr(one, name)]
+            at = np.stack([on, np.full(on.size, high + height * (high - low))], axis=1)
+            drawn.append(_dots(one, at, 2.0, f"{k}/{name}"))
+    return drawn
+
+
+def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float]) -> list[Mark]:
+    """Return a strip for each sweep: on which attractor it is; and the names of all."""
+    strip = np.zeros((2, dataset.sizes[str(dataset.attrs["varied"])]), dtype=np.int64)
+    classes = [("", "#ffffff")]
+    more = len(every) - MOST
+    for k, one in enumerate(every, 1):
+        strip[1, one.up] = strip[0, one.down] = k
+        last = f"{more} more" if k == MOST + 1 else ""
+        classes.append((typeset(one.name) if k <= MOST else last, one.colour))
+    if (strip == 0).any():
+        classes[0] = ("sweep on none", "#ffffff")
+    image = Image(strip, ends, (-1.0, 1.0), classes=classes)
+    return [image, Level(0.0, colour="#ffffff", width=1.2)]
 
 
 def families(dataset: xr.Dataset) -> list[Family]:
@@ -104,27 +181,3 @@ def _name(kind: str, n: int, w: int) -> str:
     if family == "rotation":
         return f"rotation {n}:{w:+d}"
     return f"{kind} {'+' if w > 0 else '-'}" if w and n == 0 else kind
-
-
-def name(dataset: xr.Dataset) -> str:
-    """Return the name of the parameter with its unit."""
-    own = str(dataset.attrs["varied"])
-    return basins.symbol(own, str(dataset[own].attrs.get("units", "1")))
-
-
-def across(dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the outer edges of the parameter's values."""
-    return plane.outer_edges(dataset, str(dataset.attrs["varied"]))
-
-
-def title(dataset: xr.Dataset) -> str:
-    """Return the title of a figure."""
-    return f"Bifurcations over {name(dataset).split(' (')[0]}"
-
-
-def subtitle(dataset: xr.Dataset) -> str:
-    """Return what does not vary."""
-    own = str(dataset.attrs["varied"])
-    count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
-    fixed = basins.parameters(dataset.attrs, [own])
-    return f"{fixed};   {count} values, {starts} starts each"

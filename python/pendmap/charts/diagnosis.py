@@ -1,12 +1,41 @@
-"""What the parts of a diagnosis are called in pictures."""
+"""A diagnosis: residuals, forecasts, the torque that a model lacks, candidates, effects by run."""
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.charts.chart import (
+    QUIET,
+    Areas,
+    Axis,
+    Band,
+    Chart,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Span,
+    bars,
+    holding,
+)
+from pendmap.charts.methods import NOISE, look
+from pendmap.model.labels import unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.comparison.forecast import Forecast
+    from pendmap.diagnosis import Discrepancy
+
+Floats = npt.NDArray[np.float64]
 
 ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"
-"""The unit of a torque per moment of inertia."""
-
+"""Unit of a torque per moment of inertia."""
 OVER_SAID: Final = {
     "angle": "angle (rad)",
     "velocity": "velocity (rad/s)",
@@ -15,3 +44,358 @@ OVER_SAID: Final = {
     "lab_time": "time in the laboratory (s)",
 }
 """What a residual torque is shown over, with units."""
+BEFORE, AFTER = look("before").colour, look("after").colour
+ALIKE, OTHER = "#56b4e9", "#9a9a9a"
+"""Candidates that are not told apart from what was found, and all others."""
+Z95: Final = 1.959963984540054
+RUNS: Final = 3
+"""Runs whose residuals are drawn: those that the baseline misses most."""
+PART: Final = 0.1
+"""Part of a small swing over which residuals are averaged: what a model lacks is slower."""
+WIDE: Final = 8.0
+"""Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
+RANKED: Final = 8
+"""Candidates in the ranking."""
+SIZE: Final = (8.6, 12.2)
+"""Width and height of the sheet in inches."""
+
+
+def sheet(found: Discrepancy) -> Chart:
+    """Return the sheet: residuals, their rms and forecasts, torques, ranking, an effect by run."""
+    rms = found.gap
+    subtitle = (
+        f"residual {1e3 * rms.before:.3g} mrad before, {1e3 * rms.after:.3g} after, noise "
+        f"{1e3 * rms.noise_floor:.3g};   held out {1e3 * rms.held_out_before:.3g} before, "
+        f"{1e3 * rms.held_out_after:.3g} after"
+    )
+    rows = [[panel] for panel in residuals(found)]
+    heights = [0.62] * len(rows)
+    gap = [by_run(found)]
+    if found.forecasts:
+        gap.append(forecast(found, max(found.forecasts, key=lambda one: one.starts)))
+    rows += [gap, [torque(found, "angle"), torque(found, "velocity")]]
+    shown = shown_coefficients(found)[:1]
+    # One run has nothing to be compared with.
+    last = coefficients(found, shown[0]) if shown else torque(found, "amplitude")
+    rows.append([ranking(found), last])
+    return _of_rows(_title(found), subtitle, rows, [*heights, 1.2, 1.2, 1.5], SIZE)
+
+
+def _of_rows(
+    title: str,
+    subtitle: str,
+    rows: Sequence[Sequence[Panel]],
+    heights: Sequence[float],
+    size: tuple[float, float],
+) -> Chart:
+    return Chart(
+        title,
+        subtitle,
+        [panel for row in rows for panel in row],
+        rows=[[panel.name for panel in row] for row in rows],
+        heights=heights,
+        size=size,
+        letters=False,
+    )
+
+
+def parts(found: Discrepancy) -> dict[str, Chart]:
+    """Return the charts of a report by the names that it has for them, those that show anything."""
+    made: dict[str, Chart] = {}
+    rows: list[list[Panel]] = [[panel] for panel in residuals(found)]
+    said = "the runs that the baseline misses most"
+    made["residuals"] = _of_rows("Residuals", said, rows, [1.0] * len(rows), (8.6, 4.2))
+    starts = " and ".join(f"{one.starts} {one.kind}" for one in found.forecasts)
+    said = f"forecasts from {starts} starts on what was held out" if starts else ""
+    panels = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
+    made["gap"] = _of_rows("The gap", said, [panels], [1.0], (8.6, 3.7))
+    over = [name for name in OVER_SAID if _torque_rows(found, name)]
+    if over:
+        pairs = [over[k : k + 2] for k in range(0, len(over), 2)]
+        rows = [[torque(found, name) for name in pair] for pair in pairs]
+        made["torque"] = _of_rows(
+            "Torque that the model lacks", "per moment of inertia; bands: 95 %", rows,
+            [1.0] * len(rows), (8.6, 1.1 + 2.3 * len(rows)),
+        )  # fmt: skip
+    if found.scores.best():
+        said = "what each effect of the library would explain by itself"
+        made["ranking"] = _of_rows("Ranking", said, [[ranking(found)]], [1.0], (8.6, 3.5))
+    shown = shown_coefficients(found)
+    if shown:
+        panels = [coefficients(found, name) for name in shown]
+        made["runs"] = _of_rows("Run by run", "bars and band: 95 %", [panels], [1.0], (8.6, 3.5))
+    return made
+
+
+def _title(found: Discrepancy) -> str:
+    """Return the verdict with its names; of classes that are not told apart with all of them."""
+    alike = {names[0]: names for names in found.equivalent}
+    names = [effect.name for effect in found.effects]
+    if found.verdict == "ambiguous":
+        names = [" or ".join(alike.get(name, [name])) for name in names]
+    between = "; " if found.verdict == "ambiguous" else ", "
+    return f"{found.verdict}: {between.join(names) or 'no effect claimed'}"
+
+
+def models(found: Discrepancy) -> list[tuple[str, str]]:
+    """Return the names of the models and their colours; the baseline alone where it stays."""
+    return [("before", BEFORE), ("after", AFTER)] if found.adds else [("baseline", BEFORE)]
+
+
+def residuals(found: Discrepancy) -> list[Panel]:
+    """Return record less model of the runs that the baseline misses most, before and after."""
+    runs = found.data.fitted
+    rows = [row for row in found.gap.by_run if not row.held_out]
+    order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
+    longest = max(float(runs[k].time[-1]) for k in order)
+    panels = []
+    for k in sorted(order):
+        run = runs[k]
+        interval = float(np.median(np.diff(run.time)))
+        every = max(round(PART * math.tau / (found.base.fitted.fit.model.w0 * interval)), 1)
+        time = run.time[::every]
+        floor = 2e3 * rows[k].noise_floor / math.sqrt(every)
+        marks: list[Mark] = [
+            Span((-floor, floor), axis="y", colour=NOISE, name="noise, 2 standard errors")
+        ]
+        shown = [np.array([-floor, floor])]
+        fits = (found.base.fitted.fit, found.best.fitted.fit)
+        for (name, colour), fit in zip(models(found), fits, strict=False):
+            residual = 1e3 * fit.residuals[k]
+            if run.trusted is not None:
+                residual = np.where(run.trusted, residual, math.nan)
+            mean = _smoothed(residual, every)[: time.size]
+            marks.append(Line(time, mean, colour=colour, width=1.0, name=name))
+            shown.append(mean)
+        across = Axis(
+            "time (s)" if k == max(order) else "",
+            (0.0 if time[0] >= 0 else float(time[0]), longest),
+        )
+        title = f"{run.name}: record less model, means over a tenth of a swing"
+        panels.append(Panel(f"residual {k}", title, across, Axis("mrad", holding(*shown)), marks))
+    return panels
+
+
+def _smoothed(residual: Floats, every: int) -> Floats:
+    """Return means over ``every`` samples; a bin without samples is not drawn."""
+    whole = -(-residual.size // every) * every
+    padded = np.full(whole, math.nan)
+    padded[: residual.size] = residual
+    rows = padded.reshape(-1, every)
+    known = np.isfinite(rows)
+    count = known.sum(axis=1)
+    total = np.where(known, rows, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), math.nan)
+
+
+def _rms(*values: npt.ArrayLike) -> Axis:
+    """Return the axis of residuals in mrad, logarithmic where they differ much."""
+    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    every = every[np.isfinite(every)]
+    low, high = float(every.min()), float(every.max())
+    if high > WIDE * low > 0:
+        return Axis("rms (mrad)", (low / 1.4, 1.5 * high), "log")
+    return Axis("rms (mrad)", (0.0, 1.15 * high))
+
+
+def _runs(names: Sequence[str]) -> Axis:
+    ticks = [(float(k), name.removesuffix(".csv")) for k, name in enumerate(names)]
+    return Axis("", (-0.6, len(names) - 0.4), ticks=ticks)
+
+
+def by_run(found: Discrepancy) -> Panel:
+    """Return the residual of each run before and after over its noise, those held out last."""
+    rows = found.gap.by_run
+    at = np.arange(len(rows), dtype=float)
+    back = [k for k, row in enumerate(rows) if row.held_out]
+    noise, before, after = (
+        1e3 * np.array([getattr(row, key) for row in rows])
+        for key in ("noise_floor", "before", "after")
+    )
+    marks: list[Mark] = []
+    if back:
+        marks.append(Span((back[0] - 0.5, back[-1] + 0.5), colour="#f1f1f1", name="held out"))
+    level, _ = bars(noise, at - 0.32, at + 0.32)
+    ends = bars(noise, at - 0.32, at + 0.32)[1]
+    marks += [
+        Line(*bars(at, after, before), colour="#bbbbbb", width=1.0, order=1.0),
+        Points(at, before, colour=BEFORE, fill="#ffffff", edge_width=1.0, size=5.0),
+        Line(ends, level, width=1.1, name="noise"),
+    ]
+    if found.adds:
+        marks.append(Points(at, after, marker="s", colour=AFTER, size=4.0))
+    return Panel(
+        "by run",
+        "Residual by run",
+        _runs([r.name for r in rows]),
+        _rms(noise, before, after),
+        marks,
+    )
+
+
+def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel:
+    """Return the error of forecasts against their horizon, and the noise."""
+    floor = 1e3 * one.noise_floor
+    marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
+    shown: list[npt.ArrayLike] = [floor]
+    for (name, colour), error in zip(models(found), (one.before, one.after), strict=False):
+        path = "before" if name == "baseline" else name
+        line = 1e3 * error
+        marks.append(Line(one.horizon, line, colour=colour, width=1.4, name=name, path=path))
+        shown.append(line)
+    across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
+    title = f"Error of forecasts, {one.kind} runs"
+    root = f"forecast/{one.kind}"
+    up = Axis("rms (mrad)", holding(0.0, *shown)) if plain else _rms(*shown)
+    return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
+
+
+def _torque_rows(found: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
+    """Return the bins of both models, none where there is nothing to bin by."""
+    torques = (found.torque_before, found.torque_after)
+    both = zip(models(found), torques, strict=False)
+    rows = [torque.rows.get(over, []) for _, torque in both]
+    return rows if any(rows) else []
+
+
+def torque(found: Discrepancy, over: str) -> Panel:
+    """Return the torque that both models lack over one of these, with bands of 95 %."""
+    marks: list[Mark] = [Level(0.0, colour=QUIET, path="zero")]
+    every: list[dict[str, Any]] = []
+    shown = [np.zeros(1)]
+    for (name, colour), own in zip(models(found), _torque_rows(found, over), strict=False):
+        if not own:
+            continue
+        every += own
+        path = "before" if name == "baseline" else name
+        edges = np.array([own[0]["from"], *(row["to"] for row in own)])
+        value, error = (np.array([row[key] for row in own]) for key in ("torque", "stderr"))
+        low, high, line = (
+            np.append(v, v[-1]) for v in (value - Z95 * error, value + Z95 * error, value)
+        )
+        marks += [
+            Band(edges, low, high, colour=colour, alpha=0.25, step=True, path=f"{path}/bars"),
+            Line(edges, line, colour=colour, width=1.3, step=True, name=name, path=path),
+        ]
+        shown += [low, high]
+    ends = (min(r["from"] for r in every), max(r["to"] for r in every)) if every else (0.0, 1.0)
+    along = bool(every) and every[0]["along_motion"]
+    said = "torque along\nthe motion" if along else "torque"
+    title = f"Torque that the model lacks, over {over.replace('_', ' ')}"
+    up = Axis(f"{said} ({ACCELERATION})", holding(*shown))
+    return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
+
+
+def recorded(found: Discrepancy) -> list[Panel]:
+    """Return the panels of a recording: torques and forecasts."""
+    torques = [torque(found, over) for over in OVER_SAID if _torque_rows(found, over)]
+    return [*torques, *(forecast(found, one, plain=True) for one in found.forecasts)]
+
+
+def ranking(found: Discrepancy) -> Panel:
+    """Return the greatest scores at the baseline, those of the effects found in colour."""
+    best = [found.scores.scores[k] for k in found.scores.best()[:RANKED]]
+    level = found.base.fitted.noise.level
+    values = [max(score.gain / level, 0.1) for score in best]
+    said = {AFTER: "found", ALIKE: "not told apart from it", OTHER: "not taken"}
+    boxes: dict[str, list[Floats]] = {}
+    ticks = []
+    for place, (score, value) in enumerate(zip(best, values, strict=True)):
+        y = float(len(best) - 1 - place)
+        name = score.candidate.name
+        ticks.append((y, name))
+        colour = ALIKE if any(name in names for names in found.equivalent) else OTHER
+        colour = AFTER if name in {effect.name for effect in found.effects} else colour
+        corners = [(1.0, y - 0.35), (value, y - 0.35), (value, y + 0.35), (1.0, y + 0.35)]
+        boxes.setdefault(colour, []).append(np.array(corners))
+    marks = [Areas(boxes[c], colour=c, name=text) for c, text in said.items() if c in boxes]
+    across = Axis("score G", (1.0, max(30.0, 2 * max(values, default=1.0))), "log")
+    up = Axis("", (-0.6, max(len(best), 1) - 0.4), ticks=ticks)
+    return Panel("ranking", "Candidates at the baseline", across, up, marks)
+
+
+def shown_coefficients(found: Discrepancy) -> list[str]:
+    """Return the parameters that are drawn run by run: the sizes of what was found.
+
+    Where nothing was found, the parameter that differs most between runs, by its errors. One run
+    has nothing to be compared with.
+    """
+    if len(found.data.fitted) == 1:
+        return []
+    sizes = [standing.candidate.free[0] for standing in found.assessment.identified]
+    known = [name for name in ("c_over_m", "w0", "Tr") if name in found.runs.coefficients]
+
+    def apart(name: str) -> float:
+        errors = [error for _, error in found.runs.shown(name)]
+        return found.runs.between(name) / min(errors, default=math.inf)
+
+    return sizes or ([max(known, key=apart)] if known else [])
+
+
+def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
+    """Return the interval of 95 % that all runs together leave a parameter, as it is stated.
+
+    That of the effect found; of what is not claimed, by the standard error as the report widens it.
+    """
+    trial = found.nearest.fitted
+    estimate = trial.fit.estimates[shown]
+    for standing, effect in zip(found.assessment.identified, found.effects, strict=False):
+        bounds = effect.ci95.get(standing.candidate.size)
+        if standing.candidate.free[0] == shown and bounds is not None:
+            # A size below 0 may be stated as one above it, half a turn on.
+            turned = estimate.value * effect.parameters[standing.candidate.size] < 0
+            return (-bounds[1], -bounds[0]) if turned else bounds
+    half = Z95 * math.sqrt(trial.widening) * (estimate.stderr or 0.0)
+    return estimate.value - half, estimate.value + half
+
+
+def _reach(found: Discrepancy, shown: str) -> tuple[float, float]:
+    """Return the ends of the axis: a run that hardly shows the effect would hide the others."""
+    mean = found.nearest.fitted.fit.estimates[shown].value
+    known = [(v, e) for v, e in found.runs.coefficients[shown] if math.isfinite(e)]
+    errors = sorted(e for _, e in known)
+    reach = 6 * errors[len(errors) // 2] if errors else 0.0
+    spread = max((abs(v - mean) for v, e in known if e < reach), default=0.0)
+    wide = max(abs(end - mean) for end in _together(found, shown))
+    half = max(1.4 * spread, reach, 1.5 * wide) or 1.0
+    return mean - half, mean + half
+
+
+def coefficients(found: Discrepancy, shown: str) -> Panel:
+    """Return a parameter as each run would have it, over what all together have."""
+    pairs = found.runs.coefficients[shown]
+    mean = found.nearest.fitted.fit.estimates[shown].value
+    power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0
+    scale = 10.0**-power
+    at = np.arange(len(pairs), dtype=float)
+    value, error = (scale * np.array([pair[k] for pair in pairs]) for k in (0, 1))
+    known = np.isfinite(error)
+    low, high = (scale * end for end in _reach(found, shown))
+    least, most = value - Z95 * error, value + Z95 * error
+    together = [scale * end for end in _together(found, shown)]
+    marks: list[Mark] = [
+        Span(together, axis="y", colour=NOISE, name="all together"),
+        Line(*bars(at[known], least[known], most[known]), colour=AFTER, width=1.0),
+        Points(at[known], value[known], marker="s", size=4.0, colour=AFTER, name="own value"),
+    ]
+    inner = high - low
+    for which, place, mark, said in (
+        (known & (most > high), high - 0.03 * inner, "^", "beyond the axis"),
+        (known & (least < low), low + 0.03 * inner, "v", "beyond the axis"),
+        (~known, low + 0.06 * inner, "x", "does not show"),
+    ):
+        x = at[which]
+        if x.size:
+            spots = np.full(x.size, place)
+            marks.append(
+                Points(
+                    x, spots, marker=mark, size=4.5, colour=QUIET, edge_width=1.0, name=said
+                )
+            )  # fmt: skip
+    times = f"10$^{{{power}}}$ " if power else ""
+    unit = f"{times}{unit_of(shown, found.definition)}".strip()
+    own = shown.rpartition(".")[2]
+    claimed = "" if found.effects else " (not claimed)"
+    up = Axis(f"{own} ({unit})" if unit else own, (low, high))
+    names = _runs([run.name for run in found.data.fitted])
+    return Panel(f"run by run {shown}", f"{shown}{claimed}", names, up, marks)

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import palette
-from pendmap.charts.basins import finite_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,18 +20,9 @@ if TYPE_CHECKING:
 class Entry:
     """One line of a legend.
 
-    Attributes
-    ----------
-    id : int
-        1 and up: an attractor; 0: undecided; -1: failed or diverged.
-    name, kind : str
-        As in the dataset; of undecided and failed cells, ``kind`` is the name.
-    share : str
-        Share of the cells with its standard error, ``"20.92 +- 0.13 %"``.
-    twin : str
-        Name of its mirror twin; empty where there is none.
-    points : ndarray, shape (m, 2)
-        Its stroboscopic points: angle in rad, nondimensional velocity.
+    ``id`` is 1 and up of an attractor, 0 of undecided and -1 of failed cells, whose ``kind`` is the
+    name; ``share`` is that of the cells with its standard error, ``twin`` the name of its mirror
+    twin, ``points``, shape (m, 2), are its stroboscopic points: angle in rad, velocity.
     """
 
     id: int
@@ -74,7 +64,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
         other = names.get(twin, "") if twin != i else ""
         share = percent(float(row["fraction"]), float(row["stderr"]))
         found.append(Entry(i, name, str(row["kind"].item()), share, other, points[owner == i]))
-    if finite_time(dataset) and not found:
+    if dataset.attrs.get("layers") == "finite_time" and not found:
         return found
     for i, name in ((0, "undecided"), (-1, "failed")):
         share_of = float(dataset.attrs.get(name, 0.0))
@@ -84,13 +74,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
 
 
 def colours(dataset: xr.Dataset) -> npt.NDArray[np.uint8]:
-    """Return the colours of the labels -1, 0, 1, ..., K.
-
-    Returns
-    -------
-    ndarray of uint8, shape (K + 2, 3)
-        Red, green, blue; row ``label + 1`` belongs to ``label``.
-    """
+    """Return the colours of the labels -1, 0, 1, ..., K: shape (K + 2, 3), rows from -1 on."""
     ids = dataset["id"].values.astype(int)
     table = np.empty((int(ids.max(initial=0)) + 2, 3), dtype=np.uint8)
     table[:] = palette.rgb("unnamed")

@@ -1,17 +1,32 @@
-"""Lifetimes as they are drawn: survival curves, the fitted tail, what they are called."""
+"""Lifetimes of transient chaos: survival with its tail, and the mean over where the tail begins."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import palette
+from pendmap.charts import basins, palette
+from pendmap.charts.chart import (
+    INK,
+    QUIET,
+    Axis,
+    Band,
+    Chart,
+    Dash,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Span,
+    bars,
+)
 from pendmap.charts.legend import typeset
-from pendmap.formatting import written
+from pendmap.formatting import counted, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,58 +34,39 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-SIGMAS = 2.0
+SIGMAS: Final = 2.0
 """Standard errors on each side that a band covers."""
-
-FEW = 0.01
+FEW: Final = 0.01
 """Share of starts given up at the bound above which curves of single attractors would end there."""
+_FIT, _BAND = "#d55e00", "#f4c3a0"
+_DASHES: Final[tuple[Dash, ...]] = ("-", (5, 1.5), (1.2, 1.2), (5, 1.5, 1.2, 1.5))
+"""Dashes of the curves: those of twins lie on one another."""
+_LEAST_SIGNIFICANT: Final = 0.05
+"""Level at which a tail is not exponential."""
+_MARK: Final = (2.0, 2.0)
+"""Dash of the line where the tail begins."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Shares of all starts that are still alive.
-
-    Attributes
-    ----------
-    name, kind : str
-        What captures them in the end; of all of them together both are empty.
-    periods, share : ndarray, shape (n,)
-        After so many periods; nan where none is left.
-    """
+    """Share of all starts still alive after ``periods``; without a name, of all together."""
 
     name: str
     kind: str
     periods: Floats
     share: Floats
 
-    @property
-    def colour(self) -> str:
-        """The colour of the name; dark for all."""
-        return palette.colour(self.name, self.kind) if self.name else "#222222"
 
-    @property
-    def text(self) -> str:
-        """Its line in a legend."""
-        return typeset(self.name) if self.name else "all starts"
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The fitted tail.
-
-    Attributes
-    ----------
-    periods, share, low, high : ndarray, shape (n,)
-        The curve and its band, from where it begins.
-    text : str
-        Its line in a legend.
-    """
-
-    periods: Floats
-    share: Floats
-    low: Floats
-    high: Floats
-    text: str
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return survival curves with the fitted tail, and the mean time left by its beginning."""
+    del cells
+    panels = [_survival(dataset)]
+    if dataset.sizes["tail_begin"] > 1:
+        panels.append(_tail(dataset))
+    starts = counted(int(dataset.attrs["starts"]), "start")
+    subtitle = f"{basins.parameters(dataset.attrs)};   {starts}"
+    size = (9.6 if len(panels) > 1 else 6.0, 4.6)
+    return Chart(_title(dataset), subtitle, panels, size=size).only(layer, (6.0, 4.6))
 
 
 def curves(dataset: xr.Dataset) -> list[Curve]:
@@ -103,30 +99,32 @@ def _shares(count: npt.NDArray[np.int64], starts: int) -> Floats:
     return np.where(share > 0, share, np.nan)
 
 
-def fit(dataset: xr.Dataset) -> Fit | None:
-    """Return the fitted tail, None where there is no transient chaos, or it begins later."""
+def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
+    """Return the fitted tail; none where there is no transient chaos, or it begins later."""
     a = dataset.attrs
     if not a["transient_chaos"]:
-        return None
+        return []
     mean, error, begin = (float(a[key]) for key in ("mean_periods", "stderr", "from_period"))
-    everything = curves(dataset)[0]
-    last = everything.periods[-1]
-    begin = max(begin, everything.periods[0])
+    last = whole.periods[-1]
+    begin = max(begin, whole.periods[0])
     if begin > last:
-        return None
+        return []
     periods = np.linspace(begin, max(last, begin + 1), 200)
-    first = float(np.interp(begin, everything.periods, np.nan_to_num(everything.share)))
+    first = float(np.interp(begin, whole.periods, np.nan_to_num(whole.share)))
     low, share, high = (
         first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
         for way in (-1, 0, 1)
     )
     said = f"{written(mean, error)} \N{PLUS-MINUS SIGN} {written(error, error)} periods"
     text = f"tail from period {a['from_period']}: mean lifetime {said}"
-    return Fit(periods, share, low, high, text)
+    return [
+        Band(periods, low, high, colour=_BAND, name=text, path="band", order=1.0),
+        Line(periods, share, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),
+        Level(float(periods[0]), axis="x", colour=QUIET, dash=_MARK),
+    ]
 
 
-def title(dataset: xr.Dataset) -> str:
-    """Return what a picture of lifetimes is called."""
+def _title(dataset: xr.Dataset) -> str:
     a = dataset.attrs
     if a["persistent"]:
         return f"Persistent chaos: {typeset(str(dataset['attractor'].values[0]))}"
@@ -134,3 +132,57 @@ def title(dataset: xr.Dataset) -> str:
         mean, error = float(a["mean_periods"]), float(a["stderr"])
         return f"Transient chaos: lives {written(mean, error)} periods on average"
     return "No transient chaos" if math.isfinite(a["escape_rate"]) or a["captured"] else "Undecided"
+
+
+def _survival(dataset: xr.Dataset) -> Panel:
+    every = curves(dataset)
+    marks: list[Mark] = []
+    for k, one in enumerate(every):
+        colour = palette.colour(one.name, one.kind) if one.name else INK
+        said = f"those that {typeset(one.name)} captures" if one.name else "all starts"
+        look: dict[str, Any] = {
+            "colour": colour,
+            "width": 1.3 if one.name else 1.8,
+            "dash": _DASHES[k % 4],
+        }
+        line = Line(one.periods, one.share, step=True, name=said, path=str(k), **look)
+        marks.append(line)
+    marks += _fit(dataset, every[0])
+    lowest = min(np.min(one.share[one.share > 0], initial=1.0) for one in every)
+    bottom = max(0.5 / float(dataset.attrs["starts"]), 0.5 * lowest)
+    periods = every[0].periods
+    across = Axis("periods", (periods[0], max(periods[-1], periods[0] + 1.0)))
+    up = Axis("share alive", (float(bottom), 1.5), "log")
+    return Panel("survival", "share of starts still alive", across, up, marks)
+
+
+def _tail(dataset: xr.Dataset) -> Panel:
+    """Return the mean time left against where the tail begins; empty: it is not exponential."""
+    begin, mean = dataset["tail_begin"].values.astype(float), dataset["tail_mean"].values
+    error, chance = dataset["tail_stderr"].values, dataset["tail_exponential"].values
+    a = dataset.attrs
+    marks: list[Mark] = []
+    if a["transient_chaos"]:
+        middle, wide = float(a["mean_periods"]), SIGMAS * float(a["stderr"])
+        start = float(a["from_period"])
+        marks = [
+            Span((middle - wide, middle + wide), axis="y", colour=_BAND),
+            Level(middle, colour=_FIT, width=1.4, path="fitted", order=1.0),
+            Level(start, axis="x", colour=QUIET, dash=_MARK),
+        ]
+    rough = chance <= _LEAST_SIGNIFICANT
+    spots: dict[str, Any] = {"size": 4.0, "edge": INK, "edge_width": 0.8, "order": 3.0}
+    exponential = "from here on exponential, with standard error"
+    not_so = "not exponential at the 5 % level"
+    marks += [
+        Line(*bars(begin, mean - error, mean + error), colour=QUIET, width=0.8, path="error"),
+        Points(begin, mean, name=exponential, path="mean", **spots),
+        Points(begin[rough], mean[rough], fill="white", name=not_so, **spots),
+    ]
+    precise = error < np.maximum(0.25 * mean, 1e-9)
+    low = float(np.min((mean - error)[precise], initial=float(mean.min())))
+    high = float(np.max((mean + error)[precise], initial=low * 1.05))
+    room = 0.08 * (high - low)
+    across = Axis("where the tail begins (periods)", (0.0, 1.03 * float(begin[-1])))
+    up = Axis("mean time left (periods)", (low - room, high + room))
+    return Panel("tail", "mean time left, against where the tail begins", across, up, marks)

@@ -1,16 +1,32 @@
-"""Lyapunov exponents as they are drawn: titles, the value in words, exponents of stretches."""
+"""A Lyapunov exponent: growth along the start, the running mean, its distribution."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import names
+from pendmap.charts import basins, names, palette, plane
+from pendmap.charts.chart import (
+    DASHED,
+    INK,
+    QUIET,
+    Axis,
+    Band,
+    Chart,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Span,
+    Steps,
+    holding,
+)
 from pendmap.charts.legend import typeset
-from pendmap.formatting import with_error
+from pendmap.formatting import counted, with_error
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -19,9 +35,40 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+_LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
+_BINS: Final = 60
+"""Bins of the distribution."""
+_SIGMAS: Final = 2
+"""Standard errors on each side that the band covers."""
+_WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}
+"""Inches of a figure by its number of panels."""
 
-def title(dataset: xr.Dataset) -> str:
-    """Return what a picture of an exponent is called."""
+
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return growth and exponent; of chaos also its distribution, in a recording the attractor."""
+    del cells
+    a = dataset.attrs
+    panels = [_growth(dataset)]
+    if dataset.sizes["window"]:
+        panels += [_average(dataset), _distribution(dataset)]
+    else:
+        panels.append(_sliding(dataset))
+    units = Units.of(a)
+    start = f"from \N{GREEK SMALL LETTER THETA} = {float(a['theta0']):.6g}, "
+    start += f"{names.velocity(units)} = {units.spoken(format(float(a['velocity0']), '.6g'))}"
+    rows = [[panel.name for panel in panels]]
+    if dataset.sizes["point"]:
+        panels.append(_attractor(dataset))
+    return Chart(
+        _title(dataset),
+        f"{basins.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        panels,
+        rows=rows,
+        size=(_WIDTHS[len(rows[0])], 4.3),
+    ).only(layer, (_WIDTHS[1], 4.3))
+
+
+def _title(dataset: xr.Dataset) -> str:
     head = "Largest Lyapunov exponent"
     if dataset.sizes["attractor"]:
         return f"{head}: {typeset(str(dataset['attractor'].values[0]))}"
@@ -33,32 +80,91 @@ def title(dataset: xr.Dataset) -> str:
     return f"{head}: {words[str(dataset.attrs['end'])]}"
 
 
-def value(dataset: xr.Dataset) -> str:
+def _value(dataset: xr.Dataset) -> str:
     """Return the exponent with its error and unit, empty where there is none."""
     a = dataset.attrs
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}")
-    said = said.replace("-", "\N{MINUS SIGN}")
-    per = names.per_time(Units.of(a))
-    return f"\N{GREEK SMALL LETTER LAMDA} = {said} {per}"
+    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}").replace("-", "\N{MINUS SIGN}")
+    return f"\N{GREEK SMALL LETTER LAMDA} = {said} {names.per_time(Units.of(a))}"
 
 
-def elapsed(dataset: xr.Dataset) -> tuple[float, float]:
+def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
     """Return the first and the last period of a curve, one apart at least."""
     periods = dataset["elapsed"].values
     return float(periods[0]), float(max(periods[-1], periods[0] + 1))
 
 
-def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
-    """Return where windows end along the start's own trajectory, and their exponents.
+def _rate(dataset: xr.Dataset) -> str:
+    return f"\N{GREEK SMALL LETTER LAMDA} ({names.per_time(Units.of(dataset.attrs))})"
 
-    Returns
-    -------
-    periods, exponents : ndarray, shape (n,)
-        Of ``window`` periods each; of fewer where the trajectory is shorter.
-    """
+
+def _transient(dataset: xr.Dataset) -> list[Mark]:
+    periods = max(int(dataset.attrs["transient_periods"]), 0)
+    said = f"transient, {counted(periods, 'period')}"
+    marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
+    return [Span((0, periods), colour=_TRANSIENT, name=said), *marks] if periods else marks
+
+
+def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
+    value = float(dataset.attrs["exponent"])
+    if not math.isfinite(value):
+        return []
+    said = _value(dataset)
+    look: dict[str, Any] = {
+        "colour": _MEAN,
+        "width": 1.6,
+        "dash": DASHED,
+        "name": said,
+        "path": "value",
+    }
+    return [Level(value, axis=axis, order=2.0, **look)]
+
+
+def _growth(dataset: xr.Dataset) -> Panel:
+    a, periods, growth = dataset.attrs, dataset["elapsed"].values, dataset["growth"].values
+    marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
+    rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
+    look: dict[str, Any] = {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
+    if math.isfinite(rate) and math.isfinite(a["stderr"]):
+        begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
+        # Beside a line of many decades the constant matters little: it meets the end.
+        last = growth[-1] if transient else rate * periods[-1]
+        line = last + rate * (periods[begin:] - periods[-1])
+        marks.append(Line(periods[begin:], line, **look))
+    elif math.isfinite(float(a["exponent"])):
+        marks.append(Line(periods[:0], growth[:0], **look))
+    across = Axis("periods since the start", _elapsed(dataset))
+    up = Axis("ln |\N{GREEK SMALL LETTER DELTA}x|", holding(growth, 0.0))
+    return Panel("growth", "growth along the start's own trajectory", across, up, marks)
+
+
+def _average(dataset: xr.Dataset) -> Panel:
+    """Return the mean over all trajectories against the periods averaged, with its band."""
+    a, periods = dataset.attrs, dataset["averaged"].values.astype(float)
+    mean, error = dataset["running_exponent"].values, dataset["running_stderr"].values
+    marks: list[Mark] = []
+    shown = [mean]
+    if math.isfinite(a["stderr"]):
+        low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
+        said = f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean"
+        marks.append(Band(periods, low, high, colour=_BAND, name=said, path="band"))
+        shown += [low, high]
+    if a["end"] == "undamped":
+        regular = np.log1p(periods / a["dropped_periods"]) / (periods * a["forcing_period"])
+        said = "regular motion: deviations grow as \N{GREEK SMALL LETTER TAU}"
+        marks.append(Line(periods, regular, width=1.0, dash=":", name=said, colour=INK, order=4.0))
+        shown.append(regular)
+    marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
+    across = Axis("periods averaged, each", (periods[0], periods[-1]), "log")
+    title = f"mean over {a['trajectories']} trajectories"
+    up = Axis(_rate(dataset), holding(*shown, margin=0.08))
+    return Panel("average", title, across, up, marks)
+
+
+def _sliding(dataset: xr.Dataset) -> Panel:
+    """Return exponents of stretches of ``window`` periods of the start's own trajectory."""
     a = dataset.attrs
     growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
     width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
@@ -66,4 +172,37 @@ def sliding(dataset: xr.Dataset) -> tuple[Floats, Floats]:
     begin = np.searchsorted(elapsed, elapsed - width)
     whole = (elapsed[begin] == elapsed - width) & (width > 0)
     gained = growth[whole] - growth[begin[whole]]
-    return elapsed[whole].astype(float), gained / (max(width, 1) * float(a["forcing_period"]))
+    rates = gained / (max(width, 1) * float(a["forcing_period"]))
+    marks = [*_transient(dataset), *_level(dataset)]
+    marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
+    across = Axis("periods since the start, last of each", _elapsed(dataset))
+    up = Axis(_rate(dataset), holding(rates, 0.0, float(a["exponent"]), margin=0.08))
+    title = f"exponent over {a['window']} periods"
+    return Panel("average", title, across, up, marks, root="exponent")
+
+
+def _distribution(dataset: xr.Dataset) -> Panel:
+    values = dataset["finite_time_exponent"].values.ravel()
+    density, edges = np.histogram(values, bins=_BINS, density=True)
+    marks: list[Mark] = [
+        Steps(edges, density, colour=_BAND, filled=True),
+        Steps(edges, density, colour=_LINE, width=0.9, path="density"),
+        *_level(dataset, "x"),
+    ]
+    if edges[0] < 0 < edges[-1]:
+        marks.append(Level(0.0, axis="x", colour=QUIET, width=0.6))
+    across = Axis(_rate(dataset), (float(edges[0]), float(edges[-1])))
+    up = Axis("density", (0.0, 1.08 * float(density.max())))
+    title = f"exponents over {dataset.attrs['window']} periods"
+    return Panel("distribution", title, across, up, marks)
+
+
+def _attractor(dataset: xr.Dataset) -> Panel:
+    name, kind = (str(dataset[key].values[0]) for key in ("attractor", "kind"))
+    theta = plane.angles(dataset, dataset["point_theta"].values)
+    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    at = plane.copies(dataset, points, *theta)
+    size = 2.0 if kind.endswith("chaos") else 7.0
+    spots = Points(*at.T, colour=palette.colour(name, kind), size=size, path="points")
+    across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(dataset.attrs))
+    return Panel("attractor", "attractor, once a period", across, up, [spots])

@@ -1,22 +1,83 @@
-"""How much of Melnikov's threshold is drawn."""
+"""Melnikov's threshold against the frequency of the drive."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+
+from pendmap.charts import basins
+from pendmap.charts.chart import (
+    INK,
+    QUIET,
+    Axis,
+    Band,
+    Chart,
+    Dash,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Text,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-_HIGH = 12.0
+_HIGH: Final = 12.0
 """Largest threshold shown, in units of the least: a loop's goes to infinity between frequencies."""
 
+_LOOKS: Final[dict[str, tuple[str, Dash]]] = {
+    "loop": (INK, "-"),
+    "backward": ("#0072b2", (5.0, 2.0)),
+    "forward": ("#d55e00", "-"),
+}
 
-def highest(dataset: xr.Dataset) -> float:
-    """Return the largest ``p`` of a picture of thresholds; the pendulum's own is in it."""
-    p = dataset["p_melnikov"].values
+
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return the threshold of each branch and the pendulum's own point."""
+    del cells
+    a = dataset.attrs
+    omega, p = dataset["omega"].values, dataset["p_melnikov"].values
+    own = (float(a["own_omega"]), abs(float(a["own_p"])))
+    top = _highest(p, own[1])
+    at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
+    apart = np.abs(at["forward"] - at["backward"]) if {"forward", "backward"} <= set(at) else p[:0]
+    alike = bool(np.isfinite(apart).any()) and bool(np.nanmax(apart) < 1e-9 * top)
+    looped = "loop" in at
+    marks: list[Mark] = []
+    for name, (colour, dash) in _LOOKS.items():
+        if name not in at or not (at[name] <= top).any():
+            continue
+        said = {
+            "loop": "homoclinic, loop of upright rest",
+            "forward": "threshold, both branches" if alike else "threshold, forward",
+        }.get(name, "" if alike else f"threshold, {name}")
+        if looped and name != "loop":
+            said = f"heteroclinic, {name}"
+        marks.append(
+            Line(omega, at[name], colour=colour, dash=dash, width=1.6, name=said, path=name)
+        )
+        if said:
+            high = np.full_like(omega, top)
+            marks.append(Band(omega, at[name], high, colour=colour, alpha=0.10))
+    damped = np.nanmax(at.get("loop", p), initial=0.0) > 0
+    follows = "fractal boundaries of basins" if damped else "chaos; no basins without damping"
+    star: dict[str, Any] = {"marker": "*", "size": 9.0, "clip": False, "order": 4.0}
+    marks += [
+        Points(*np.array(own).reshape(2, 1), name="this pendulum", path="own", **star),
+        Text(0.5, 0.93, f"manifolds cross: {follows}", inside=True, boxed=True, colour=QUIET),
+    ]
+    x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
+    across = Axis("\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0", x)
+    up = Axis("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g", (0.0, top))
+    panel = Panel("melnikov", "", across, up, marks)
+    title = "Homoclinic threshold, Melnikov, first order"
+    return Chart(title, basins.parameters(a), [panel], ratio=0.68).only(layer)
+
+
+def _highest(p: np.ndarray, own: float) -> float:
+    """Return the largest ``p`` of the picture; the pendulum's own is in it."""
     known = p[np.isfinite(p)]
     shown = min(float(known.max()), _HIGH * float(known.min())) if known.size else 1.0
-    return max(shown, 1.15 * abs(float(dataset.attrs["own_p"])), 1e-3)
+    return max(shown, 1.15 * own, 1e-3)

@@ -14,6 +14,8 @@ EVEN: Final = "#0072b2"
 """Half cycles that begin at a peak of odd or even number."""
 MEASURED: Final = "#222222"
 """What was measured."""
+NOISE: Final = "#d9d9d9"
+"""What the noise of the readings explains."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from pendmap.charts.chart import Axis
+
 if TYPE_CHECKING:
+    from pendmap.charts.chart import Ends
     from pendmap.units import Units
 
 
@@ -33,3 +36,8 @@ def clock(units: Units) -> str:
 def per_time(units: Units) -> str:
     """Return what an exponent counts."""
     return "per second" if units.si else f"per unit {_TAU}"
+
+
+def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
+    """Return the axes of the phase plane."""
+    return Axis(ANGLE, theta, "angle"), Axis(speed(units), velocity)

@@ -1,16 +1,18 @@
-"""Closed orbits as they are drawn: paths in the phase plane, points, colours, the legend."""
+"""Closed orbits: paths and stroboscopic points in the phase plane."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import palette, plane
+from pendmap.charts import basins, names, palette, plane
+from pendmap.charts.chart import INK, QUIET, Chart, Line, Mark, Panel, Points
 from pendmap.charts.legend import typeset
+from pendmap.formatting import counted
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,74 +20,82 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-MOST = 16
+MOST: Final = 16
 """Orbits that are named: of more the legend says how many there are."""
 
 
-@dataclass(frozen=True, eq=False)
-class Closed:
-    """One orbit in a picture.
-
-    Attributes
-    ----------
-    id : int
-        1 and up.
-    name, kind : str
-        As in the dataset.
-    stable : bool
-        Whether it attracts, or is a centre where nothing does.
-    largest : float
-        Largest modulus of its multipliers.
-    path : ndarray, shape (m, 2)
-        Its motion in the phase plane, broken by rows of nan where the angle wraps.
-    points : ndarray, shape (n, 2)
-        Its stroboscopic points.
-    """
-
-    id: int
-    name: str
-    kind: str
-    stable: bool
-    largest: float
-    path: Floats
-    points: Floats
-
-    @property
-    def colour(self) -> str:
-        """The colour of its name."""
-        return palette.colour(self.name, self.kind)
-
-    @property
-    def text(self) -> str:
-        """Its line in a legend."""
-        says = "stable" if self.stable else "unstable"
-        return f"{typeset(self.name)}, {says}, largest |multiplier| {self.largest:.4g}"
-
-
-def closed(dataset: xr.Dataset) -> list[Closed]:
-    """Return the orbits of a dataset, those that attract last: they are drawn on top."""
-    owner, path_of = dataset["point_orbit"].values, dataset["path_orbit"].values
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return the orbits: full lines and points are stable, broken lines, empty points are not."""
+    del cells
+    units = Units.of(dataset.attrs)
     points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
-    found = []
-    for k in range(dataset.sizes["orbit"]):
-        row = dataset.isel(orbit=k)
-        number = int(row["id"])
-        moduli = np.hypot(*np.moveaxis(row["multipliers"].values, -1, 0))
-        found.append(
-            Closed(
-                number,
-                str(row["orbit"].values),
-                str(row["kind"].values),
-                bool(int(row["stable"])),
-                float(np.nanmax(moduli)) if np.isfinite(moduli).any() else math.nan,
-                _path(dataset, path_of == number),
-                points[owner == number],
-            )
-        )
-    return sorted(found, key=lambda one: one.stable)
+    paths = [_path(dataset, dataset["path_orbit"].values == i) for i in dataset["id"].values]
+    every = np.concatenate([points, *paths])
+    every = every[np.isfinite(every).all(axis=1)]
+    theta = plane.angles(dataset, every[:, 0])
+    box = (float(dataset.attrs["low_velocity"]), float(dataset.attrs["high_velocity"]))
+    velocity = plane.padded(every[:, 1]) if every.size else box
+    marks = _drawn(dataset, theta)
+    count = int(dataset.attrs.get("draws", 0))
+    over = f";   grey dots: {counted(count, 'draw')}" if count else ""
+    # Those that attract come last: they are drawn on top.
+    stable = dataset["stable"].values.astype(bool)
+    for k in [*np.flatnonzero(~stable), *np.flatnonzero(stable)]:
+        own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
+        marks += _orbit(dataset, int(k), paths[k], plane.copies(dataset, own, *theta))
+    if dataset.sizes["orbit"] > MOST:
+        none = np.empty(0)
+        more = f"and {dataset.sizes['orbit'] - MOST} more"
+        marks.append(Points(none, none, marker="none", name=more))
+    across, up = names.phase_plane(theta, velocity, units)
+    low, high = (units.bare(end, VELOCITY) for end in velocity)
+    return Chart(
+        _title(dataset),
+        basins.parameters(dataset.attrs) + over,
+        [Panel("phase", "", across, up, marks)],
+        ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
+        remark="" if dataset.sizes["orbit"] else "No orbit was found.",
+    ).only(layer)
+
+
+def _drawn(dataset: xr.Dataset, theta: tuple[float, float]) -> list[Mark]:
+    """Return the points of the orbits over draws of the parameters."""
+    if not int(dataset.attrs.get("draws", 0)):
+        return []
+    at = [dataset[f"drawn_{name}"].values.ravel() for name in ("theta", "velocity")]
+    points = plane.copies(dataset, np.stack(at, axis=1)[np.isfinite(at[0])], *theta)
+    return [Points(*points.T, marker=".", size=3.0, colour=QUIET, order=3.0)]
+
+
+def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
+    row = dataset.isel(orbit=k)
+    number, name = int(row["id"]), str(row["orbit"].values)
+    stable = bool(int(row["stable"]))
+    moduli = np.hypot(*np.moveaxis(row["multipliers"].values, -1, 0))
+    largest = float(np.nanmax(moduli)) if np.isfinite(moduli).any() else math.nan
+    says = "stable" if stable else "unstable"
+    said = f"{typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
+    named = sorted(dataset["id"].values)[:MOST]
+    colour = palette.colour(name, str(row["kind"].values))
+    # Pale colours on white, and all of them in grey, need an edge.
+    look: dict[str, Any] = {
+        "colour": colour,
+        "name": f"{number}: {said}" if number in named else "",
+    }
+    return [
+        Line(
+            *path.T, width=1.6 if stable else 1.0, dash="-" if stable else (4.0, 2.0), halo=QUIET,
+            path=f"{number}/path", **look,
+        ),
+        Points(
+            *at.T, size=5.0, edge=INK, edge_width=1.0, fill="" if stable else "white", order=4.0,
+            clip=False, path=f"{number}/points", **look,
+        ),
+    ]  # fmt: skip
 
 
 def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
+    """Return the motion in the phase plane, broken by rows of nan where the angle wraps."""
     theta, velocity = dataset["path_theta"].values[mine], dataset["path_velocity"].values[mine]
     piece = dataset["path_piece"].values[mine]
     gap = np.full((1, 2), np.nan)
@@ -98,25 +108,7 @@ def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
     return np.concatenate(parts)
 
 
-def angles(orbits: list[Closed], dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the angles that a picture shows."""
-    theta = [one.path[:, 0] for one in orbits] + [one.points[:, 0] for one in orbits]
-    shown = np.concatenate([*theta, np.empty(0)])
-    return plane.angles(dataset, shown[np.isfinite(shown)])
-
-
-def speeds(orbits: list[Closed], dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the velocities that a picture shows: all of the paths, or the box where none is."""
-    values = [one.path[:, 1] for one in orbits] + [one.points[:, 1] for one in orbits]
-    shown = np.concatenate([*values, np.empty(0)])
-    shown = shown[np.isfinite(shown)]
-    if shown.size == 0:
-        return float(dataset.attrs["low_velocity"]), float(dataset.attrs["high_velocity"])
-    return plane.padded(shown)
-
-
-def title(dataset: xr.Dataset) -> str:
-    """Return what a picture of a dataset is called."""
+def _title(dataset: xr.Dataset) -> str:
     n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
     count = dataset.sizes["orbit"]
     signed = "0" if w == 0 else f"{w:+d}".replace("-", "\N{MINUS SIGN}")

@@ -21,6 +21,7 @@ Nothing here depends on which other attractors a map holds, and no drawing libra
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 
@@ -181,6 +182,28 @@ def direction(name: str, kind: str | None = None) -> int:
     return _read(name, kind).direction
 
 
+@functools.cache
+def _words() -> dict[str, str]:
+    """Return every colour that this module gives, and its name."""
+    directed = [
+        shade for family in _DIRECTED.values() for side in family.values() for shade in side
+    ]
+    shades = [*_SINGLE.values(), *directed, *(s for some in _OSCILLATION.values() for s in some)]
+    mixed = [_mixed(shade, k) for k in range(1, len(_LAPS) + 1) for shade in shades]
+    grey = [(UNNAMED, "grey"), ("#222222", "grey"), ("#666666", "grey")]
+    return dict(reversed([*grey, *shades, *mixed]))
+
+
+def in_words(code: str) -> str:
+    """Return the name of a colour ``"#rrggbb"``, or of the nearest that has one."""
+    known = _words()
+    if code in known:
+        return known[code]
+    every = list(known)
+    apart = np.array([parts(one) for one in every]) - np.array(parts(code))
+    return known[every[int(np.argmin((apart**2).sum(axis=1)))]]
+
+
 def lap(name: str, kind: str | None = None) -> int:
     """Return how often the colours of its family were used up before its own: usually 0.
 
@@ -210,8 +233,11 @@ def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 def _shade(name: str, kind: str | None) -> _Shade:
     shade, round_ = _place(_read(name, kind))
-    if not round_:
-        return shade
+    return _mixed(shade, round_) if round_ else shade
+
+
+def _mixed(shade: _Shade, round_: int) -> _Shade:
+    """Return a colour where its family begins again."""
     ground, part, word = _LAPS[(round_ - 1) % len(_LAPS)]
     mixed = [round((1 - part) * int(shade[0][k : k + 2], 16) + part * ground) for k in (1, 3, 5)]
     return "#" + "".join(f"{value:02x}" for value in mixed), f"{word} {shade[1]}"

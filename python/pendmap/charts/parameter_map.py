@@ -1,15 +1,16 @@
-"""Maps over two parameters as drawn: a colour for each kind, stripes where some coexist."""
+"""Maps over two parameters: a colour for each kind of attractor, stripes where some coexist."""
 
 from __future__ import annotations
 
 import json
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from pendmap.charts import basins, palette, plane, tongues
+from pendmap.charts.chart import Axis, Chart, Colours, Image, Line, Mark, Panel, together
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,10 +29,15 @@ LAYERS = {
 }
 """Layers by the name a user types; ``share KIND`` is the share of the starts of a kind."""
 
-Stroke = Literal["-", "--", ":"]
-
-_MOST = 13
-_LEAST = 0.002
+_RECORDED: Final = ("exponent", "attractors", "undecided")
+"""Layers that a recording has beside those that lead."""
+_STRIPES: Final = 100
+"""Stripes across a picture."""
+_LEAST_HALF: Final = 0.05
+"""Least part of the other one that a half of the exponents' scale reaches."""
+_MOST_COUNT: Final = 8
+"""Largest number with a colour of its own."""
+_MOST, _LEAST = 13, 0.002
 """Kinds that are named: so many, and those in no fewer of the cells."""
 
 _OTHERS = {"oscillation": "oscillation, other periods", "rotation": "rotation, others"}
@@ -41,23 +47,11 @@ _OTHERS = {"oscillation": "oscillation, other periods", "rotation": "rotation, o
 class Kind:
     """A kind of attractor in a picture, or a family of rare ones.
 
-    Attributes
-    ----------
-    name : str
-        As it is printed.
-    colour : str
-        ``"#rrggbb"``.
-    shade : str
-        The colour in words.
-    members : tuple of str
-        The kinds of the dataset that it stands for.
-    presence : float
-        Share of the cells that have it.
+    ``members`` are the kinds of the dataset, ``presence`` the share of the cells that have it.
     """
 
     name: str
     colour: str
-    shade: str
     members: tuple[str, ...]
     presence: float
 
@@ -103,7 +97,7 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
 
 
 def _kind(name: str, like: str, members: tuple[str, ...], presence: float) -> Kind:
-    return Kind(name, palette.colour(like), palette.describe(like), members, presence)
+    return Kind(name, palette.colour(like), members, presence)
 
 
 def _named(name: str) -> str:
@@ -132,16 +126,8 @@ def _place(name: str) -> tuple[int, float, float]:
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:
     """Return an image of indices into :func:`kinds`, row 0 lowest, a cell a block of pixels.
 
-    Where kinds coexist, diagonal stripes of their colours take turns.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A map over two parameters.
-    size : int
-        Pixels of the longer side, about.
-    width : int
-        Pixels of a stripe, measured along a row.
+    Where kinds coexist, diagonal stripes of their colours take turns. ``size`` is about the pixels
+    of the longer side, ``width`` those of a stripe along a row.
     """
     listed = kinds(dataset)
     own = {member: k for k, kind in enumerate(listed) for member in kind.members}
@@ -160,71 +146,83 @@ def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]
     return image
 
 
-def axes(dataset: xr.Dataset) -> tuple[str, str]:
-    """Return the names of columns and rows with their units."""
-    across, up = (str(dataset.attrs[which]) for which in ("columns", "rows"))
-    first, second = (
-        basins.symbol(name, str(dataset[name].attrs.get("units", "1"))) for name in (across, up)
-    )
-    return first, second
-
-
-def edges(dataset: xr.Dataset) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the outer edges of columns and rows."""
-    across, up = (str(dataset.attrs[which]) for which in ("columns", "rows"))
-    return plane.outer_edges(dataset, across), plane.outer_edges(dataset, up)
-
-
-def curves(dataset: xr.Dataset) -> dict[str, tuple[Stroke, list[npt.NDArray[np.float64]]]]:
-    """Return the critical curves of a map: for each name a line style and polylines, shape (m, 2).
-
-    Empty where they were not asked for.
-    """
-    if "curve_p" not in dataset:
-        return {}
-    omega = dataset["curve_omega"].values
-    rows = tongues.by_frequency(dataset, "curve_", omega.size)
-    turned = str(dataset.attrs["rows"]).lower() == "omega"
-
-    def to(line: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        return line[:, ::-1] if turned else line
-
-    sought = dataset["curve_fold_sought"].values > 0
-    fold = to(np.stack([omega, dataset["curve_fold"].values], axis=1)[sought])
-    return {
-        "rest: multiplier +1": ("-", [to(line) for line in tongues.joined(omega, rows, 1)]),
-        "rest: multiplier −1": (
-            "--",
-            [to(line) for line in tongues.joined(omega, rows, -1)],
-        ),
-        "fold of the oscillation born there": (":", [fold]),
-    }
-
-
-def named(dataset: xr.Dataset, name: str) -> str:
-    """Return a layer's name.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
+    """Return the kinds of attractor, striped where several coexist, and other layers."""
     shares = [f"share {kind}" for kind in dataset["kind"].values]
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
-    if name not in known and name not in shares:
+    if layer is not None and layer not in (*known, *shares):
         layers = ", ".join([*known, *shares])
-        raise InputError(f"layer must be one of this map, {layers}, got {name!r}")
-    return name
+        raise InputError(f"layer must be one of this map, {layers}, got {layer!r}")
+    leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
+    others = [one for one in _RECORDED if one in known and one not in leading]
+    shown = [layer] if layer else [*leading, *others]
+    varied = [str(dataset.attrs[which]) for which in ("columns", "rows")]
+    symbols = [basins.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in varied]
+    across, up = (plane.outer_edges(dataset, one) for one in varied)
+    sides = Axis(symbols[0], across), Axis(symbols[1], up)
+    lines = _curves(dataset)
+    panels = []
+    for one in shown:
+        title = LAYERS.get(one, one) + ("; stripes: they coexist" if one == "kinds" else "")
+        image = _image(dataset, one, across, up, cells)
+        panels.append(Panel(one, title, *sides, [image, *lines]))
+    fixed = basins.parameters(dataset.attrs, varied)
+    shape: tuple[Any, ...] = dataset["regime"].shape
+    starts = int(dataset.attrs["starts"])
+    size = f"{shape[1]} \N{MULTIPLICATION SIGN} {shape[0]} cells, {starts} starts each"
+    return Chart(
+        f"Attractors over {' and '.join(name.split(' (')[0] for name in symbols)}",
+        f"{fixed};   {size}",
+        panels,
+        rows=[shown if layer else leading],
+        ratio=0.85,
+        tabs=True,
+    )
 
 
-def layer(dataset: xr.Dataset, name: str, limit: int) -> npt.NDArray[np.float64]:
-    """Return the image of a layer that is no picture of kinds, as of :func:`plane.pixels`."""
+def _image(
+    dataset: xr.Dataset, name: str, across: tuple[float, float], up: tuple[float, float], cells: int
+) -> Image:
+    """Return the picture of a layer."""
+    if name == "kinds":
+        classes = [(kind.text, kind.colour) for kind in kinds(dataset)]
+        picture = striped(dataset, cells, max(2, cells // _STRIPES))
+        return Image(picture, across, up, classes=classes, path="kinds")
     of_kind = name.removeprefix("share ")
-    values = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
-    return np.asarray(plane.pixels(dataset, values, limit), dtype=np.float64)
+    layer = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
+    values = np.asarray(plane.pixels(dataset, layer, cells), dtype=np.float64)
+    if name == "period":
+        values = np.where(values > 0, values, np.nan)
+    look = _colours(dataset, name, values[np.isfinite(values)])
+    return Image(values, across, up, colours=look, path="values")
 
 
-def said(dataset: xr.Dataset, name: str) -> str:
+def _colours(dataset: xr.Dataset, name: str, values: npt.NDArray[np.float64]) -> Colours:
+    """Return the colour scale: exponents about 0, counts in steps, shares from 0 to 1."""
+    said = _said(dataset, name)
+    if name == "exponent":
+        low, high = (float(q) for q in np.quantile(values, [0.01, 0.99])) if values.size else (0, 0)
+        low, high = min(low, -1e-3, -_LEAST_HALF * high), max(high, 1e-3, -_LEAST_HALF * low)
+        # The halves have scales of their own: without ticks on both, dark blue would look as far
+        # from 0 as dark red.
+        ticks = sorted({at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)})
+        return Colours(said, "RdBu_r", low, high, "centred", "both", ticks)
+    if name in ("attractors", "period", "winding"):
+        top = int(min(values.max(initial=1), _MOST_COUNT))
+        low = -0.5 if name != "period" else 0.5
+        beyond: Literal["max", "neither"] = "max" if values.max(initial=0) > top else "neither"
+        whole = [float(k) for k in range(int(low + 0.5), top + 1)]
+        return Colours(said, "viridis", low, top + 0.5, "counts", beyond, whole)
+    return Colours(said, "cividis", 0.0, 1.0)
+
+
+def _few(low: float, high: float) -> list[float]:
+    """Return at most four round places in a half of a colour bar."""
+    ticks = [at for at, _ in plane.plain_ticks(low, high)]
+    return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
+
+
+def _said(dataset: xr.Dataset, name: str) -> str:
     """Return what a layer shows, in words, with its unit."""
     if name.startswith("share "):
         return f"share of the starts on {name.removeprefix('share ')}"
@@ -237,16 +235,30 @@ def said(dataset: xr.Dataset, name: str) -> str:
     return LAYERS[name] + unit
 
 
-def title(dataset: xr.Dataset) -> str:
-    """Return the title of a figure."""
-    return f"Attractors over {' and '.join(name.split(' (')[0] for name in axes(dataset))}"
-
-
-def subtitle(dataset: xr.Dataset) -> str:
-    """Return what does not vary, and how many cells there are."""
-    varied = [str(dataset.attrs[which]) for which in ("columns", "rows")]
-    parameters = basins.parameters(dataset.attrs, varied)
-    shape: tuple[Any, ...] = dataset["regime"].shape
-    times = "\N{MULTIPLICATION SIGN}"
-    starts = int(dataset.attrs["starts"])
-    return f"{parameters};   {shape[1]} {times} {shape[0]} cells, {starts} starts each"
+def _curves(dataset: xr.Dataset) -> list[Mark]:
+    """Return the critical curves of a map; none where they were not asked for."""
+    if "curve_p" not in dataset:
+        return []
+    omega = dataset["curve_omega"].values
+    rows = tongues.by_frequency(dataset, "curve_", omega.size)
+    turned = str(dataset.attrs["rows"]).lower() == "omega"
+    sought = dataset["curve_fold_sought"].values > 0
+    fold = np.stack([omega, dataset["curve_fold"].values], axis=1)[sought]
+    found: list[Mark] = []
+    for k, (name, dash, lines) in enumerate(
+        (
+            ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
+            ("rest: multiplier \N{MINUS SIGN}1", "--", tongues.joined(omega, rows, -1)),
+            ("fold of the oscillation born there", ":", [fold]),
+        )
+    ):
+        x, y = together(line[:, ::-1] if turned else line for line in lines)
+        if np.isfinite(x + y).sum() > 1:
+            look: dict[str, Any] = {
+                "width": 1.1,
+                "halo": "#ffffff",
+                "name": name,
+                "path": f"curves/{k}",
+            }
+            found.append(Line(x, y, dash=dash, order=2.0, **look))
+    return found

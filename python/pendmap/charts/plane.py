@@ -29,6 +29,9 @@ NARROW = 1e-4
 _FINE = 8
 """Pixels of the narrowest cell where cells are not equally wide."""
 
+LOG_TICKS = 4
+"""Ticks that a logarithmic colour bar has at least, where its range allows."""
+
 MOST_COPIES = 100
 """Copies of a point, 2 pi apart, that are told apart in a window."""
 
@@ -148,6 +151,17 @@ def plain_ticks(low: float, high: float) -> Ticks:
     first, last = _between(low, high, step)
     digits = min(17, max(6, 3 + math.floor(math.log10(size / step))))
     return [(k * step, _written(k * step, digits)) for k in range(first, last + 1)]
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return ticks 1, 2, 5, 10, ... between the ends; more of them where these are close."""
+    for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
+        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        ticks = [m * 10.0**k for k in powers for m in steps]
+        inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
+        if len(inside) >= LOG_TICKS:
+            return inside
+    return sorted({float(round(x)) for x in np.linspace(low, high, 5)})
 
 
 def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:

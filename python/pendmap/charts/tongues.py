@@ -1,24 +1,49 @@
-"""Critical curves as they are drawn: lines joined from frequency to frequency, stable regions."""
+"""Critical curves: lines joined from frequency to frequency, and where rest is stable."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.analysis.critical_curves import in_plane, window
+from pendmap.analysis.critical_curves import PLANES, in_plane, window
+from pendmap.analysis.tongues import NEAR
+from pendmap.charts import basins
+from pendmap.charts.chart import (
+    QUIET,
+    Areas,
+    Axis,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Text,
+    together,
+)
+from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     import xarray as xr
 
 
 Floats = npt.NDArray[np.float64]
 
-COLOURS = {1: "#d55e00", -1: "#0072b2"}
-"""Curves on which a multiplier is +1 (solutions of the drive's period), and -1 (twice that)."""
+_CURVES: Final = {
+    -1: ("minus", "exact, multiplier \N{MINUS SIGN}1 (period 2)", "#0072b2", "#56b4e9"),
+    1: ("plus", "exact, multiplier +1 (period 1)", "#d55e00", "#e69f00"),
+}
+"""By multiplier: path, name and colours of hanging and inverted rest's curves; +1 has solutions of
+the drive's period, -1 of twice that."""
+_STABLE, _INVERTED, _FOLD = "#e3ecd8", "#9a6fb0", "#009e73"
+_ROOTS: Final = {"omega-p": ("tongues", ""), "e-alpha2": ("paper", "")}
+"""Where a recording has the planes."""
+_DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}
+"""Parameters that vary."""
 
 _SQUARED = "\N{SUPERSCRIPT TWO}"
 _NAMES = {
@@ -43,103 +68,127 @@ _JUMP = 0.6
 ``p`` and a little."""
 
 
-@dataclass(frozen=True)
-class Chart:
-    """Critical curves in one of the planes.
+def chart(
+    dataset: xr.Dataset,
+    *,
+    layer: str | None = None,
+    cells: int = 0,
+    title: str = "Where rest is stable, hanging and inverted",
+    marks: Sequence[tuple[float, float, str]] = (),
+) -> Chart:
+    """Return the critical curves in both planes; a figure shows one of them.
 
-    Attributes
-    ----------
-    names : (str, str)
-        What the axes show.
-    x, y : (float, float)
-        Their ranges.
-    lines : dict
-        For the multipliers 1 and -1 polylines, shape (m, 2) each.
-    undamped : list of ndarray
-        Those without damping.
-    stable : list of ndarray, shape (m, 2)
-        Polygons in which hanging rest is stable.
-    inverted_lines, inverted : dict, list of ndarray
-        Lines and polygons of inverted rest.
-    beyond : ndarray, shape (m, 2)
-        The edge of what was computed.
-    fold : ndarray, shape (m, 2)
-        Where the oscillation born toward smaller p folds; broken by nan.
-    asymptotic : dict
-        For each name a curve that is near the exact one, broken by nan, and the rest of it.
-    own : (float, float)
-        The pendulum's point.
-    bands : list of ndarray, shape (2, 2)
-        Over draws of the parameters the interval of each critical amplitude.
+    ``marks`` are points ``(p, omega, name)`` that stand for the pendulum's own.
     """
+    del cells
+    first = layer or str(dataset.attrs.get("plane", PLANES[0]))
+    if first not in PLANES:
+        raise InputError(f"layer must be one of {', '.join(PLANES)}, got {first!r}")
+    order = sorted(_ROOTS, key=lambda plane: plane != first)
+    return Chart(
+        title,
+        basins.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
+        [_panel(dataset, plane, marks) for plane in order],
+        rows=[[first]],
+        ratio=0.72,
+        tabs=True,
+    )
 
-    names: tuple[str, str]
-    x: tuple[float, float]
-    y: tuple[float, float]
-    lines: dict[int, list[Floats]]
-    undamped: list[Floats]
-    stable: list[Floats]
-    inverted_lines: dict[int, list[Floats]]
-    inverted: list[Floats]
-    beyond: Floats
-    fold: Floats
-    asymptotic: dict[str, tuple[Floats, Floats]]
-    own: tuple[float, float]
-    bands: list[Floats]
 
-
-def chart(dataset: xr.Dataset, plane: str, near: float) -> Chart:
-    """Return the critical curves of a dataset in one of :data:`PLANES`.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As made by :func:`pendmap.tongues`.
-    plane : str
-        One of :data:`PLANES`.
-    near : float
-        Relative error up to which an asymptotic curve counts as near the exact one.
-    """
+def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, str]]) -> Panel:
     omega = dataset["omega"].values
     p_max = float(dataset.attrs["p_max"])
+    x, top = window(omega, p_max, plane)
 
     def to(points: Floats) -> Floats:
         """From (omega, p) to the plane."""
         return np.stack(in_plane(points[..., 0], points[..., 1], plane), axis=-1)
 
-    damped = by_frequency(dataset, "", omega.size)
-    bare = by_frequency(dataset, "undamped_", omega.size)
-    lines = {m: [to(line) for line in joined(omega, damped, m)] for m in COLOURS}
-    undamped = [to(_tipped(line, m, omega)) for m in COLOURS for line in joined(omega, bare, m)]
+    def curves(found: list[list[tuple[float, int]]], m: int) -> tuple[Floats, Floats]:
+        return together(to(line) for line in joined(omega, found, m))
+
     first = dataset["stable_at_first"].values
-    stable = [to(area) for area in _stable(omega, dataset, "", first, p_max)]
-    upright = by_frequency(dataset, "inverted_", omega.size)
+    stable = "hanging rest: its orbit is" if dataset.attrs["moved"] else "hanging rest is"
+    upright = stable.replace("hanging", "inverted")
+    drawn: list[Mark] = [
+        Areas(
+            [to(area) for area in _stable(omega, dataset, "", first, p_max)],
+            colour=_STABLE,
+            name=f"{stable} stable",
+        )
+    ]
     inverted = _stable(omega, dataset, "inverted_", np.zeros_like(first), p_max)
-    error = dataset["asymptotic_error"].values
-    asymptotic = {}
-    for k, name in enumerate(dataset["curve"].values):
-        whole = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
-        close = (error[k] < near)[:, None]
-        parting = (error[k] < _PARTED)[:, None] & ~close
-        asymptotic[str(name)] = (np.where(close, whole, np.nan), np.where(parting, whole, np.nan))
-    edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
-    own = to(np.array([float(dataset.attrs["own_omega"]), float(dataset.attrs["own_p"])]))
-    x, top = window(omega, p_max, plane)
-    return Chart(
-        _NAMES[plane],
-        x,
-        (0.0, top),
-        lines,
-        undamped,
-        stable,
-        {m: [to(line) for line in joined(omega, upright, m)] for m in COLOURS},
-        [to(area) for area in inverted],
-        edge,
-        to(np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]),
-        asymptotic,
-        (float(own[0]), float(own[1])),
-        [to(band) for prefix in ("", "inverted_") for band in _bands(dataset, prefix)],
+    if inverted:
+        # A hatch shows what lies below it, and no seams.
+        drawn.append(
+            Areas(
+                [to(area) for area in inverted],
+                colour=_INVERTED,
+                hatch="////",
+                name=f"{upright} stable",
+            )
+        )
+    found = by_frequency(dataset, "", omega.size)
+    above = by_frequency(dataset, "inverted_", omega.size)
+    for m, (name, said, colour, pale) in _CURVES.items():
+        look: dict[str, Any] = {"width": 1.5 if m < 0 else 1.1, "order": 2.2}
+        drawn.append(Line(*curves(found, m), colour=colour, name=said, path=name, **look))
+        x_up, y_up = curves(above, m)
+        of_upright = f"inverted rest: {said.partition(' (')[0]}" if x_up.size else ""
+        pair: dict[str, Any] = {"colour": pale, "name": of_upright, "path": f"inverted_{name}"}
+        drawn.append(Line(x_up, y_up, **(look | pair)))
+    bare = by_frequency(dataset, "undamped_", omega.size)
+    lines = [to(_tipped(line, m, omega)) for m in _CURVES for line in joined(omega, bare, m)]
+    damped = float(dataset.attrs["gamma"]) > 0 and bool(lines)
+    said = "exact, without damping" if damped else ""
+    drawn.append(Line(*together(lines), colour=QUIET, width=0.6, name=said, path="undamped"))
+    fold = to(np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0])
+    said = "fold: the oscillation exists from here" if np.isfinite(fold).any() else ""
+    drawn.append(
+        Line(*fold.T, colour=_FOLD, width=1.6, dash=(5.0, 2.0), name=said, path="fold", order=2.1)
     )
+    drawn += _asymptotic(dataset, to)
+    bands = [to(band) for prefix in ("", "inverted_") for band in _bands(dataset, prefix)]
+    if bands:
+        draws = "95 % of the draws"
+        drawn.append(Line(*together(bands), colour=QUIET, width=3.0, alpha=0.5, name=draws))
+    edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
+    if (edge[:, 1] < 0.995 * top).any():
+        drawn.append(Line(*edge.T, colour="#c8c8c8", width=3.0, name="largest p computed", order=1))
+    own_at = np.array([[float(dataset.attrs["own_omega"]), float(dataset.attrs["own_p"])]])
+    drawn += _points(to(own_at), x, top) if not marks else []
+    for p, at, name in marks:
+        ((across, up),) = to(np.array([[at, p]]))
+        spot = np.array([across]), np.array([up])
+        drawn.append(Points(*spot, size=5.0))
+        shift = (0.015 * (x[1] - x[0]), 0.012 * top)
+        drawn.append(Text(across + shift[0], up + shift[1], name, align=("left", "bottom")))
+    names = _NAMES[plane]
+    sides = Axis(names[0], x), Axis(names[1], (0.0, top))
+    return Panel(plane, _ROOTS[plane][1], *sides, drawn, root=_ROOTS[plane][0])
+
+
+def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mark]:
+    """Return the asymptotic curves, thin where they part from the exact ones."""
+    omega, error = dataset["omega"].values, dataset["asymptotic_error"].values
+    drawn: list[Mark] = []
+    for k, (name, look) in enumerate(zip(dataset["curve"].values, ("-.", "--", ":"), strict=False)):
+        whole = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
+        close = (error[k] < NEAR)[:, None]
+        parting = np.where((error[k] < _PARTED)[:, None] & ~close, whole, np.nan)
+        said = "" if np.isnan(parting).all() else str(name)
+        near = np.where(close, whole, np.nan)
+        drawn += [
+            Line(*near.T, dash=look, width=1.0, name=said),
+            Line(*parting.T, dash=look, width=0.5, alpha=0.45),
+        ]
+    return drawn
+
+
+def _points(own: Floats, x: tuple[float, float], top: float) -> list[Mark]:
+    (across, up) = own[0]
+    said = "this pendulum" if x[0] <= across <= x[1] and 0 <= up <= top else ""
+    return [Points(*own.T, marker="*", size=9.0, name=said, path="own", order=4.0)]
 
 
 def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:

@@ -84,9 +84,9 @@ def command(  # noqa: PLR0913 (an option each)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = Written()
     if plot is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        draw = functools.partial(figures.draw_comparison, comparison)
+        draw = functools.partial(render.draw_comparison, comparison)
         written = write_all([(draw, plot)], keep=True)
     if as_json:
         more = {"model": str(model), "simd": instruction_set()}

@@ -188,13 +188,13 @@ def _files(
     out, plot, report, rerun = outputs
     yield lambda path: save_model(diagnosed_model(found, line), path), out
     if plot is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        yield functools.partial(figures.draw_discrepancy, found), plot
+        yield functools.partial(render.draw_discrepancy, found), plot
     if report is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        yield functools.partial(figures.write_report, found), report
+        yield functools.partial(render.write_report, found), report
     if rerun is not None:
         from pendmap import viewer
 

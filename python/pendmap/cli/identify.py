@@ -88,9 +88,9 @@ def _files(
 
         yield functools.partial(save_model, model), outputs.out
     if outputs.plot is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        yield functools.partial(figures.draw_identification, report), outputs.plot
+        yield functools.partial(render.draw_identification, report), outputs.plot
     if outputs.rerun is not None:
         from pendmap import viewer
 

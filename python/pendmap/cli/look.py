@@ -43,9 +43,9 @@ def command(
         experiment = read_experiment(path, rate_hz=rate_hz)
     written = Written()
     if plot is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        written = write_all([(functools.partial(figures.draw_record, experiment), plot)])
+        written = write_all([(functools.partial(render.draw_record, experiment), plot)])
     if as_json:
         write_json(fields(experiment))
     elif not quiet:

@@ -48,11 +48,11 @@ def command(  # noqa: PLR0913 (the options above)
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
     target = out or default_file(file.with_suffix(".png"))
 
-    from pendmap import figures
+    from pendmap import render
     from pendmap.files.dataset import load
 
     draw = functools.partial(
-        figures.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
+        render.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
     )
     try:
         written = write_all([(draw, target)])

@@ -135,7 +135,7 @@ def _names(where: virtual_rig.Places) -> str:
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
     """Draw the records with their public description, not what is hidden."""
-    from pendmap import figures, virtual_rig
+    from pendmap import render, virtual_rig
 
     held = virtual_rig.held_out(experiment)
     records = []
@@ -146,12 +146,12 @@ def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
             omega = "\N{GREEK CAPITAL LETTER OMEGA}"
             words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
         words += ["held out"] if k in held else []
-        records.append(figures.RunPanel(", ".join(words), run.time, run.angle))
+        records.append(render.RunPanel(", ".join(words), run.time, run.angle))
     sensor = experiment.sensor
     counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
     subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
     title = f"Measured angle: {name}"
-    return figures.draw_runs(records, path, title=title, subtitle=subtitle)
+    return render.draw_runs(records, path, title=title, subtitle=subtitle)
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:

@@ -142,9 +142,9 @@ def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path
 
         yield save, outputs.out
     if outputs.plot is not None:
-        from pendmap import figures
+        from pendmap import render
 
-        yield figures.draw, outputs.plot
+        yield render.draw, outputs.plot
     if outputs.rerun is not None:
         from pendmap import viewer
 

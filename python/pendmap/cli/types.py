@@ -245,7 +245,7 @@ def _library(path: Path) -> None:
 
 
 _LIBRARIES = {
-    **dict.fromkeys((".png", ".svg", ".pdf", ".html", ".md"), ("pendmap.figures", "matplotlib")),
+    **dict.fromkeys((".png", ".svg", ".pdf", ".html", ".md"), ("pendmap.render", "matplotlib")),
     ".rrd": ("pendmap.viewer", "rerun-sdk"),
     ".nc": ("netCDF4", "netcdf4"),
     ".zarr": ("zarr", "the extra pendmap[zarr]"),

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pendmap.charts import names, plane
-from pendmap.errors import InputError
-from pendmap.figures import sheet as sheets
-from pendmap.figures import style, tongues
-from pendmap.figures.written import written
+from pendmap.charts import names, plane, tongues
+from pendmap.charts.chart import Axis, Chart, Line, Panel, Points, holding
+from pendmap.render import drawing
+from pendmap.render.written import written
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from pendmap.comparison import ForcedComparison
 
@@ -31,37 +28,9 @@ def draw_tongues(
     title: str,
     marks: Sequence[tuple[float, float, str]] = (),
 ) -> Path:
-    """Draw critical curves with points marked into a file: figure 1.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        What ``pendmap.tongues`` returned.
-    path : str or path
-        As of :func:`pendmap.figures.draw`.
-    title : str
-        What stands above.
-    marks : sequence of (float, float, str)
-        Amplitude ``p``, frequency ``omega`` and name of each point.
-
-    Returns
-    -------
-    Path
-        The file, complete.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix.
-    OSError
-        If the file cannot be written.
-    """
-    return written(
-        path,
-        lambda dpi: tongues.figure(
-            dataset, layer=None, size=None, dpi=dpi, colormap=None, title=title, marks=marks
-        ),
-    )
+    """Draw critical curves with points marked, ``(p, omega, name)``, into a file: figure 1."""
+    chart = tongues.chart(dataset, title=title, marks=marks)
+    return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
 
 
 def draw_tumbling(
@@ -74,16 +43,10 @@ def draw_tumbling(
 ) -> Path:
     """Draw time history, phase plane and Poincare section of trajectories, a column each: figure 2.
 
-    Parameters
-    ----------
-    runs : sequence of Dataset
-        Trajectories of :func:`pendmap.simulate`, from the instant from which they are shown.
-    path, size, dpi, title
-        As for :func:`draw_pendulum`, whose result and errors are those here.
+    Trajectories are shown from their first instant.
     """
-    return written(
-        path, lambda dpi: figure(runs, size=size, dpi=dpi, title=title), size=size, dpi=dpi
-    )
+    chart = tumbling_chart(runs, title)
+    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
 
 
 def draw_pendulum(
@@ -95,7 +58,7 @@ def draw_pendulum(
 ) -> Path:
     """Draw the pendulum with its moving pivot and its equation (eq. 2.1) into a file: figure 3.
 
-    Parameters, result and errors are those of :func:`pendmap.figures.draw_record`; ``title`` stands
+    Parameters, result and errors are those of :func:`pendmap.render.draw_record`; ``title`` stands
     above, by default what is drawn.
     """
     from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
@@ -116,17 +79,8 @@ def draw_motions(  # noqa: PLR0913 (what, where, and how)
 ) -> Path:
     """Draw forced runs beside a model: the paper's figures 8 (steady states) and 9 (tumbling).
 
-    Parameters
-    ----------
-    runs : sequence of ForcedComparison
-        Of :func:`pendmap.comparison.free`.
-    steady : bool
-        Whether their steady states are drawn, a phase plane each; else a row for each: histories
-        and phase planes of the record and of a member of the ensemble, and the statistics.
-    title, subtitle : str
-        What stands above.
-    path, dpi
-        As for :func:`draw_pendulum`, whose result and errors are those here.
+    Steady states have a phase plane each; runs that tumble have a row each: histories and phase
+    planes of the record and of a member of the ensemble, and the statistics.
     """
     from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
 
@@ -134,33 +88,14 @@ def draw_motions(  # noqa: PLR0913 (what, where, and how)
     return written(path, lambda dpi: make(runs, dpi=dpi, title=title, subtitle=subtitle), dpi=dpi)
 
 
-# Trajectories side by side: time history, phase plane and Poincare section, a column each.
-
-
 HISTORY, CURVE = 60, 100
 """Periods of the time history and of the phase curve, the first ones."""
 
 _INK = "#1d3557"
-_GAP_X, _GAP_Y, _LEAST = 0.75, 0.85, 1.0
-_ROWS = (0.7, 1.0, 1.0)
 
 
-def figure(
-    runs: Sequence[xr.Dataset], *, size: tuple[float, float] | None, dpi: float, title: str | None
-) -> Figure:
-    """Return the figure; see :func:`pendmap.figures.draw_tumbling`.
-
-    Raises
-    ------
-    InputError
-        If ``size`` leaves no room for the panels.
-    """
-    count = len(runs)
-    width, height = size or (0.6 + 3.1 * count, 9.0)
-    wide = (width - sheets.LEFT - sheets.RIGHT - (count - 1) * _GAP_X) / count
-    high = (height - sheets.TOP - sheets.BOTTOM - 2 * _GAP_Y) / sum(_ROWS)
-    if min(wide, high) < _LEAST:
-        raise InputError(f"size {size} leaves no room for the panels; it must be larger")
+def tumbling_chart(runs: Sequence[xr.Dataset], title: str | None) -> Chart:
+    """Return the chart of figure 2."""
     gammas = sorted({float(run.attrs["gamma"]) for run in runs})
     damping = ", ".join(f"{gamma:g}" for gamma in gammas)
     periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]
@@ -168,51 +103,37 @@ def figure(
         f"\N{GREEK SMALL LETTER GAMMA} = {damping};   time history, phase plane ({min(periods)} "
         f"periods), Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section ({points} points)"
     )
-    sheet = sheets.headed((width, height), dpi, title or "Trajectories", shared)
-    bottoms = [sheets.BOTTOM + sum(_ROWS[k + 1 :]) * high + (2 - k) * _GAP_Y for k in range(3)]
-    for k, draw in enumerate((_history, _phase, _section)):
-        for column, run in enumerate(runs):
-            left = sheets.LEFT + column * (wide + _GAP_X)
-            axes = sheets.place(sheet, left, bottoms[k], wide, _ROWS[k] * high)
-            draw(axes, run)
-            if k == 0:
-                attrs = run.attrs
-                point = f"p = {attrs['p']:g}, \N{GREEK SMALL LETTER OMEGA} = {attrs['omega']:g}"
-                axes.set_title(f"({'abcdefgh'[column]}) {point}")
-            if column:
-                axes.set_ylabel("")
-    return sheet
+    columns = [_column(run, k) for k, run in enumerate(runs)]
+    return Chart(
+        title or "Trajectories",
+        shared,
+        [panel for column in columns for panel in column],
+        rows=[[column[row].name for column in columns] for row in range(3)],
+        heights=(0.7, 1.0, 1.0),
+        size=(0.6 + 3.1 * len(runs), 9.0),
+    )
+
+
+def _column(run: xr.Dataset, k: int) -> list[Panel]:
+    """Return time history, phase plane and section of a trajectory."""
+    attrs, units = run.attrs, Units.of(run.attrs)
+    point = f"p = {attrs['p']:g}, \N{GREEK SMALL LETTER OMEGA} = {attrs['omega']:g}"
+    part, whole = _first(run, HISTORY), _first(run, CURVE)
+    time, theta = part["time"].values, part["theta"].values
+    clock = Axis(names.clock(units), (float(time[0]), float(time[-1])))
+    history = Line(time, theta, colour=_INK, width=0.8)
+    curve = plane.broken_at_wrap(whole["theta"].values, whole["velocity"].values)
+    sides = names.phase_plane((-math.pi, math.pi), plane.padded(run["velocity"].values), units)
+    section = run["section_theta"].values, run["section_velocity"].values
+    up = Axis(names.ANGLE, holding(theta), "angle")
+    return [
+        Panel(f"history {k}", point, clock, up, [history]),
+        Panel(f"phase {k}", "", *sides, [Line(*curve.T, colour=_INK, width=0.35)]),
+        Panel(f"section {k}", "", *sides, [Points(*section, colour=_INK, size=0.8)]),
+    ]
 
 
 def _first(run: xr.Dataset, periods: int) -> xr.Dataset:
-    """Return so many periods, the first ones."""
+    """Return the first periods of a trajectory."""
     last = run["section_time"].values[min(periods, run.sizes["period"] - 1)]
     return run.sel(time=slice(None, last))
-
-
-def _history(axes: Axes, run: xr.Dataset) -> None:
-    part = _first(run, HISTORY)
-    time, theta = part["time"].values, part["theta"].values
-    axes.plot(time, theta, color=_INK, lw=0.8)
-    axes.margins(x=0.0, y=0.06)
-    style.scale(axes, "y", axes.get_ylim(), names.ANGLE, angle=True)
-    clock = names.clock(Units.of(run.attrs))
-    style.scale(axes, "x", (float(time[0]), float(time[-1])), clock)
-
-
-def _phase(axes: Axes, run: xr.Dataset) -> None:
-    part = _first(run, CURVE)
-    curve = plane.broken_at_wrap(part["theta"].values, part["velocity"].values)
-    axes.plot(curve[:, 0], curve[:, 1], color=_INK, lw=0.35)
-    _phase_plane(axes, run)
-
-
-def _section(axes: Axes, run: xr.Dataset) -> None:
-    theta, velocity = run["section_theta"].values, run["section_velocity"].values
-    axes.plot(theta, velocity, "o", ms=0.8, mew=0, color=_INK)
-    _phase_plane(axes, run)
-
-
-def _phase_plane(axes: Axes, run: xr.Dataset) -> None:
-    speeds = plane.padded(run["velocity"].values)
-    style.phase_plane(axes, (-math.pi, math.pi), speeds, Units.of(run.attrs))

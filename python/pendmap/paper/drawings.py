@@ -11,9 +11,9 @@ from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
 
 from pendmap.charts.methods import MEASURED, look
 from pendmap.comparison.free import MODEL
-from pendmap.figures import blocks, forced
-from pendmap.figures import sheet as sheets
 from pendmap.formatting import counted
+from pendmap.render import blocks, forced
+from pendmap.render import sheet as sheets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +56,7 @@ def figure(
     equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
     known = "w0\u00b2 = g/l, p = Y\u03a9\u00b2/g"
     equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
-    made = sheets.headed((width, height), dpi, title or TITLE, equation, left=0.3)
+    made = sheets.headed((width, height), dpi, title or TITLE, equation)
     scale = min((width - 0.2) / 5.8, (height - 0.75) / 4.85)
     wide, high = (width - 0.2) / scale, (height - 0.75) / scale
     axes = sheets.place(made, 0.1, 0.05, width - 0.2, height - 0.75)
@@ -218,7 +218,7 @@ def steady_figure(
     """Return the figure: a phase plane for each run, the record as points, the model as a line."""
     rows = -(-len(runs) // _STEADY)
     size = (0.7 * WIDTH, rows * HIGH + 1.2)
-    figure = sheets.headed(size, dpi, title, subtitle, left=0.1)
+    figure = sheets.headed(size, dpi, title, subtitle)
     _legend(figure, rows * HIGH + 0.42, "o", size[0])
     for k, one in enumerate(runs):
         row, column = divmod(k, _STEADY)
@@ -255,7 +255,7 @@ def tumbling_figure(
     A record and a member of the ensemble stand beside one another, never over one another.
     """
     size = (WIDTH, len(runs) * HIGH + 1.2)
-    figure = sheets.headed(size, dpi, title, subtitle, left=0.1)
+    figure = sheets.headed(size, dpi, title, subtitle)
     _legend(figure, len(runs) * HIGH + 0.42, "", size[0])
     letters = iter(f"({letter}) " for letter in _LETTERS)
     for k, one in enumerate(runs):

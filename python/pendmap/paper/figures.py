@@ -98,7 +98,7 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
-    from pendmap import figures  # noqa: PLC0415
+    from pendmap import render  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import draw, motions  # noqa: PLC0415
 
@@ -120,7 +120,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
         return draw.draw_motions(runs, path, steady=key == "8", title=title, subtitle=subtitle)
     found = report(seed)
-    return figures.draw_identification(
+    return render.draw_identification(
         found,
         path,
         parts=(_PARTS[key],),

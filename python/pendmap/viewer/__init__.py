@@ -7,24 +7,17 @@ that of what was found in records, ``record_discrepancy`` that of what a model l
 
 from __future__ import annotations
 
+import functools
 import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pendmap.charts.basins import refuse_too_large
-from pendmap.charts.selection import shown
-from pendmap.errors import InputError
+from pendmap.charts import registry
 from pendmap.files import whole_file
 from pendmap.viewer import (
     basins,
-    diagrams,
-    exponents,
+    chart,
     frame,
-    lifetimes,
-    melnikov,
-    orbits,
-    planes,
-    tongues,
     trajectory,
 )
 from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
@@ -65,15 +58,11 @@ __all__ = [
 SUFFIXES = (".rrd",)
 """The kind of file a recording is."""
 
+CELLS = 4096
+"""Rows and columns of an image at most: graphics processors take no larger ones for sure."""
+
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
-    "bifurcation": (diagrams.blueprint, diagrams.log),
-    "lifetime": (lifetimes.blueprint, lifetimes.log),
-    "lyapunov": (exponents.blueprint, exponents.log),
-    "orbits": (orbits.blueprint, orbits.log),
-    "parameter_map": (planes.blueprint, planes.log),
-    "melnikov": (melnikov.blueprint, melnikov.log),
-    "tongues": (tongues.blueprint, tongues.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
 }
 
@@ -115,7 +104,7 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
         ``pendmap.melnikov`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which. Of a
-        selection the recording shows the cells that are there, as :func:`pendmap.figures.draw`.
+        selection the recording shows the cells that are there, as :func:`pendmap.render.draw`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
@@ -133,17 +122,18 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     OSError
         If the file cannot be written.
     """
-    kind = dataset.attrs.get("kind")
-    if kind not in _KINDS:
-        known = ", ".join(_KINDS)
-        raise InputError(f"cannot record a dataset of kind {kind!r}; kinds that can be: {known}")
-    dataset = shown(dataset)
-    refuse_too_large(dataset)
-    layout, log = _KINDS[kind]
+    dataset = registry.ready(dataset, "record")
+    kind = dataset.attrs["kind"]
+    if kind in _KINDS:
+        layout, log = _KINDS[kind]
+        view = layout(dataset)
+    else:
+        made = registry.build(dataset, cells=CELLS)
+        view, log = chart.blueprint(made), functools.partial(chart.log, chart=made)
     with (
         whole_file(path, SUFFIXES) as part,
         frame.strict(),
-        frame.written(frame.recording(dataset), layout(dataset), part) as recording,
+        frame.written(frame.recording(dataset), view, part) as recording,
     ):
         frame.describe(recording, dataset)
         log(recording, dataset)

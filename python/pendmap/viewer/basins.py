@@ -78,7 +78,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    return frame.Frame(theta, velocity, Units.of(dataset.attrs))
+    return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
 
 
 def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame:
@@ -87,7 +87,7 @@ def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame
     low, high = float(velocity.min()), float(velocity.max())
     pad = max(0.06 * (high - low), 0.05)
     theta = plane.angles(dataset, np.concatenate([entry.points[:, 0] for entry in listed]))
-    return frame.Frame(theta, (low - pad, high + pad), Units.of(dataset.attrs))
+    return frame.Frame.phase(theta, (low - pad, high + pad), Units.of(dataset.attrs))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:

@@ -45,19 +45,9 @@ MOST: Final = 1000.0
 
 @dataclass(frozen=True)
 class Beside:
-    """A record and two models of it.
+    """A record (s, rad) and what two models leave of it (rad), with the noise of a reading.
 
-    Parameters
-    ----------
-    name : str
-        Of the run.
-    time, record : ndarray, shape (n,)
-        s, and what the sensor read, rad; a row without numbers ends what is before a gap.
-    before, after : ndarray, shape (n,)
-        What is left by the baseline and by the model found, rad; no number where a sample does not
-        count.
-    sigma : float
-        Noise of a reading, rad.
+    A row without numbers ends what is before a gap; what does not count is no number.
     """
 
     name: str

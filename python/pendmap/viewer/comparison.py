@@ -38,29 +38,13 @@ SLOPE = 0.05
 
 @dataclass(frozen=True)
 class Comparison:
-    """A record and its model.
+    """A record and its model, all in s, rad and rad/s; what is not known is no number.
 
-    Parameters
-    ----------
-    name : str
-        Of the run.
-    time, record : ndarray, shape (n,)
-        s, and what the sensor read, rad; a row without numbers ends what is before a gap.
-    speed : ndarray, shape (n,)
-        Velocity of the record, measured or as a difference, rad/s; no number where it is not known.
-    left_out : ndarray of bool, shape (n,)
-        Samples that are not for fitting.
-    model_time, model, model_speed : ndarray, shape (m,)
-        s, what the sensor would read of the model, rad, and its velocity, rad/s; empty without one.
-        ``model_time`` is ``time`` but for a record of peaks alone.
-    residual : ndarray, shape (n,)
-        Record less model, rad; no number where there is none.
-    peaks : Peaks
-        Of the record, in the turn in which they are drawn.
-    sigma : float
-        Noise of a reading, rad; 0 where it is not known.
-    sparse : bool
-        Whether the record holds peaks alone, with nothing between them.
+    ``speed`` is measured or a difference, ``left_out`` marks samples that are not for fitting.
+    ``model`` is what the sensor would read, empty without a model; ``model_time`` is ``time`` but
+    for a record of peaks alone, which is ``sparse``. ``residual`` is record less model, ``peaks``
+    are in the turn in which they are drawn, ``sigma`` is the noise of a reading, 0 if not known.
+    A row without numbers ends what is before a gap.
     """
 
     name: str
@@ -187,20 +171,9 @@ def _drawn(
 
 
 def drawn_at(time: Floats, w0: float) -> tuple[slice, npt.NDArray[np.int64], Floats]:
-    """Return which samples of a run are drawn, where gaps cut them, and the instants.
+    """Return the samples of a run that are drawn, places among them of gaps, all instants (s).
 
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        s.
-    w0 : float
-        Natural frequency, rad/s; 0 where it is not known.
-
-    Returns
-    -------
-    slice, ndarray of int, ndarray
-        The samples kept; places among these where a row without numbers belongs; the instants of
-        all rows, s.
+    ``w0`` is the natural frequency in rad/s, 0 where it is not known.
     """
     step = float(np.median(np.diff(time)))
     swing = math.tau / w0 / step if w0 else math.inf

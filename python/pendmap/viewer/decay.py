@@ -119,7 +119,7 @@ def _frame(one: Comparison, w0: float) -> frame.Frame:
     reach = math.pi if not 0 < widest < SMALL else MARGIN * widest
     speeds = speed[np.isfinite(speed)]
     speeds = plane.padded(speeds if speeds.size else np.zeros(1))
-    return frame.Frame((-reach, reach), speeds, Units(w0, si=True))
+    return frame.Frame.phase((-reach, reach), speeds, Units(w0, si=True))
 
 
 def log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> None:

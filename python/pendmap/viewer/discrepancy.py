@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap import report
-from pendmap.charts.diagnosis import OVER_SAID
+from pendmap.charts import diagnosis
 from pendmap.errors import InputError
 from pendmap.files import whole_file
-from pendmap.viewer import beside, columns, frame
-from pendmap.viewer.beside import AFTER, BEFORE
-from pendmap.viewer.panel import Panel
+from pendmap.viewer import beside, chart, columns, frame
 
 if TYPE_CHECKING:
     import os
@@ -24,9 +22,8 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
     from pendmap.viewer.beside import Beside
 
-Z95 = 1.959963984540054
-
-SI = "rad/s\N{SUPERSCRIPT TWO}"
+RATIO = 0.56
+"""Height of a panel over its width."""
 
 
 def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -68,7 +65,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
             f"{columns.LATEST:g} s"
         )
     larger = beside.magnified(shown)
-    panels = _panels(found)
+    panels = [chart.Place.of(panel, RATIO) for panel in diagnosis.recorded(found)]
     with whole_file(path, (".rrd",)) as part, frame.strict():
         content = _content(found, shown)
         # A layout holds for all recordings of an application, and this one has runs of its own.
@@ -78,86 +75,9 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
             frame.text(recording, "summary", report.as_markdown(report.diagnosis(found), {}))
             for number, one in enumerate(shown, 1):
                 beside.log(recording, f"run_{number}", one, larger)
-            for root, (panel, _) in panels.items():
-                panel.log(recording, root)
-            _torques(recording, found, panels)
-            _forecasts(recording, found, panels)
+            for place in panels:
+                chart.log_panel(recording, place)
     return Path(path)
-
-
-def _panels(found: Discrepancy) -> dict[str, tuple[Panel, str]]:
-    """Return panels of torques and forecasts by their roots, with what they are called."""
-    panels = {}
-    for over, said in OVER_SAID.items():
-        rows = [
-            row for t in (found.torque_before, found.torque_after) for row in t.rows.get(over, [])
-        ]
-        if rows:
-            x = np.array([(row["from"], row["to"]) for row in rows])
-            y = np.array(
-                [row["torque"] + sign * Z95 * row["stderr"] for row in rows for sign in (-1, 1)]
-            )
-            along = " along the motion" if rows[0]["along_motion"] else ""
-            panel = Panel.holding(x, np.append(y, 0.0), said, f"torque{along}  ({SI})")
-            panels[f"torque/{over}"] = (panel, f"Torque lacking over {over.replace('_', ' ')}")
-    for forecast in found.forecasts:
-        y = 1e3 * np.concatenate([forecast.before, forecast.after, [0.0, forecast.noise_floor]])
-        x = np.append(forecast.horizon, 0.0)
-        panel = Panel.holding(x, y, "time ahead  (s)", "rms error  (mrad)")
-        panels[f"forecast/{forecast.kind}"] = (panel, f"Error of forecasts, {forecast.kind} runs")
-    return panels
-
-
-def _torques(
-    stream: rr.RecordingStream, found: Discrepancy, panels: dict[str, tuple[Panel, str]]
-) -> None:
-    for over in OVER_SAID:
-        root = f"torque/{over}"
-        if root not in panels:
-            continue
-        panel, _ = panels[root]
-        zero = [np.array([[panel.x[0], 0.0], [panel.x[1], 0.0]])]
-        panel.strips(stream, f"{root}/data/zero", zero, frame.INK, 0.5)
-        for look, torque in ((BEFORE, found.torque_before), (AFTER, found.torque_after)):
-            rows = torque.rows.get(over, [])
-            if rows:
-                panel.strips(stream, f"{root}/data/{look.name}", _steps(rows), look.colour, 1.5)
-                panel.strips(
-                    stream,
-                    f"{root}/data/{look.name}/bars",
-                    _bars(rows, look is AFTER),
-                    look.colour,
-                    0.8,
-                )
-
-
-def _steps(rows: list[dict[str, Any]]) -> list[np.ndarray]:
-    """Return the line of a torque: level through each bin."""
-    return [np.array([(row[end], row["torque"]) for row in rows for end in ("from", "to")])]
-
-
-def _bars(rows: list[dict[str, Any]], right: bool) -> list[np.ndarray]:  # noqa: FBT001 (a side)
-    """Return intervals of 95 %, beside the middle of each bin: both models' are seen."""
-    part = 0.55 if right else 0.45
-    lines = []
-    for row in rows:
-        x, half = row["from"] + part * (row["to"] - row["from"]), Z95 * row["stderr"]
-        lines.append(np.array([[x, row["torque"] - half], [x, row["torque"] + half]]))
-    return lines
-
-
-def _forecasts(
-    stream: rr.RecordingStream, found: Discrepancy, panels: dict[str, tuple[Panel, str]]
-) -> None:
-    for forecast in found.forecasts:
-        root = f"forecast/{forecast.kind}"
-        panel, _ = panels[root]
-        floor = 1e3 * forecast.noise_floor
-        noise = [np.array([[panel.x[0], floor], [panel.x[1], floor]])]
-        panel.strips(stream, f"{root}/data/noise", noise, frame.INK, 1.0)
-        for look, error in ((BEFORE, forecast.before), (AFTER, forecast.after)):
-            line = np.stack([forecast.horizon, 1e3 * error], axis=1)
-            panel.strips(stream, f"{root}/data/{look.name}", [line], look.colour, 1.5)
 
 
 def _content(found: Discrepancy, shown: list[Beside]) -> str:
@@ -188,13 +108,11 @@ def _describe(stream: rr.RecordingStream, found: Discrepancy, larger: float) -> 
     stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
 
 
-def _blueprint(
-    shown: list[Beside], larger: float, panels: dict[str, tuple[Panel, str]]
-) -> rrb.Blueprint:
+def _blueprint(shown: list[Beside], larger: float, panels: list[chart.Place]) -> rrb.Blueprint:
     """Return the layout: a tab a run and one of the panels, beside them the report."""
     runs = [beside.views(f"run_{k}", one, larger) for k, one in enumerate(shown, 1)]
     grid = rrb.Grid(
-        *(panel.view(root, name) for root, (panel, name) in panels.items()),
+        *(place.frame.view(place.panel.where, place.panel.title) for place in panels),
         grid_columns=2,
         name="Gap",
     )

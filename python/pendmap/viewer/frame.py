@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.charts import names, plane
-from pendmap.units import NONDIMENSIONAL, VELOCITY, Units
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -29,9 +29,6 @@ SIDE = 1000.0
 
 SHORT = 8
 """Letters of a name that has room beside the ticks."""
-
-PLAIN = 0.8
-"""Height over width of a frame that is no phase plane."""
 
 TIMELINE = "sim_time"
 
@@ -134,37 +131,31 @@ def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blu
 
 @dataclass(frozen=True)
 class Frame:
-    """A rectangle of the phase plane, and where it lies in a 2D view.
+    """A rectangle with two axes, and where it lies in a 2D view.
 
     A 2D view counts downward and draws both directions to one scale. So everything under
     ``root/data`` is logged in physical units, one static transform there brings it to the screen,
-    and the frame with its ticks is drawn under ``root/axes``, ``SIDE`` wide.
-
-    Attributes
-    ----------
-    x : (float, float)
-        Range of the angle in rad.
-    y : (float, float)
-        Range of the velocity.
-    units : Units
-        What it is counted in.
-    axes : (str, str) or None
-        Names of other quantities, symbol and unit, where it is no phase plane.
+    and the frame with its ticks is drawn under ``root/axes``, ``SIDE`` wide. ``ratio`` is height
+    over width; ``angles`` says which axes have multiples of pi as labels.
     """
 
     x: tuple[float, float]
     y: tuple[float, float]
-    units: Units = NONDIMENSIONAL
-    axes: tuple[str, str] | None = None
+    axes: tuple[str, str]
+    ratio: float
+    angles: tuple[bool, bool] = (False, False)
+
+    @classmethod
+    def phase(cls, x: tuple[float, float], y: tuple[float, float], units: Units) -> Frame:
+        """Return the frame of a phase plane, neither a slit nor a tower."""
+        low, high = (units.bare(bound, VELOCITY) for bound in y)
+        ratio = min(max((high - low) / (x[1] - x[0]), 0.3), 1.3)
+        return cls(x, y, (names.ANGLE, names.speed(units)), ratio, (True, False))
 
     @property
     def height(self) -> float:
-        """Height on the screen: that of the range, but neither a slit nor a tower."""
-        if self.axes:
-            return PLAIN * SIDE
-        low, high = (self.units.bare(bound, VELOCITY) for bound in self.y)
-        ratio: float = (high - low) / (self.x[1] - self.x[0])
-        return SIDE * min(max(ratio, 0.3), 1.3)
+        """Height on the screen."""
+        return SIDE * self.ratio
 
     def to_screen(self) -> rr.Transform3D:
         """Return the transform from physical units to the screen."""
@@ -195,8 +186,8 @@ class Frame:
             origin=f"/{root}",
             name=name,
             visual_bounds=rrb.VisualBounds2D(
-                x_range=[-190.0, SIDE + 190.0],
-                y_range=[-100.0, self.height + 150.0 + below],
+                x_range=[-210.0, SIDE + 190.0],
+                y_range=[-110.0, self.height + 150.0 + below],
             ),
             time_ranges=time_ranges,
         )
@@ -209,8 +200,8 @@ class Frame:
         places: list[list[float]] = []
         labels: list[str] = []
         (across, along), (up, rising) = (
-            plane.short_ticks(*self.x, angle=self.axes is None),
-            plane.short_ticks(*self.y, angle=False),
+            plane.short_ticks(*self.x, angle=self.angles[0]),
+            plane.short_ticks(*self.y, angle=self.angles[1]),
         )
         for value, label in along:
             at = w * (across + value - self.x[0]) / (self.x[1] - self.x[0])
@@ -220,12 +211,12 @@ class Frame:
         for value, label in rising:
             at = h * (self.y[1] - up - value) / (self.y[1] - self.y[0])
             lines.append([[-12, at], [0, at]])
-            places.append([-55, at - 22])
+            places.append([-70, at - 22])
             labels.append(label)
-        # With its unit the velocity's name is too long to stand beside the ticks.
-        below, beside = self.axes or (names.ANGLE, names.speed(self.units))
-        above = self.units.si or len(beside) > SHORT
-        places += [[w / 2, h + 75], [60, -80] if above else [-135, h / 2 - 22]]
+        below, beside = self.axes
+        # A name longer than a symbol has no room beside the ticks.
+        above = len(beside) > SHORT
+        places += [[w / 2, h + 75], [0, -85] if above else [-135, h / 2 - 22]]
         labels += [plane.shifted(below, across), plane.shifted(beside, up)]
         thin = rr.Radius.ui_points(0.75)
         stream.log(

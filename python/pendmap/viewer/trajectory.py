@@ -91,7 +91,7 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
         visual_bounds=rrb.VisualBounds2D(x_range=[-reach, reach], y_range=[-reach, reach]),
     )
     state = [
-        rrb.TimeSeriesView(origin=f"/state/{name}", name=text(around.units))
+        rrb.TimeSeriesView(origin=f"/state/{name}", name=text(Units.of(attrs)))
         for name, (text, _) in _STATE.items()
     ]
     left = rrb.Vertical(
@@ -154,13 +154,7 @@ def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def refuse_beyond(time: Floats, velocity: Floats) -> None:
-    """Refuse what a recording cannot hold: its places are single precision, its times ns.
-
-    Raises
-    ------
-    InputError
-        For a time or a velocity beyond that.
-    """
+    """Refuse what a recording cannot hold: its places are single precision, its times ns."""
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
@@ -170,7 +164,7 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
 
 def frame_of(attrs: Attributes, velocity: Floats) -> frame.Frame:
     """Return the frame of the phase plane that holds these velocities."""
-    return frame.Frame((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
+    return frame.Frame.phase((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
 
 
 def _stroke(attrs: Attributes) -> float:

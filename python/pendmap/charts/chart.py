@@ -1,0 +1,291 @@
+"""Charts: what a picture shows, as arrays and plain values; every renderer draws any chart.
+
+A chart has panels, a panel two axes and marks. Marks stand in the units of their axes. Where a mark
+has a ``name``, a legend names it; marks of one name share a line there. Where it has a ``path``, a
+recording holds it there, below the data of its panel. No drawing library is imported here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+Floats = npt.NDArray[np.float64]
+Dash = str | tuple[float, ...]
+Ends = tuple[float, float]
+
+INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
+"""Colours of text and axes, of what is secondary, and of warnings."""
+
+DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)
+"""Dashes: lengths of lines and gaps, in widths of the line."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One side of a panel.
+
+    ``name`` is symbol and unit, a blank between them. Without ``ends`` a side holds the marks.
+    ``scale`` ``angle`` has multiples of pi as labels, ``signed`` is logarithmic beyond
+    ``straight`` on both sides of 0. Labels are values times ``factor``, or else ``ticks``.
+    """
+
+    name: str = ""
+    ends: Ends | None = None
+    scale: Literal["plain", "angle", "log", "signed"] = "plain"
+    straight: float = 0.0
+    factor: float = 1.0
+    ticks: Sequence[tuple[float, str]] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mark:
+    """What all marks have; those of a higher ``order`` lie on top."""
+
+    colour: str = INK
+    name: str = ""
+    path: str = ""
+    order: float | None = None
+    alpha: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Mark):
+    """A line through points, broken where they are not numbers; ``halo`` is a colour around it."""
+
+    x: Floats
+    y: Floats
+    _: dataclasses.KW_ONLY
+    width: float = 1.2
+    dash: Dash = "-"
+    step: bool = False
+    halo: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Points(Mark):
+    """Separate points; ``fill`` and ``edge`` are by default the colour."""
+
+    x: Floats
+    y: Floats
+    _: dataclasses.KW_ONLY
+    marker: str = "o"
+    size: float = 3.0
+    fill: str = ""
+    edge: str = ""
+    edge_width: float = 0.0
+    halo: str = ""
+    clip: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Mark):
+    """The area between two curves."""
+
+    x: Floats
+    low: Floats
+    high: Floats
+    _: dataclasses.KW_ONLY
+    step: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Steps(Mark):
+    """A histogram, ``n`` values over ``n + 1`` edges: its outline, or its area."""
+
+    edges: Floats
+    values: Floats
+    _: dataclasses.KW_ONLY
+    filled: bool = False
+    width: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Areas(Mark):
+    """Polygons, shape (m, 2) each; hatched, or full."""
+
+    shapes: Sequence[Floats]
+    _: dataclasses.KW_ONLY
+    hatch: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Colours:
+    """How an image's values become colours, and the name of the bar beside it.
+
+    ``scale`` is ``linear``, ``log``, ``centred`` (two halves about 0) or ``counts`` (whole numbers
+    in steps); ``beyond`` says which ends values exceed.
+    """
+
+    name: str
+    map: str
+    low: float
+    high: float
+    scale: Literal["linear", "log", "centred", "counts"] = "linear"
+    beyond: Literal["neither", "min", "max", "both"] = "neither"
+    ticks: Sequence[float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Image(Mark):
+    """Cells, row 0 lowest, between the ends of both axes.
+
+    ``values`` are numbers, shape (rows, columns), nan where there is none, and ``colours`` how they
+    are coloured; or they are numbers of ``classes``, pairs of name and colour.
+    """
+
+    values: npt.NDArray[Any]
+    x: Ends
+    y: Ends
+    _: dataclasses.KW_ONLY
+    colours: Colours | None = None
+    classes: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Level(Mark):
+    """A line across the panel at a value of one axis."""
+
+    value: float
+    _: dataclasses.KW_ONLY
+    axis: Literal["x", "y"] = "y"
+    width: float = 0.7
+    dash: Dash = "-"
+
+
+@dataclass(frozen=True, eq=False)
+class Span(Mark):
+    """Stretches of one axis, shaded across the panel, shape (n, 2)."""
+
+    ends: npt.ArrayLike
+    _: dataclasses.KW_ONLY
+    axis: Literal["x", "y"] = "x"
+
+
+@dataclass(frozen=True, eq=False)
+class Text(Mark):
+    """Words at a place, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
+
+    x: float
+    y: float
+    text: str
+    _: dataclasses.KW_ONLY
+    inside: bool = False
+    align: tuple[str, str] = ("center", "center")
+    boxed: bool = False
+    size: float = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Two axes and what stands between them.
+
+    ``name`` is what a user types for it; ``root`` is where a recording has it, by default the name.
+    ``share`` is its size beside the others of its row; a ``note``, pairs of text and colour, stands
+    beneath one that is smaller. ``bare`` panels have no frame.
+    """
+
+    name: str
+    title: str
+    x: Axis
+    y: Axis
+    marks: Sequence[Mark]
+    _: dataclasses.KW_ONLY
+    root: str = ""
+    share: float = 1.0
+    note: Sequence[tuple[str, str]] = ()
+    bare: bool = False
+    least: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """Return where a recording has it."""
+        return self.root or self.name
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Panels with a title.
+
+    ``rows`` are the names of the panels that a figure shows, from the top, by default all in one;
+    ``heights`` are the shares of the rows, ``ratio`` the height of a panel over its width, and
+    ``size`` the inches of the figure where it goes by these. Rows of fewer panels than ``columns``
+    are not filled. A recording shows all panels: one at a
+    time as ``tabs``, or below one another; ``remark`` ends its legend.
+    """
+
+    title: str
+    subtitle: str
+    panels: Sequence[Panel]
+    _: dataclasses.KW_ONLY
+    rows: Sequence[Sequence[str]] = ()
+    heights: Sequence[float] = ()
+    ratio: float = 0.8
+    size: Ends | None = None
+    columns: int = 0
+    letters: bool = True
+    tabs: bool = False
+    remark: str = ""
+    notes: Sequence[str] = ()
+    legend: Literal["below", "above", "none"] = "below"
+
+    def panel(self, name: str) -> Panel:
+        """Return the panel of a name."""
+        return next(panel for panel in self.panels if panel.name == name)
+
+    @property
+    def shown(self) -> list[list[Panel]]:
+        """Return the rows of a figure."""
+        if not self.rows:
+            return [list(self.panels)]
+        return [[self.panel(name) for name in row] for row in self.rows]
+
+    def only(self, layer: str | None, size: Ends | None = None) -> Chart:
+        """Return the chart with one of its panels alone, all of it without a name.
+
+        Raises
+        ------
+        InputError
+            If it has no panel of that name.
+        """
+        if layer is None:
+            return self
+        known = [panel.name for row in self.shown for panel in row]
+        if layer not in known:
+            if len(known) == 1:
+                raise InputError(f"no layer {layer!r}: this figure has one part")
+            raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
+        return dataclasses.replace(self, rows=((layer,),), heights=(), size=size)
+
+
+def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
+    """Return lines, shape (n, 2) each, as one that is broken between them: x and y."""
+    gap = np.full((1, 2), np.nan)
+    parts = [part for line in lines for part in (line, gap)]
+    both = np.concatenate([np.empty((0, 2)), *parts])
+    return both[:, 0], both[:, 1]
+
+
+def bars(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Return upright bars from low to high as one broken line: x and y."""
+    at, bottom, top = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, low, high)))
+    gap = np.full(at.shape, np.nan)
+    return np.repeat(at, 3), np.stack([bottom, top, gap], axis=1).ravel()
+
+
+def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:
+    """Return the ends of an axis that holds the values that are numbers, with a margin."""
+    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    known = every[np.isfinite(every)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    pad = margin * (high - low) or (0.0 if high > low else 0.06 * max(abs(low), 1.0))
+    return low - pad, high + pad

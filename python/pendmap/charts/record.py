@@ -1,0 +1,272 @@
+"""Records: one in detail, an experiment as strips, or a panel a run."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.charts import names
+from pendmap.charts.chart import (
+    ALARM,
+    QUIET,
+    Axis,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Span,
+    Steps,
+    Text,
+    holding,
+)
+from pendmap.formatting import moment
+from pendmap.records.noise import noise_floor
+from pendmap.records.summary import noise_said, noise_unit
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import true_runs
+
+if TYPE_CHECKING:
+    from pendmap.records import Experiment, Run
+
+Floats = npt.NDArray[np.float64]
+
+USED: Final = "#1d3557"
+UNUSED: Final = "#a9a9a9"
+FALSE: Final = "#d55e00"
+_BAND: Final = "#ececec"
+MOST_POINTS: Final = 20_000
+"""Residuals that are drawn; more only make a figure large."""
+MOST_LINES: Final = 14
+"""Lines of findings below the panels."""
+MOST_RUNS: Final = 12
+"""Strips of one figure; the text of ``look`` has every run."""
+FEW: Final = 400
+"""Samples under which each is drawn as a dot."""
+APART: Final = 0.22
+"""Inches between numbers in one row."""
+SHORT: Final = 2e-3
+"""Share of the record under which a finding is a point, not a span."""
+WIDTH: Final = 8.6
+"""Inches across a figure."""
+TURN: Final = 2.0
+"""Range of angles from which on multiples of pi are its labels, rad."""
+
+
+def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
+    """Return one record in detail, or a strip of each run."""
+    return _one(records.runs[0], width) if len(records.runs) == 1 else _many(records, width)
+
+
+def _one(run: Run, width: float) -> Chart:
+    noted = _listed(run, max(int((width - 1.0) / 0.073), 20))
+    last = _decay(run) if run.peaks_only else _residuals(run)
+    panels = [_flags(run, width), _history(run), _intervals(run), last]
+    return Chart(
+        f"Record {run.name}",
+        _subtitle(run),
+        panels,
+        rows=[["flags"], ["history"], ["clock", "last"]],
+        heights=(0.15, 1.25, 1.0),
+        size=(width, 6.3 + 0.19 * len(noted)),
+        notes=noted,
+    )
+
+
+def _subtitle(run: Run) -> str:
+    if run.peaks_only:
+        return f"{run.time.size} turning points, {moment(run.time[0])} to {moment(run.time[-1])} s"
+    said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
+    said = said.replace("+-", "\N{PLUS-MINUS SIGN}")
+    used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
+    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {said}"
+
+
+def _listed(run: Run, letters: int) -> list[str]:
+    """Return the findings in lines, numbered as in the figure."""
+    lines: list[str] = []
+    for number, found in enumerate(run.findings, 1):
+        mended = "mended: " if found.mended else ""
+        lines += textwrap.wrap(
+            f"{number}  {mended}{found.text}", letters, subsequent_indent="    ", max_lines=2
+        )
+    if len(lines) > MOST_LINES:
+        lines = [*lines[: MOST_LINES - 1], "...  pendmap look has the rest"]
+    return lines
+
+
+def angle(ends: tuple[float, float]) -> Axis:
+    """Return the axis of an angle: multiples of pi where it goes far."""
+    return Axis(names.ANGLE, ends, "angle" if ends[1] - ends[0] > TURN else "plain")
+
+
+def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
+    """Return the samples: those for fitting, others, and outliers, which stand alone."""
+    few: dict[str, Any] = {"size": 2.2}
+    alone = _lone(~run.trusted)
+    steps = np.diff(run.time)
+    # A line from the sample before would cross a gap.
+    breaks = np.flatnonzero(np.concatenate([[False], steps > 5 * np.median(steps)]))
+    marks: list[Mark] = []
+    for which, colour, said in (
+        (~run.trusted & ~alone, UNUSED, "not for fitting"),
+        (run.trusted, USED, "for fitting"),
+    ):
+        look: dict[str, Any] = {"colour": colour, "name": said if which.any() else ""}
+        if not run.peaks_only:
+            shown = np.where(which, run.theta, np.nan)
+            line = np.insert(time, breaks, time[breaks]), np.insert(shown, breaks, np.nan)
+            marks.append(Line(*line, width=width, **look))
+        if run.peaks_only or time.size < FEW:
+            marks.append(Points(time[which], run.theta[which], **few, **look))
+    if alone.any():
+        cross: dict[str, Any] = {"colour": FALSE, "marker": "x", "size": 4.5, "edge_width": 1.0}
+        marks.append(Points(time[alone], run.theta[alone], name="outliers", **cross))
+    return marks
+
+
+def _lone(marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return which of the marked samples stand in stretches of three at most: outliers."""
+    few = np.zeros(marked.size, bool)
+    for low, high in zip(*true_runs(marked), strict=True):
+        few[low:high] = high - low <= 3  # noqa: PLR2004
+    return few
+
+
+def _history(run: Run) -> Panel:
+    spans = [(part.from_s, part.to_s) for part in run.segments if not part.used]
+    marks = _samples(run, run.time, 0.8)
+    if spans:
+        marks.append(Span(spans, colour=_BAND))
+    clock = Axis("t (s)", holding(run.time, margin=0.01))
+    return Panel("history", "", clock, angle(holding(run.theta)), marks)
+
+
+def _flags(run: Run, width: float) -> Panel:
+    """Return the numbers of findings that have a place, in two rows in which they do not meet."""
+    low, high = float(run.time[0]), float(run.time[-1])
+    ends = holding(run.time, margin=0.01)
+    inches = (width - 1.0) / (ends[1] - ends[0])
+    taken: list[list[float]] = [[], []]
+    marks: list[Mark] = []
+    for number, found in enumerate(run.findings, 1):
+        if found.from_s is None or found.to_s is None:
+            continue
+        left, right = max(found.from_s, low), min(found.to_s, high)
+        if right < low or left > high:
+            continue
+        at = (left - ends[0]) * inches
+        row = next((r for r in (0, 1) if all(abs(at - x) > APART for x in taken[r])), None)
+        if row is None:
+            continue
+        taken[row].append(at)
+        colour = QUIET if found.mended else ALARM
+        wide = right - left > SHORT * (high - low) and not found.where.startswith("row")
+        place = np.array([left, right]) if wide else np.array([left])
+        height = np.full(place.size, row + 0.12)
+        marks.append(
+            Line(place, height, colour=colour, width=1.6)
+            if wide
+            else Points(place, height, colour=colour, marker="v", size=3.5)
+        )
+        side = ("center", "bottom")
+        marks.append(Text(left, row + 0.28, str(number), colour=colour, align=side, size=8.0))
+    return Panel("flags", "", Axis("", ends), Axis("", (0.0, 2.0)), marks, bare=True)
+
+
+def _intervals(run: Run) -> Panel:
+    """Return how often each interval between samples occurs."""
+    steps = 1e3 * np.diff(run.time)
+    usual = float(np.median(steps))
+    low, high = float(steps.min()), float(steps.max())
+    wide = high > 20 * max(low, 1e-9 * usual)
+    pad = max(0.05 * (high - low), 0.02 * usual)
+    edges = (
+        np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
+        if wide
+        else np.linspace(low - pad, high + pad, 61)
+    )
+    counts = np.maximum(np.histogram(steps, edges)[0], 1e-3)
+    ends = float(edges[0]), float(edges[-1])
+    across = Axis("interval (ms)", ends, "log" if wide else "plain")
+    up = Axis("samples", (0.7, 1.5 * steps.size), "log")
+    title = "between turning points" if run.peaks_only else "the clock"
+    return Panel("clock", title, across, up, [Steps(edges, counts, colour=USED, filled=True)])
+
+
+def _decay(run: Run) -> Panel:
+    size = np.maximum(np.abs(run.theta), 1e-9)
+    clock = Axis("t (s)", (float(run.time[0]), float(run.time[-1])))
+    ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
+    up = Axis("|\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
+    return Panel("last", "the decay", clock, up, [Points(run.time, size, colour=USED, size=2.5)])
+
+
+def _residuals(run: Run) -> Panel:
+    """Return how far samples are from their neighbours, against speed, and the noise found."""
+    noise = noise_floor(run)
+    read = run.theta if run.gyroscope is None else run.read
+    fit = local_fit(run.time, read)
+    keep = run.trusted[fit.middle]
+    speed, residual = np.abs(fit.slope[keep]), 1e3 * np.abs(fit.residual[keep])
+    title = "away from nine neighbours"
+    if not speed.size or not math.isfinite(noise.sigma):
+        none = Axis("", (0.0, 1.0), ticks=())
+        return Panel("last", title, none, none, [Text(0.5, 0.5, "too few samples")])
+    some = slice(None, None, max(speed.size // MOST_POINTS, 1))
+    marks: list[Mark] = [Points(speed[some], residual[some], colour="#a9b8cc", size=0.8)]
+    for part in noise.by_speed:
+        ends = np.array([part.speed_from, min(part.speed_to, float(speed.max()))])
+        level = np.full(2, 1e3 * part.sigma)
+        marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
+    top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
+    # What is read changes by speeds, a rate by accelerations.
+    speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
+    if run.gyroscope is not None:
+        two = "\N{SUPERSCRIPT TWO}"
+        speeds = f"|d{two}\N{GREEK SMALL LETTER THETA}/dt{two}| (rad/s{two})"
+    fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
+    across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
+    up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))
+    return Panel("last", title, across, up, marks)
+
+
+def _many(experiment: Experiment, width: float) -> Chart:
+    """Return a strip of each run, each from its own start, so that all share a scale of time."""
+    runs = experiment.runs[:MOST_RUNS]
+    longest = max(float(run.time[-1] - run.time[0]) for run in runs)
+    shown = f", the first {MOST_RUNS}" if len(experiment.runs) > MOST_RUNS else ""
+    known = ", ".join(f"{name} = {value:g}" for name, value in experiment.known.items())
+    panels = []
+    for k, run in enumerate(runs):
+        name = "t from the start (s)" if k + 1 == len(runs) else ""
+        clock = Axis(name, (-0.01 * longest, 1.01 * longest))
+        marks = _samples(run, run.time - run.time[0], 0.7)
+        up = angle(holding(run.theta, margin=0.08))
+        panels.append(Panel(str(k), _said(run), clock, up, marks))
+    return Chart(
+        f"Experiment {experiment.path.resolve().name}",
+        f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; "),
+        panels,
+        rows=[[panel.name] for panel in panels],
+        size=(width, 1.4 + 1.25 * len(runs)),
+        letters=False,
+    )
+
+
+def _said(run: Run) -> str:
+    said: list[str] = [run.kind]
+    if run.drive is not None:
+        said.append(
+            f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s"
+        )
+    if run.hold_out:
+        said.append("held out")
+    keys = [found.what for found in run.findings][:3]
+    more = ", ..." if len(run.findings) > len(keys) else ""
+    said.append(", ".join(keys) + more)
+    return f"{run.name}: " + ", ".join(filter(None, said))

@@ -1,0 +1,65 @@
+"""Builders of charts by the kind of dataset: a module here of the kind's name has ``chart``."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+from typing import TYPE_CHECKING, Final, Protocol
+
+from pendmap import charts
+from pendmap.charts.basins import refuse_too_large
+from pendmap.charts.selection import shown
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pendmap.charts.chart import Chart
+
+
+class Builder(Protocol):
+    """Makes a chart: of one ``layer``, images of at most so many ``cells`` along a side."""
+
+    def __call__(self, dataset: xr.Dataset, *, layer: str | None, cells: int) -> Chart:
+        """Return the chart."""
+
+
+BUILDERS: Final[dict[str, Builder]] = {}
+"""Builders of kinds that have no module here."""
+
+
+def kinds() -> list[str]:
+    """Return the kinds of datasets that have a chart."""
+    names = [module.name for module in pkgutil.iter_modules(charts.__path__)]
+    return sorted({*BUILDERS, *(name for name in names if _builder(name) is not None)})
+
+
+def _builder(kind: str) -> Builder | None:
+    if kind in BUILDERS:
+        return BUILDERS[kind]
+    name = f"pendmap.charts.{kind}"
+    if not kind.isidentifier() or importlib.util.find_spec(name) is None:
+        return None
+    found: Builder | None = getattr(importlib.import_module(name), "chart", None)
+    return found if callable(found) else None
+
+
+def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
+    """Return a dataset as it is drawn, if it has a chart and there is memory for it."""
+    kind = dataset.attrs.get("kind")
+    if not isinstance(kind, str) or _builder(kind) is None:
+        raise InputError(
+            f"cannot {action} a dataset of kind {kind!r}; kinds that can be: {', '.join(kinds())}"
+        )
+    dataset = shown(dataset)
+    refuse_too_large(dataset)
+    return dataset
+
+
+def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
+    """Return the chart of a dataset of :func:`ready`."""
+    builder = _builder(str(dataset.attrs["kind"]))
+    if builder is None:
+        raise InputError(f"no chart of kind {dataset.attrs['kind']!r}")
+    return builder(dataset, layer=layer, cells=cells)

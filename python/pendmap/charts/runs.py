@@ -1,0 +1,80 @@
+"""Records of several runs: a panel a run, measured angle against time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.charts import names, plane
+from pendmap.charts.chart import Axis, Chart, Line, Panel
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Floats = npt.NDArray[np.float64]
+
+COLUMNS: Final = 20
+"""Runs up to which there are two columns; of more there are three."""
+BINS: Final = 10_000
+"""Pieces of a panel of which least and greatest angle are drawn, where there are more samples."""
+LOST: Final = 1.5
+"""Samples apart, in the usual distance, from which on nothing is drawn between two."""
+_COLOUR: Final = "#1d3557"
+
+
+@dataclass(frozen=True)
+class RunPanel:
+    """One run as it was measured.
+
+    Attributes
+    ----------
+    title : str
+        What stands above its panel.
+    time, angle : ndarray, shape (n,)
+        Time since the run began in s, measured angle in rad, not wrapped.
+    """
+
+    title: str
+    time: Floats
+    angle: Floats
+
+
+def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
+    """Return a panel a run, measured angle against time."""
+    columns = min(len(runs), 2 if len(runs) <= COLUMNS else 3)
+    rows = -(-len(runs) // columns)
+    panels = []
+    for k, run in enumerate(runs):
+        begin, end = float(run.time[0]), float(run.time[-1])
+        clock = Axis(names.clock(Units(si=True)), (begin, max(end, begin + 1e-3)))
+        up = Axis(names.ANGLE, plane.padded(run.angle), "angle")
+        line = Line(*_curve(run), colour=_COLOUR, width=0.7)
+        panels.append(Panel(str(k), run.title, clock, up, [line]))
+    wide, high = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * rows)
+    return Chart(
+        title,
+        subtitle,
+        panels,
+        rows=[[p.name for p in panels[k : k + columns]] for k in range(0, len(runs), columns)],
+        columns=columns,
+        size=(wide, high),
+        letters=False,
+    )
+
+
+def _curve(run: RunPanel) -> tuple[Floats, Floats]:
+    """Return the line of a record: broken where samples are lost, thinned where there are many."""
+    time, theta = run.time, run.angle
+    if time.size > 2 * BINS:
+        begins = np.linspace(0, time.size, BINS, endpoint=False).astype(int)
+        ends = (np.minimum.reduceat(theta, begins), np.maximum.reduceat(theta, begins))
+        return np.repeat(time[begins], 2), np.stack(ends, axis=1).ravel()
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size else math.inf
+    lost = np.flatnonzero(steps > LOST * usual) + 1
+    return np.insert(time, lost, np.nan), np.insert(theta, lost, np.nan)

@@ -1,0 +1,148 @@
+"""One trajectory: time history, energy, phase plane, Poincare section."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pendmap.analysis.trajectory import energy
+from pendmap.charts import basins, names, plane
+from pendmap.charts.chart import QUIET, Axis, Chart, Level, Line, Mark, Panel, Points, Span, holding
+from pendmap.charts.curves import envelope
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+LATE: Final = 0.2
+"""The last share of a trajectory, drawn dark, so that what it settles to stands out."""
+FLAT: Final = 0.1
+"""Range in rad under which a history counts as a straight line."""
+SIZES: Final = ((500, 2.6), (20_000, 1.3), (math.inf, 0.6))
+"""Sizes of the points of a section by the number of points up to which they hold."""
+UPSIDE_DOWN: Final = 2.0
+"""Energy over m g l of a pendulum that rests upside down."""
+MOST_DRAWN: Final = 20_000
+"""Bins of a curve against time that is drawn by its lowest and highest values."""
+MOST_PERIODS: Final = 200
+"""Periods of which the phase curve is drawn whole; of more, the last half of this number."""
+_SIZES: Final = {"history": (8.6, 3.6), "energy": (8.6, 3.6)}
+"""Inches of a figure of one part."""
+_EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
+
+
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+    """Return the four parts; curves are dark where they are late."""
+    del cells
+    attrs, units = dataset.attrs, Units.of(dataset.attrs)
+    start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
+    start += f"{names.velocity(units)} = {units.spoken(format(float(attrs['velocity0']), '.6g'))}"
+    time = dataset["time"].values
+    ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
+    return Chart(
+        "Trajectory",
+        f"{basins.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        [
+            _history(dataset, Axis(names.clock(units) if layer else "", ends)),
+            _energy(dataset, Axis(names.clock(units), ends)),
+            _phase(dataset),
+            _section(dataset),
+        ],
+        rows=[["history"], ["energy"], ["phase", "section"]],
+        heights=(0.32, 0.2, 0.48),
+        size=(8.6, 8.2),
+    ).only(layer, _SIZES.get(layer or "", (5.6, 5.3)))
+
+
+def _history(dataset: xr.Dataset, clock: Axis) -> Panel:
+    marks: list[Mark] = _against_time(dataset, dataset["theta"].values)
+    spans = resting(dataset)
+    if len(spans):
+        marks.append(Span(spans, colour=_REST, name="at rest"))
+    ends = _wide(dataset["theta"].values)
+    title = "time history (dark: the last fifth)"
+    return Panel("history", title, clock, Axis(names.ANGLE, ends, "angle"), marks)
+
+
+def _wide(values: Floats) -> tuple[float, float]:
+    low, high = holding(values)
+    return (low - FLAT, high + FLAT) if high - low < FLAT else (low, high)
+
+
+def _energy(dataset: xr.Dataset, clock: Axis) -> Panel:
+    values = energy(dataset["theta"].values, dataset["velocity"].values, dataset.attrs)
+    marks, ends, title = _against_time(dataset, values), _wide(values), "energy"
+    if ends[0] < UPSIDE_DOWN < ends[1]:  # above it, it can go over the top
+        marks.append(Level(UPSIDE_DOWN, colour=QUIET, width=0.8, dash=(4.0, 3.0), order=0.0))
+        title = "energy (dashed: upside down at rest)"
+    return Panel("energy", title, clock, Axis("E / (m g l)", ends), marks)
+
+
+def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
+    """Return a curve against time, its last part dark; a long one by its lowest and highest."""
+    time = dataset["time"].values
+    late = _late(time)
+    parts = ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE))
+    return [
+        Line(*envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
+        for part, colour in parts
+    ]
+
+
+def resting(dataset: xr.Dataset) -> Floats:
+    """Return when friction holds the pendulum within the times shown, from and to, shape (n, 2)."""
+    if "event_kind" not in dataset:
+        return np.empty((0, 2))
+    kinds, times = dataset["event_kind"].values, dataset["event_time"].values
+    first, last = (float(dataset["time"].values[end]) for end in (0, -1))
+    begins, releases = times[kinds == "stick"], times[kinds == "release"]
+    ends = np.append(releases, np.inf)[np.searchsorted(releases, begins)]
+    spans = np.clip(np.stack([begins, ends], axis=1), first, last)
+    within: Floats = spans[spans[:, 0] < spans[:, 1]]
+    return within
+
+
+def _phase(dataset: xr.Dataset) -> Panel:
+    theta, velocity = dataset["theta"].values, dataset["velocity"].values
+    late, first, which = _late(dataset["time"].values), 0, ""
+    if dataset.sizes["period"] > MOST_PERIODS:
+        beginning = dataset["section_time"].values[-1 - MOST_PERIODS // 2]
+        late = first = int(np.searchsorted(dataset["time"].values, beginning))
+        which = f", the last {MOST_PERIODS // 2} periods"
+    marks: list[Mark] = []
+    for part, colour, width in (
+        (slice(first, late + 1), _EARLY, 0.5), (slice(late, None), _LATE, 0.7),
+    ):  # fmt: skip
+        curve = plane.broken_at_wrap(theta[part], velocity[part])
+        marks.append(Line(*curve.T, colour=colour, width=width))
+    if (dataset.attrs.get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
+        marks.append(Points(plane.wrapped(theta[-1:]), velocity[-1:], colour=_LATE, size=3.5))
+    return Panel("phase", f"phase plane{which}", *_sides(dataset), marks)
+
+
+def _sides(dataset: xr.Dataset) -> tuple[Axis, Axis]:
+    speeds = plane.padded(dataset["velocity"].values)
+    return names.phase_plane((-math.pi, math.pi), speeds, Units.of(dataset.attrs))
+
+
+def _section(dataset: xr.Dataset) -> Panel:
+    theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
+    time = dataset["time"].values
+    late = np.asarray(dataset["section_time"].values >= time[_late(time)], bool)
+    size = next(size for most, size in SIZES if theta.size <= most)
+    marks = [
+        Points(theta[which], velocity[which], colour=colour, size=size)
+        for which, colour in ((~late, _EARLY), (late, _LATE))
+    ]
+    title = "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period"
+    return Panel("section", title, *_sides(dataset), marks)
+
+
+def _late(time: Floats) -> int:
+    """Return the first index of the last part."""
+    return int(np.searchsorted(time, time[-1] - LATE * (time[-1] - time[0])))

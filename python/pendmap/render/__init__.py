@@ -1,0 +1,116 @@
+"""Figures for papers; the only place that imports matplotlib.
+
+``draw`` looks at what a dataset holds and draws the figure for it. It needs no display.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pendmap.charts import registry
+from pendmap.charts.runs import RunPanel
+from pendmap.render.drawing import figure
+from pendmap.render.of_records import (
+    draw_comparison,
+    draw_discrepancy,
+    draw_identification,
+    draw_record,
+    draw_runs,
+    write_report,
+)
+from pendmap.render.written import SUFFIXES, written
+
+if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
+    import xarray as xr
+
+__all__ = [
+    "SUFFIXES",
+    "RunPanel",
+    "draw",
+    "draw_comparison",
+    "draw_discrepancy",
+    "draw_identification",
+    "draw_record",
+    "draw_runs",
+    "write_report",
+]
+
+
+def draw(  # noqa: PLR0913 (all of these a user may choose)
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    layer: str | None = None,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    colormap: str | None = None,
+) -> Path:
+    """Draw a dataset into a file.
+
+    Of a basin map: the labels, with the attractors marked and named with their shares, and the
+    settle time beside them; where the labels are unreliable, settle time and net turns lead; where
+    labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
+    and points in the phase plane. Of a map over two parameters: the kinds of attractor, striped
+    where several coexist, and the largest exponent. Of a bifurcation diagram: stroboscopic angles,
+    sweeps up and down, exponents. Of critical curves: stable regions and their boundaries. Of
+    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history,
+    energy, phase plane, Poincare section. Of an exponent: growth along the start, the running mean,
+    its distribution. Of a lifetime: the survival curve with its tail, and the mean over where the
+    tail begins.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
+        ``pendmap.melnikov`` or ``pendmap.simulate`` returned;
+        ``attrs["kind"]`` tells which. Of a selection (a range, every k-th value, reversed,
+        transposed) the picture shows the cells that are there, at their coordinates, with their
+        shares.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    layer : str, optional
+        Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
+        over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
+        ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
+        ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
+        of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map over two parameters
+        ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
+        ``certainty``, or ``share KIND``.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+    colormap : str, optional
+        Name of a matplotlib colour map for the map's scalar layers.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind of dataset, suffix, layer or colour map, and for an impossible size or
+        resolution.
+    MemoryError
+        If the dataset is too large.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> figures.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
+    """
+    dataset = registry.ready(dataset, "draw")
+
+    return written(
+        path,
+        lambda dpi: figure(dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),
+        size=size,
+        dpi=dpi,
+    )

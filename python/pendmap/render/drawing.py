@@ -1,0 +1,387 @@
+"""Any chart as a matplotlib figure, and several charts on one sheet."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import textwrap
+import warnings
+from typing import TYPE_CHECKING, Any, Final
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from pendmap.charts import registry
+from pendmap.charts.chart import Image
+from pendmap.errors import InputError
+from pendmap.render import marks, style, ticks
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase, SubFigure
+
+    from pendmap.charts.chart import Chart, Ends, Mark, Panel
+
+LEFT: Final = 0.1
+HEAD: Final = 0.72
+LINE: Final = style.RC["font.size"] * 1.5 / 72
+"""Inches left of the title, of title and subtitle, of a line of words."""
+CELLS: Final = 1200
+"""Rows and columns of a map that are drawn at most, unless the figure has more pixels."""
+WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
+"""Inches across a panel: of several side by side, of the only one, of those below one another."""
+BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
+"""Inches that names and labels take beside a panel, a bar, those below it, a row of a legend."""
+LEAST: Final = 0.5
+"""Inches that a panel needs."""
+_SMALLEST: Final = 0.9
+"""Size of a subtitle's letters, over their own, under which it takes a third line."""
+
+
+def draw(chart: Chart, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
+    """Return the figure of a chart; ``size`` is in inches.
+
+    Raises
+    ------
+    InputError
+        If ``size`` leaves no room for the panels.
+    """
+    figure, needed = _made(chart, size or chart.size or _natural(chart), dpi)
+    if size is not None and _lacks(size, needed):
+        least = _least(chart, dpi)
+        if _lacks(size, least):
+            raise InputError(
+                f"size {size} leaves no room for the panels; it must be at least"
+                f" {least[0]:.1f} x {least[1]:.1f} inches"
+            )
+    return figure
+
+
+def figure(
+    dataset: xr.Dataset,
+    *,
+    layer: str | None = None,
+    size: tuple[float, float] | None = None,
+    dpi: float = 200.0,
+    colormap: str | None = None,
+) -> Figure:
+    """Return the figure of a dataset that is ready to be drawn."""
+    pixels = math.ceil(max(size or (0.0,)) * dpi)
+    chart = registry.build(dataset, layer=layer, cells=max(CELLS, pixels))
+    if colormap is not None:
+        style.colour_map(colormap)
+        chart = _recoloured(chart, colormap)
+    return draw(chart, size=size, dpi=dpi)
+
+
+def _recoloured(chart: Chart, colormap: str) -> Chart:
+    """Return a chart with this colour map in its images of numbers."""
+    shown = {panel.name for row in chart.shown for panel in row}
+    panels, found = [], False
+    for panel in chart.panels:
+        marks: list[Mark] = []
+        for mark in panel.marks:
+            if isinstance(mark, Image) and mark.colours is not None:
+                found |= panel.name in shown
+                look = dataclasses.replace(mark.colours, map=colormap)
+                marks.append(dataclasses.replace(mark, colours=look))
+            else:
+                marks.append(mark)
+        panels.append(dataclasses.replace(panel, marks=marks))
+    if not found:
+        raise InputError(
+            f"colormap {colormap!r}: this figure has none; its colours tell attractors apart"
+        )
+    return dataclasses.replace(chart, panels=panels)
+
+
+def _least(chart: Chart, dpi: float) -> Ends:
+    """Return the least size with room for every panel and its words, in tenths of an inch."""
+    size = chart.size or _natural(chart)
+    _, least = _made(chart, size, dpi)
+    for _ in range(9):
+        least = (math.ceil(10 * least[0] - 1e-6) / 10, math.ceil(10 * least[1] - 1e-6) / 10)
+        _, needed = _made(chart, least, dpi)
+        if not _lacks(least, needed):
+            break
+        least = (max(least[0], needed[0]), max(least[1], needed[1]))
+    return least
+
+
+def _lacks(size: Ends, needed: Ends) -> bool:
+    return needed[0] > size[0] + 1e-6 or needed[1] > size[1] + 1e-6
+
+
+def _natural(chart: Chart) -> Ends:
+    """Return a size in inches in which the panels have their proportions."""
+    rows = chart.shown
+    stacked = len(rows) > 1 and all(len(row) == 1 for row in rows)
+    wide = STACKED if stacked else ALONE if len(rows[0]) == 1 else WIDE
+    across = [sum(panel.share for panel in row) * wide + _aside(row) for row in rows]
+    heights = chart.heights or [max(panel.share for panel in row) for row in rows]
+    texts = marks.legend(_all_marks(chart))[1]
+    width = max(across) + 0.15
+    down = sum(heights) * wide * chart.ratio + BELOW * len(rows)
+    below = ROW * -(-len(texts) // _columns(texts, width)) + 0.1 if texts else 0.0
+    return width, down + HEAD + below + LINE * len(chart.notes)
+
+
+def _aside(row: Sequence[Panel]) -> float:
+    bars = sum(any(getattr(mark, "colours", None) for mark in panel.marks) for panel in row)
+    return BESIDE * len(row) + BAR * bars
+
+
+def _all_marks(chart: Chart) -> list[Any]:
+    return [mark for row in chart.shown for panel in row for mark in panel.marks]
+
+
+def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
+    """Return the figure of a chart, and the size in inches that it needs."""
+    texts = marks.legend(_all_marks(chart))[1] if chart.notes else []
+    # The layout leaves room for a legend at the edge alone, not for one above notes.
+    rows = -(-len(texts) // _columns(texts, size[0]))
+    foot = LINE * len(chart.notes) + (ROW * rows + 0.1 if rows else 0.0)
+    figure = headed(size, dpi, chart.title, chart.subtitle, foot=foot)
+    for k, line in enumerate(chart.notes):
+        at = (0.06 + LINE * (len(chart.notes) - k)) / size[1]
+        figure.text(LEFT / size[0], at, line, fontsize=8.5, va="top")
+    axes = fill(figure, chart)
+    fits = settle(figure, [(axes[p.name], p) for row in chart.shown for p in row])
+    return figure, _needed(figure, chart, axes) if fits else (1.15 * size[0], 1.15 * size[1])
+
+
+def headed(size: Ends, dpi: float, title: str, subtitle: str, *, foot: float = 0.0) -> Figure:
+    """Return an empty figure with title and subtitle, and room for ``foot`` inches below."""
+    figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    top, height = write_head(figure, title, subtitle), size[1]
+    rect = (0.0, foot / height, 1.0, max(1 - (top + foot) / height, 1e-3))
+    engine: Any = figure.get_layout_engine()
+    engine.set(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=rect)
+    return figure
+
+
+def write_head(figure: Figure, title: str, subtitle: str) -> float:
+    """Write title and subtitle; return the inches that they take.
+
+    A subtitle that is too long for one line becomes two, at a semicolon, where these need not be
+    much smaller, and else has a line for each part; a title becomes smaller.
+    """
+    width, height = (float(side) for side in figure.get_size_inches())
+    room = width - 2 * LEFT
+    whole = style.inches(subtitle, style.RC["font.size"])
+    lines = [subtitle] if whole <= room else halves(subtitle)
+    if _SMALLEST * longest(lines) > room:
+        lines = subtitle.split(";   ")
+    shrunk = room / max(longest(lines), 1e-3)
+    # Letters of few pixels are set wider than in proportion.
+    font = style.RC["font.size"] * (1.0 if shrunk >= 1 else 0.9 * shrunk)
+    bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
+    left = LEFT / width
+    figure.text(left, 1 - 0.22 / height, title, fontsize=bold, weight="bold", va="center")
+    for k, line in enumerate(lines):
+        down = 0.45 + LINE * k
+        figure.text(left, 1 - down / height, line, color=style.QUIET, va="center", fontsize=font)
+    return float(HEAD + LINE * (len(lines) - 1) - (0.0 if subtitle else LINE))
+
+
+def fill(figure: Figure | SubFigure, chart: Chart) -> dict[str, Axes]:
+    """Draw the panels of a chart and its legend into a figure; return the axes by their names."""
+    rows = chart.shown
+    heights = chart.heights or [max(panel.share for panel in row) for row in rows]
+    shares = [panel.share for panel in rows[0]] if len(rows) == 1 else []
+    columns = chart.columns or math.lcm(*(len(row) for row in rows))
+    grid = figure.add_gridspec(
+        len(rows), columns, height_ratios=list(heights), width_ratios=shares or None
+    )
+    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    several = chart.letters and sum(len(row) for row in rows) > 1
+    axes: dict[str, Axes] = {}
+    for down, row in enumerate(rows):
+        wide = 1 if chart.columns else columns // len(row)
+        for k, panel in enumerate(row):
+            place: Any = grid[down, k * wide : (k + 1) * wide]
+            if panel.note and panel.share < 1:
+                parts = [panel.share, 1 - panel.share]
+                place = (
+                    place.subgridspec(2, 1, height_ratios=parts)[0, 0]
+                    if len(row) > 1
+                    else place.subgridspec(1, 2, width_ratios=parts)[0, 0]
+                )
+            axes[panel.name] = figure.add_subplot(place)
+            if panel.title:
+                mark = f"({next(letters)}) " if several else ""
+                axes[panel.name].set_title(f"{mark}{panel.title}")
+    for row in rows:
+        for panel in row:
+            _panel(axes[panel.name], panel)
+    handles, texts = marks.legend(_all_marks(chart)) if chart.legend != "none" else ([], [])
+    if texts:
+        width = figure.bbox.width / _dpi(figure)
+        foot = LINE * len(chart.notes) * _dpi(figure)
+        where: Any = f"outside {'lower' if chart.legend == 'below' else 'upper'} left"
+        figure.legend(
+            handles,
+            texts,
+            loc=where,
+            bbox_to_anchor=(0.0, foot / figure.bbox.height, 1.0, 1.0) if foot else None,
+            ncols=_columns(texts, width),
+            borderpad=0.1,
+            labelspacing=0.45,
+            handlelength=1.7,
+            handleheight=1.0,
+            handletextpad=0.6,
+            columnspacing=1.6,
+        )
+    return axes
+
+
+def _panel(axes: Axes, panel: Panel) -> None:
+    for mark in panel.marks:
+        marks.draw(axes, mark)
+    for artist in (*axes.lines, *axes.collections, *axes.images):
+        artist.set_in_layout(False)
+    for which, side in (("x", panel.x), ("y", panel.y)):
+        bare = dataclasses.replace(side, ticks=()) if panel.bare else side
+        ticks.scale(axes, which, bare)
+    if panel.bare:
+        axes.set_axis_off()
+
+
+def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
+    """Place the panels, fold titles that are too long for them, and write notes beneath.
+
+    Returns
+    -------
+    bool
+        Whether there is room for the panels.
+    """
+    engine: Any = figure.get_layout_engine()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        engine.execute(figure)
+        for axes, panel in panels:
+            ticks.turn(axes)
+            title, room = axes.get_title(loc="left"), _inches(axes)[0]
+            if title and width_of(title) > room + 0.15:
+                axes.set_title(folded(title, room))
+            if panel.note:
+                _note(axes, panel)
+        engine.execute(figure)
+    return not any("collapsed" in str(one.message) for one in said)
+
+
+def _note(axes: Axes, panel: Panel) -> None:
+    """Write paragraphs beneath a small panel, or beside one that stands alone in its row."""
+    wide, high = _inches(axes)
+    beside = wide > high * 2
+    free = wide * (1 - panel.share) / panel.share
+    used, room = 0.0, high if beside else high * (1 - panel.share) / panel.share
+    for k, (text, colour) in enumerate(panel.note):
+        bold = colour == style.ALARM
+        width = (free - 0.35 if beside else wide) / (0.081 if bold else 0.067)
+        lines = textwrap.wrap(text, max(12, int(width)))
+        if k and used + LINE * len(lines) > room:
+            return
+        words = axes.annotate(
+            "\n".join(lines),
+            (1.0, 1.0) if beside else (0.0, 0.0),
+            (18.0, -72 * used) if beside else (0.0, -72 * (0.5 + used)),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            va="top",
+            color=colour,
+            weight="bold" if bold else "normal",
+            linespacing=1.25,
+        )
+        words.set_in_layout(False)
+        used += LINE * len(lines) + 0.05
+
+
+def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
+    """Return the size in inches in which every panel has the room that its words need."""
+    width, height = figure.get_size_inches()
+    across, down = [], 0.0
+    for row in chart.shown:
+        have = [_inches(axes[panel.name]) for panel in row]
+        least = [_room(axes[panel.name], panel) for panel in row]
+        unit = max(
+            (need[0] - one[0]) / panel.share
+            for need, one, panel in zip(least, have, row, strict=True)
+        )
+        across.append(unit * sum(panel.share for panel in row))
+        down += max(need[1] - one[1] for need, one in zip(least, have, strict=True))
+    texts = marks.legend(_all_marks(chart))[1] if chart.legend != "none" else []
+    words = [style.inches(chart.title, 12, bold=True), longest(halves(chart.subtitle))]
+    words.append(max((_entry(text) for text in texts), default=0.0))
+    return max(width + max(across), max(words) + 2 * LEFT), height + down
+
+
+def _room(axes: Axes, panel: Panel) -> Ends:
+    """Return width and height that a panel needs."""
+    bars = [mark.colours.name for mark in panel.marks if getattr(mark, "colours", None)]  # type: ignore[attr-defined]
+    words = [panel.y.name, *bars]
+    high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
+    title = axes.get_title(loc="left").replace("\n", " ")
+    wide = max(LEAST, panel.least, width_of(folded(title, 0.0)) - 0.15)
+    if panel.note:
+        wide = max(wide, 1.2)
+        high = max(high, 0.9)
+    return wide, high
+
+
+def _inches(axes: Axes) -> Ends:
+    box, dpi = axes.get_window_extent(), _dpi(axes.figure)
+    return float(box.width) / dpi, float(box.height) / dpi
+
+
+def _dpi(part: FigureBase) -> float:
+    """Return the pixels per inch of the figure that a part belongs to."""
+    whole: Any = part.get_figure(root=True)
+    return float(whole.dpi)
+
+
+def width_of(title: str) -> float:
+    """Return how wide the longest line of a panel's title is, in inches."""
+    return max(style.inches(line, style.RC["axes.titlesize"]) for line in title.split("\n"))
+
+
+def folded(title: str, room: float) -> str:
+    """Return a title on two lines of nearly equal length, or more where there is less room."""
+    letters = max(len(line) for line in title.split("\n")) or 1
+    size = width_of(title) / letters
+    lines = title
+    for count in range(2, 4):
+        lines = textwrap.fill(title, max(-(-len(title) // count) + 3, 8))
+        if room == 0.0 or width_of(lines) <= room + 0.15 or size == 0:
+            break
+    return lines
+
+
+def halves(text: str) -> list[str]:
+    """Return a text on two lines as equal as can be, broken at one of its semicolons."""
+    parts = text.split(";   ")
+    both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
+    return min(both, key=longest, default=[text])
+
+
+def longest(lines: Sequence[str]) -> float:
+    """Return the inches of the longest line."""
+    return max(style.inches(line, style.RC["font.size"]) for line in lines)
+
+
+def _entry(text: str) -> float:
+    """Return the inches of a legend's entry with its handle."""
+    return style.inches(text, style.RC["legend.fontsize"]) + 0.55
+
+
+def _columns(texts: Sequence[str], room: float) -> int:
+    """Return how many columns a legend has in ``room`` inches, its rows nearly full."""
+    if not texts:
+        return 1
+    fit = max(1, int((room - 0.2) // max(map(_entry, texts))))
+    rows = -(-len(texts) // min(fit, len(texts)))
+    return -(-len(texts) // rows)

@@ -1,0 +1,196 @@
+"""Marks of charts as matplotlib draws them, and what stands for them in a legend."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import BoundaryNorm, LogNorm, Normalize, TwoSlopeNorm, to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+
+from pendmap.charts import chart as charts
+from pendmap.render import style
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+
+    from pendmap.charts.chart import Mark
+
+MANY: Final = 2000
+"""Points from which on they are drawn as pixels also in a file of vectors."""
+
+
+def draw(axes: Axes, mark: Mark) -> None:
+    """Draw a mark."""
+    _DRAW[type(mark)](axes, mark)
+
+
+def _common(mark: Mark) -> dict[str, Any]:
+    order = {} if mark.order is None else {"zorder": mark.order}
+    return order if mark.alpha == 1 else order | {"alpha": mark.alpha}
+
+
+def _dash(dash: charts.Dash) -> Any:  # noqa: ANN401 (as matplotlib takes it)
+    return dash if isinstance(dash, str) else (0, dash)
+
+
+def _look(mark: charts.Line) -> dict[str, Any]:
+    look = {"color": mark.colour, "lw": mark.width, "ls": _dash(mark.dash)} | _common(mark)
+    if mark.halo:
+        stroke = withStroke(linewidth=1.3 * mark.width + 0.9, foreground=mark.halo)
+        look["path_effects"] = [stroke]
+    return look
+
+
+def _spots(mark: charts.Points) -> dict[str, Any]:
+    look = {
+        "marker": mark.marker,
+        "ls": "none",
+        "ms": mark.size,
+        "color": mark.colour,
+        "mfc": mark.fill or mark.colour,
+        "mec": mark.edge or mark.colour,
+        "mew": mark.edge_width,
+    } | _common(mark)
+    if mark.halo:
+        look["path_effects"] = [withStroke(linewidth=0.42 * mark.size, foreground=mark.halo)]
+    return look
+
+
+def _line(axes: Axes, mark: charts.Line) -> None:
+    axes.plot(mark.x, mark.y, drawstyle="steps-post" if mark.step else "default", **_look(mark))
+
+
+def _points(axes: Axes, mark: charts.Points) -> None:
+    if not np.size(mark.x):
+        return  # it stands in the legend alone
+    many = np.size(mark.x) > MANY
+    axes.plot(mark.x, mark.y, clip_on=mark.clip, rasterized=many, **_spots(mark))
+
+
+def _band(axes: Axes, mark: charts.Band) -> None:
+    step: Any = "post" if mark.step else None
+    look: dict[str, Any] = {"zorder": 0.5} | _common(mark)
+    axes.fill_between(mark.x, mark.low, mark.high, step=step, color=mark.colour, lw=0, **look)
+
+
+def _steps(axes: Axes, mark: charts.Steps) -> None:
+    width = 0 if mark.filled else mark.width
+    axes.stairs(
+        mark.values, mark.edges, fill=mark.filled, baseline=0 if mark.filled else None,
+        color=mark.colour, lw=width, **_common(mark),
+    )  # fmt: skip
+
+
+def _areas(axes: Axes, mark: charts.Areas) -> None:
+    # Edges of the same colour: without them a seam shows between neighbours. A hatch has none.
+    look: dict[str, Any] = {"facecolors": mark.colour, "edgecolors": mark.colour, "lw": 0.3}
+    if mark.hatch:
+        look = {"facecolors": "none", "edgecolors": mark.colour, "hatch": mark.hatch, "lw": 0}
+    axes.add_collection(PolyCollection(list(mark.shapes), **(look | _common(mark))))
+
+
+def _level(axes: Axes, mark: charts.Level) -> None:
+    look = {"color": mark.colour, "lw": mark.width, "ls": _dash(mark.dash)}
+    across = axes.axvline if mark.axis == "x" else axes.axhline
+    across(mark.value, **(look | {"zorder": 1.2} | _common(mark)))
+
+
+def _span(axes: Axes, mark: charts.Span) -> None:
+    shade = axes.axvspan if mark.axis == "x" else axes.axhspan
+    for low, high in np.reshape(mark.ends, (-1, 2)):
+        shade(low, high, color=mark.colour, lw=0, **({"zorder": 0} | _common(mark)))
+
+
+def _text(axes: Axes, mark: charts.Text) -> None:
+    look: dict[str, Any] = {"transform": axes.transAxes} if mark.inside else {}
+    if mark.boxed:
+        look["bbox"] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2}
+    across, up = mark.align
+    axes.text(
+        mark.x, mark.y, mark.text, color=mark.colour, ha=across, va=up, fontsize=mark.size,
+        **(look | _common(mark)),
+    )  # fmt: skip
+
+
+def _image(axes: Axes, mark: charts.Image) -> None:
+    where: dict[str, Any] = {
+        "extent": (*mark.x, *mark.y), "origin": "lower", "aspect": "auto",
+        "interpolation": "nearest",
+    }  # fmt: skip
+    if mark.colours is None:
+        shades = np.round(255 * np.array([to_rgb(colour) for _, colour in mark.classes]))
+        axes.imshow(shades.astype(np.uint8).reshape(-1, 3)[mark.values], **where, **_common(mark))
+        return
+    look = mark.colours
+    drawn = axes.imshow(
+        mark.values, cmap=style.colour_map(look.map), norm=_norm(look), **where, **_common(mark)
+    )
+    bar = axes.figure.colorbar(
+        drawn, ax=axes, extend=look.beyond, extendfrac=0.03, pad=0.02, aspect=28, fraction=0.05
+    )
+    if look.ticks is not None:
+        texts = [f"{tick:.6g}".replace("-", "\N{MINUS SIGN}") for tick in look.ticks]
+        bar.set_ticks(list(look.ticks), labels=texts)
+    bar.ax.minorticks_off()
+    bar.outline.set_linewidth(0.7)
+    bar.set_label(look.name, labelpad=4)
+
+
+def _norm(look: charts.Colours) -> Normalize:
+    if look.scale == "log":
+        return LogNorm(look.low, look.high)
+    if look.scale == "centred":
+        return TwoSlopeNorm(0.0, look.low, look.high)
+    if look.scale == "counts":
+        return BoundaryNorm(np.arange(look.low, look.high + 1), 256, extend=look.beyond)
+    return Normalize(look.low, look.high)
+
+
+_DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
+    charts.Line: _line,
+    charts.Points: _points,
+    charts.Band: _band,
+    charts.Steps: _steps,
+    charts.Areas: _areas,
+    charts.Level: _level,
+    charts.Span: _span,
+    charts.Text: _text,
+    charts.Image: _image,
+}
+
+
+def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
+    """Return handles and texts of the named marks; those of one name stand upon one another."""
+    named: dict[str, list[Any]] = {}
+    for mark in marks:
+        if isinstance(mark, charts.Image):
+            for name, colour in mark.classes:
+                if name:
+                    named.setdefault(name, []).append(
+                        Patch(facecolor=colour, edgecolor=style.QUIET, linewidth=0.5)
+                    )
+        elif mark.name:
+            named.setdefault(mark.name, []).append(_handle(mark))
+    kept = {name: handles[:3] for name, handles in named.items()}
+    return [tuple(each) if len(each) > 1 else each[0] for each in kept.values()], list(kept)
+
+
+def _handle(mark: Mark) -> Any:  # noqa: ANN401 (an artist)
+    if isinstance(mark, charts.Line):
+        return Line2D([], [], **(_look(mark) | {"lw": max(mark.width, 1.0)}))
+    if isinstance(mark, charts.Points):
+        size = min(max(mark.size, 3.0), 9.0)
+        return Line2D([], [], **(_spots(mark) | {"ms": size}))
+    if isinstance(mark, charts.Level):
+        return Line2D([], [], color=mark.colour, lw=mark.width, ls=_dash(mark.dash))
+    if isinstance(mark, charts.Areas) and mark.hatch:
+        return Patch(facecolor="none", edgecolor=mark.colour, hatch=mark.hatch, lw=0)
+    if isinstance(mark, charts.Steps) and not mark.filled:
+        return Line2D([], [], color=mark.colour, lw=mark.width)
+    return Patch(facecolor=mark.colour, alpha=mark.alpha, lw=0)

@@ -1,0 +1,249 @@
+"""Figures of records, and of what is made of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pendmap.charts.runs import of_runs
+from pendmap.errors import InputError
+from pendmap.render import drawing
+from pendmap.render.written import written
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from pendmap.charts.runs import RunPanel
+    from pendmap.comparison import Comparison
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.identification import IdentificationReport
+    from pendmap.records import Experiment
+
+
+def draw_record(
+    records: Experiment,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Draw what an experiment holds into a file.
+
+    Of one record: the angle with what is for fitting and what is not, the findings at their places
+    and in words, the intervals of its clock, its noise against speed. Of several runs: a strip
+    each.
+
+    Parameters
+    ----------
+    records : Experiment
+        What ``pendmap.read_experiment`` returned.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix and an impossible size or resolution.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap.charts import record  # noqa: PLC0415 (what reads records takes a while)
+
+    chart = record.sheet(records, **({"width": size[0]} if size else {}))
+    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
+
+
+def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
+    """Draw a model beside the records that it is compared with into a file.
+
+    For each run: record and model, the residual with the noise, errors of periods and peaks.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What ``pendmap.comparison.free`` returned.
+    path : str or path
+        As of :func:`pendmap.render.draw`.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap.render import comparison as sheet  # noqa: PLC0415 (scipy takes a while)
+
+    return written(path, lambda dpi: sheet.figure(comparison, dpi=dpi))
+
+
+def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Draw a diagnosis into a file.
+
+    The residuals of the runs that the baseline misses most, before and after, over the noise; the
+    residual by run, and the error of forecasts against their horizon; the torque that each model
+    lacks over angle and velocity, with 95 % intervals; the scores of the candidates; the first
+    effect's size run by run.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        What ``pendmap.diagnosis.diagnose`` returned.
+    path : str or path
+        As of :func:`pendmap.render.draw`.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If the file cannot be written.
+    """
+    from pendmap.charts import diagnosis  # noqa: PLC0415 (scipy takes a while)
+
+    return written(path, lambda dpi: drawing.draw(diagnosis.sheet(found), dpi=dpi))
+
+
+def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a diagnosis with its figures.
+
+    Parameters
+    ----------
+    found : Discrepancy
+        What ``pendmap.diagnosis.diagnose`` returned.
+    path : str or path
+        ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
+        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
+
+    Returns
+    -------
+    Path
+        The file or folder. Each file is complete; existing ones are replaced.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If a file cannot be written.
+    """
+    from pendmap.render import report  # noqa: PLC0415 (scipy takes a while)
+
+    target = Path(path)
+    if target.suffix.lower() not in {"", *report.SUFFIXES} and not target.is_dir():
+        known = " or ".join(report.SUFFIXES)
+        raise InputError(
+            f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
+            f"{target.suffix!r}"
+        )
+    return report.write(found, target)
+
+
+def draw_runs(
+    runs: Sequence[RunPanel], path: str | os.PathLike[str], *, title: str, subtitle: str
+) -> Path:
+    """Draw the records of an experiment into a file: a panel a run, measured angle against time.
+
+    Parameters
+    ----------
+    runs : sequence of RunPanel
+        One or more.
+    path : str or path
+        As of :func:`pendmap.render.draw`.
+    title, subtitle : str
+        What stands above all panels.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix, or without any run.
+    OSError
+        If the file cannot be written.
+    """
+    if not runs:
+        raise InputError("runs must hold one record or more, got []")
+    chart = of_runs(runs, title=title, subtitle=subtitle)
+    return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
+
+
+def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
+    report: IdentificationReport,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+    parts: Sequence[str] | None = None,
+    title: str | None = None,
+    subtitle: str | None = None,
+) -> Path:
+    """Draw what was identified into a file: figures 4 to 7 of the paper and its table 1.
+
+    Parameters
+    ----------
+    report : IdentificationReport
+        What ``pendmap.identification.identify_experiment`` returned.
+    path : str or path
+        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
+    size : (float, float), optional
+        Width and height in inches; by default as large as the parts need.
+    dpi : float, optional
+        Pixels per inch, 200 by default.
+    parts : sequence of str, optional
+        Which parts, by default all: ``record`` (figure 4: angle, velocity, its sign, odd and even
+        half cycles), ``decrement`` (5: of each three peaks, with the zero error and without),
+        ``decay`` (6: every model beside the record), ``errors`` (7: of periods and peaks) and
+        ``table`` (table 1).
+    title, subtitle : str, optional
+        What stands above; by default the record's name, and what was measured.
+
+    Returns
+    -------
+    Path
+        The file, complete.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix or part, and for an impossible size or resolution.
+    OSError
+        If the file cannot be written.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 3.
+    """
+    from pendmap.render import identification  # noqa: PLC0415 (likewise)
+
+    return written(
+        path,
+        lambda dpi: identification.figure(
+            report, parts=parts, size=size, dpi=dpi, title=title, subtitle=subtitle
+        ),
+        size=size,
+        dpi=dpi,
+    )

@@ -1,0 +1,115 @@
+"""The report of a diagnosis with its figures, one for each of its parts."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import TYPE_CHECKING, Final
+
+import matplotlib as mpl
+
+from pendmap import report
+from pendmap.charts import diagnosis
+from pendmap.files import whole_file, whole_folder
+from pendmap.render import drawing, style
+from pendmap.render import sheet as sheets
+from pendmap.render.blocks import Box
+from pendmap.render.errors import draw_errors
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.report.document import Document
+
+SUFFIXES: Final = (".html", ".md")
+"""The kinds of file that a report is."""
+
+DPI: Final = 110.0
+"""Pixels per inch: sharp on a screen, and the file stays under a megabyte."""
+
+WIDTH: Final = 8.6
+"""Inches of every figure."""
+
+CYCLES: Final = 3
+"""Free runs in figure 7: those held out first, then the longest."""
+
+
+def figure_7(found: Discrepancy, dpi: float) -> Figure | None:
+    """Return errors of simulated periods and peaks, of both models, for each free run."""
+    runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
+    if not runs:
+        return None
+    high = 3.0
+    size, said = (WIDTH, high * len(runs) + 0.72), "from the first measured peak on"
+    made = sheets.headed(size, dpi, "Simulated periods and peaks", said)
+    letters: Iterator[str] = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
+    top = high * len(runs)
+    for one in runs:
+        top -= high
+        title = one.name + (", held out" if one.held_out else "")
+        errors = one.errors
+        if not found.adds:
+            errors = {"baseline": errors["before"]} if "before" in errors else {}
+        draw_errors(made, Box(0.0, top, WIDTH, high), errors, one.peaks, letters, title)
+    return made
+
+
+def figures(found: Discrepancy) -> dict[str, Figure]:
+    """Return the figures by the names that the report has for them."""
+    made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(found).items()}
+    cycles = figure_7(found, DPI)
+    return made | ({} if cycles is None else {"figure_7": cycles})
+
+
+def write(found: Discrepancy, path: Path) -> Path:
+    """Write the report of a diagnosis; see :func:`pendmap.render.write_report`."""
+    document = report.diagnosis(found)
+    with mpl.rc_context(style.RC):
+        drawn = figures(found)
+        pictures = {name: _png(drawn[name]) for name in document.pictures if name in drawn}
+    if path.suffix.lower() == ".html" and not path.is_dir():
+        _put({path: _html(document, pictures)})
+    elif path.suffix.lower() == ".md" and not path.is_dir():
+        _put(_beside(path, document, pictures))
+    elif path.is_dir():
+        _put(_both(path, document, pictures))
+    else:
+        with whole_folder(path) as part:
+            part.mkdir()
+            _put(_both(part, document, pictures))
+    return path
+
+
+def _put(files: Mapping[Path, bytes]) -> None:
+    """Put the files of a report in their places: all of them, or none."""
+    with contextlib.ExitStack() as places:
+        for path, content in files.items():
+            places.enter_context(whole_file(path, (*SUFFIXES, ".png"))).write_bytes(content)
+
+
+def _png(made: Figure) -> bytes:
+    buffer = io.BytesIO()
+    made.savefig(buffer, format="png", dpi=DPI)
+    return buffer.getvalue()
+
+
+def _html(document: Document, pictures: dict[str, bytes]) -> bytes:
+    return report.as_html(document, pictures).encode()
+
+
+def _beside(
+    path: Path, document: Document, pictures: dict[str, bytes], *, alone: bool = False
+) -> dict[Path, bytes]:
+    """Return Markdown and its figures beside it, which have its name before theirs."""
+    names = {n: f"{n}.png" if alone else f"{path.stem}_{n}.png" for n in pictures}
+    files = {path.with_name(names[n]): content for n, content in pictures.items()}
+    return files | {path: report.as_markdown(document, names).encode()}
+
+
+def _both(folder: Path, document: Document, pictures: dict[str, bytes]) -> dict[Path, bytes]:
+    beside = _beside(folder / "report.md", document, pictures, alone=True)
+    return beside | {folder / "report.html": _html(document, pictures)}

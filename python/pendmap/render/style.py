@@ -1,0 +1,102 @@
+"""How all figures look: type, ticks, colour bars, and how they are written."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
+
+from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+
+INK = "#222222"
+QUIET = "#666666"
+ALARM = "#a61c00"
+
+RC: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 6.0,
+    "axes.unicode_minus": True,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "pendmap",
+    "pdf.fonttype": 42,
+    "path.simplify": True,
+    "agg.path.chunksize": 20000,
+}
+
+MOST, PIXELS = 100.0, 20000
+"""Inches and pixels that a side of a figure may have."""
+
+DPI = (20, 1200)
+"""Pixels per inch that may be chosen."""
+
+
+@functools.lru_cache(maxsize=4096)
+def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
+    """Return the width of a line of text in inches, in the size of ticks where none is given."""
+    if not text.strip():
+        return 0.0
+    weight = "bold" if bold else "normal"
+    font = FontProperties(family=RC["font.sans-serif"], weight=weight)
+    path = TextPath((0, 0), text, size=size or RC["xtick.labelsize"], prop=font)
+    return float(path.get_extents().width) / 72
+
+
+def colour_map(name: str) -> Colormap:
+    """Return a matplotlib colour map by its name, if there is one."""
+    if name not in mpl.colormaps:
+        known = "viridis, cividis, magma, inferno, plasma, RdBu_r, PuOr"
+        raise InputError(f"no colour map {name!r}; there are for example {known}")
+    return mpl.colormaps[name].copy()
+
+
+def resolution(dpi: float | None) -> float:
+    """Return the pixels per inch, 200 where nothing is said, if they are possible."""
+    if dpi is None:
+        return 200.0
+    low, high = DPI
+    if not low <= dpi <= high:
+        raise InputError(f"dpi {dpi:g} is not between {low} and {high}")
+    return float(dpi)
+
+
+def check_size(size: tuple[float, float] | None, dpi: float) -> None:
+    """Refuse a size in inches that no figure has, or more pixels than fit."""
+    if size is None:
+        return
+    if not all(0 < side <= MOST for side in size):
+        raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
+    if max(size) * dpi > PIXELS:
+        raise InputError(f"size {size} at {dpi:g} dpi: at most {PIXELS} pixels a side are possible")
+
+
+def write(figure: Figure, path: Path) -> None:
+    """Write a figure in its suffix's format, undated, so that equal figures are equal files."""
+    suffix = path.suffix.lower().lstrip(".")
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
+    figure.savefig(path, format=suffix, dpi=figure.dpi, metadata=metadata)

@@ -1,0 +1,38 @@
+"""Figures into files: complete, or not there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+
+from pendmap.files import whole_file
+from pendmap.render import style
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""The kinds of file that can be drawn."""
+
+
+def written(
+    path: str | os.PathLike[str],
+    make: Callable[[float], Figure],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Write the figure that ``make`` returns for a resolution into a file; return its path.
+
+    ``size`` and ``dpi`` are what was asked for; impossible ones are refused.
+    """
+    resolution = style.resolution(dpi)
+    style.check_size(size, resolution)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(style.RC):
+        style.write(make(resolution), part)
+    return Path(path)

@@ -1,0 +1,106 @@
+"""A chart is built once: both renderers draw whatever a builder returns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.text import Text
+
+from drawn import made, named, written
+from pendmap import InputError, render, viewer
+from pendmap.charts import chart as charts
+from pendmap.charts import registry
+from recordings import recorded
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("strict_recordings")
+
+X = np.linspace(1.0, 100.0, 50)
+CELLS = charts.Colours("height", "viridis", 0.0, 1.0)
+
+
+def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> charts.Chart:
+    """Every mark that there is, over plain and logarithmic axes."""
+    y = dataset["p"].values
+    size = min(cells, 4)
+    across, up = charts.Axis("x (s)", (1.0, 100.0), "log"), charts.Axis("y (rad)", (-2.0, 2.0))
+    curves = (
+        charts.Line(X, y, name="a line", path="line", colour="#d55e00"),
+        charts.Points(X[::9], y[::9], name="points", path="points", colour="#0072b2"),
+        charts.Band(X, y - 0.1, y + 0.1, name="a band", path="band", alpha=0.3),
+        charts.Level(0.5, path="level", dash=charts.DASHED),
+        charts.Span((2.0, 3.0), colour="#eeeeee", name="a span"),
+        charts.Areas([np.array([(1, -1), (2, -1), (2, 0)])], colour="#cccccc", name="an area"),
+        charts.Text(0.5, 0.9, "words", inside=True),
+    )
+    bins = charts.Steps(np.array([1.0, 10.0, 100.0]), np.array([0.5, 1.0]), path="bins")
+    classes = charts.Image(
+        np.eye(size, dtype=np.uint8), (1, 5), (0, 1), path="cells",
+        classes=[("no", "#ffffff"), ("yes", "#000000")],
+    )  # fmt: skip
+    heights = charts.Image(np.eye(size), (1, 5), (0, 1), colours=CELLS, path="heights")
+    plain = charts.Axis("a"), charts.Axis("b", (0.0, 1.0))
+    return charts.Chart(
+        "An example",
+        "of every mark",
+        [
+            charts.Panel("curves", "curves", across, up, curves),
+            charts.Panel("bins", "bins", charts.Axis("x"), charts.Axis("n", (0, 2)), [bins]),
+            charts.Panel("classes", "classes", *plain, [classes]),
+            charts.Panel("heights", "heights", *plain, [heights]),
+        ],
+        rows=[["curves", "bins"], ["classes", "heights"]],
+    ).only(layer)
+
+
+@pytest.fixture
+def dataset(monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
+    monkeypatch.setitem(registry.BUILDERS, "example", example)
+    return xr.Dataset({"p": ("x", np.sin(X))}, attrs={"kind": "example", "summary": "An example."})
+
+
+def test_a_builder_is_all_that_a_figure_needs(dataset: xr.Dataset, tmp_path: Path) -> None:
+    figure = made(dataset)
+    assert named(figure) == ["a line", "points", "a band", "a span", "an area", "no", "yes"]
+    for said in ("An example", "of every mark", "words", "height", "x (s)", "(a) curves"):
+        assert said in written(figure)
+    for text in figure.findobj(Text):
+        if isinstance(text, Text) and text.get_visible() and text.get_text().strip():
+            box = text.get_window_extent()
+            assert figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, text.get_text()
+    for suffix in render.SUFFIXES:
+        assert render.draw(dataset, tmp_path / f"a{suffix}").stat().st_size > 5000
+    assert [axes.get_title(loc="left") for axes in made(dataset, "bins").axes] == ["bins"]
+    with pytest.raises(InputError, match=r"no layer 'other'.*curves, bins, classes, heights"):
+        render.draw(dataset, tmp_path / "b.png", layer="other")
+
+
+def test_and_all_that_a_recording_needs(dataset: xr.Dataset, tmp_path: Path) -> None:
+    back = recorded(dataset, tmp_path)
+    marks = {f"/curves/data/{name}" for name in ("line", "points", "band", "level")}
+    images = {"/classes/data/cells", "/heights/data/heights"}
+    assert marks | images | {"/bins/data/bins", "/legend", "/summary"} <= set(back.columns)
+    # Views have no logarithmic axes: powers of ten stand there.
+    at = np.array(back.one("/curves/data/points", "Points2D:positions"))
+    assert np.allclose(at, np.stack([np.log10(X[::9]), np.sin(X)[::9]], axis=1), atol=1e-6)
+    cells = back.image("/classes/data/cells", "SegmentationImage", np.uint8)
+    assert (cells == np.eye(4)).all()
+    assert "- a line: vermillion" in back.one("/legend", "TextDocument:text")
+    assert back.views["/curves"] == "Curves"
+
+
+def test_without_a_builder_there_is_neither(tmp_path: Path) -> None:
+    unknown = xr.Dataset(attrs={"kind": "example"})
+    for write, name in ((render.draw, "a.png"), (viewer.record, "a.rrd")):
+        with pytest.raises(InputError, match=r"kind 'example'; kinds that can be: basins, .*traj"):
+            write(unknown, tmp_path / name)
+
+
+def test_every_module_with_a_builder_is_a_kind() -> None:
+    assert {"basins", "melnikov", "trajectory"} <= set(registry.kinds())
+    assert not {"chart", "palette", "registry"} & set(registry.kinds())
