@@ -78,15 +78,25 @@ SCHEMA = Schema(
     Field("mean_periods", "periods", "periods computed for a start, on average"),
     result.SECONDS,
     result.REACHED,
-    Field("basin_entropy", "nat", "mean entropy of the labels in boxes of 5 x 5 cells"),
+    Field(
+        "basin_entropy",
+        "nat",
+        "mean entropy of the labels in boxes of 5 x 5 cells",
+        "texture.basin_entropy",
+    ),
     Field("boundary_basin_entropy", "nat", "the same, of boxes with more than one label"),
     Field("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes"),
     Field("unreliable", "1", "share of sampled labels that half the step or mirroring changes"),
     Field("labels_sampled", "1", "labels checked so"),
     Field("unreliable_half_step", "1", "share that half the step changes"),
     Field("unreliable_mirror", "1", "share that mirroring changes; absent without the symmetry"),
-    Field("neighbours_agree", "1", "share of neighbouring cells with the same label"),
-    Field("neighbours_chance", "1", "share that would agree by chance", "chance"),
+    Field(
+        "neighbours_agree",
+        "1",
+        "share of neighbouring cells with the same label",
+        "texture.neighbours_agree",
+    ),
+    Field("neighbours_chance", "1", "share that would agree by chance", "texture.chance"),
     result.CHAOS_BOUND,
     Field("searched_starts", "1", "starts of the search for attractors"),
     Field("plane", "", "basins, only_chaos or conservative"),
@@ -275,6 +285,13 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     ------
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> pendmap.basins_of(pendulum, [0.0, 1.0], [0.1, 2.5]).label.values
+    array([1, 1], dtype=int16)
     """
     bare, units = without_dimensions(pendulum)
     numerics = Numerics(tol, max_periods, threads, seed, progress)

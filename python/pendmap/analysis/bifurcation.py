@@ -115,6 +115,14 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         If there is too little memory for the values.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, omega=2.0)
+    >>> result = pendmap.bifurcation(pendulum, {"p": (0.1, 0.5, 3)})
+    >>> sorted(result.sizes)
+    ['bound', 'branch', 'entry', 'kind', 'loose', 'p', 'point']
     """
     model = pendulum
     pendulum, units = without_dimensions(model)

@@ -168,6 +168,14 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     References
     ----------
     Kantz & Grassberger (1985), Physica D 17, 75; Lai & Tel (2011), Transient Chaos, chapter 2.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=1.7, omega=2.0)
+    >>> result = pendmap.lifetime(pendulum, starts=400)
+    >>> round(result.attrs["mean_periods"])
+    132
     """
     model = pendulum
     pendulum, units = without_dimensions(model)

@@ -148,6 +148,14 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     Benettin, Galgani, Giorgilli & Strelcyn (1980), Meccanica 15, 9 and 21 (the method); Kaplan &
     Yorke (1979), Lecture Notes in Mathematics 730, 204; Mueller (1995), Chaos, Solitons & Fractals
     5, 1671 (turns and sticks).
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=2.0, omega=2.0)
+    >>> result = pendmap.lyapunov(pendulum)
+    >>> round(result.attrs["exponent"], 1)
+    0.3
     """
     model = pendulum
     pendulum, units = without_dimensions(model)

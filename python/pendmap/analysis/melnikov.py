@@ -122,6 +122,13 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     ----------
     Guckenheimer & Holmes (1983), Nonlinear Oscillations, section 4.5; Koch & Leven (1985), Physica
     D 16, 1 for the parametrically excited pendulum.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> result = pendmap.melnikov(pendmap.Pendulum(gamma=0.1, p=1.0, omega=2.0))
+    >>> round(result.attrs["p_melnikov"], 6)
+    0.367608
     """
     model = pendulum
     pendulum, _ = without_dimensions(model)

@@ -138,6 +138,13 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         If there is too little memory for the grid.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> result = pendmap.orbit(pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0), n=2)
+    >>> result.theta_point.values.round(3), result.stable.values
+    (array([-1.318]), array([1], dtype=int8))
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
@@ -173,7 +180,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "w": w,
         "cells": grid.cells,
     }
-    SCHEMA.complete(dataset, model, values, {"begun": raw.begun})
+    SCHEMA.complete(dataset, model, values, raw)
     summarised(dataset, _summary(dataset, pendulum, friction=raw.friction), model, "orbits are")
     return dataset
 

@@ -162,6 +162,14 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     References
     ----------
     Xu, Wiercigroch & Cartmell (2005), Chaos, Solitons & Fractals 23, 1537.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1)
+    >>> ranges = {"p": (0.2, 1.8, 3), "omega": (1.8, 2.2, 2)}
+    >>> sorted(pendmap.parameter_map(pendulum, ranges, starts=4).sizes)
+    ['bound', 'entry', 'kind', 'omega', 'p', 'set']
     """
     model = pendulum
     pendulum, units = without_dimensions(model)

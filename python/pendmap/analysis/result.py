@@ -30,7 +30,7 @@ class Field:
     unit: str
     meaning: str
     core: str = ""
-    """Name of the value in the core's result, where that is another one."""
+    """Place of the value in the core's result where it has another name: ``texture.chance``."""
     json: bool = True
     """Whether the JSON object holds it."""
     convert: Callable[[Any], Any] | None = None
@@ -74,8 +74,9 @@ class Schema:
             if field.name in values or field.read is not None:
                 value = values.get(field.name)
             else:
-                key = field.core or field.name
-                value = raw.get(key) if isinstance(raw, dict) else getattr(raw, key, None)
+                value = raw
+                for part in (field.core or field.name).split("."):
+                    value = getattr(value, part, None)
             if value is not None:
                 dataset.attrs[field.name] = value
 

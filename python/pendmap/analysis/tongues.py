@@ -182,6 +182,13 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         drive, or a load that is no constant torque, which moves it.
     KeyboardInterrupt
         After Ctrl-C, within a fraction of a second.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> result = pendmap.tongues(pendmap.Pendulum(gamma=0.1), omega=[1.9, 2.0, 2.1])
+    >>> round(float(result.p.min()), 3)
+    0.2
     """
     model = pendulum
     pendulum, units = without_dimensions(model)

@@ -170,6 +170,14 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         If there is too little memory for the samples.
     KeyboardInterrupt
         After Ctrl-C, without ``live`` or before the first sample.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> result = pendmap.simulate(pendulum, theta=1.0, velocity=0.0, until=20.0)
+    >>> round(float(result.theta[-1]), 3)
+    0.446
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
@@ -377,6 +385,14 @@ def advance(  # noqa: PLR0913
     ------
     InputError
         If the lengths differ, a start is not finite, or a value is outside its range.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> theta, velocity, turns = pendmap.advance(pendulum, [0.5], [0.0], 40)
+    >>> theta.round(3), velocity.round(3)
+    (array([1.318]), array([-0.27]))
     """
     pendulum, units = without_dimensions(pendulum)
     numerics = Numerics(tol, threads=threads, progress=progress)

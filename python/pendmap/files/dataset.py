@@ -52,6 +52,13 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         not installed.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> result = pendmap.melnikov(pendmap.Pendulum(gamma=0.1, p=1.0, omega=2.0))
+    >>> pendmap.save(result, "melnikov.nc").name
+    'melnikov.nc'
     """
     target = Path(path)
     if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
@@ -123,6 +130,13 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         If it is not a result of pendmap, or of a later format.
     OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
+    >>> pendmap.load(path).attrs["kind"]
+    'melnikov'
     """
     source = Path(path)
     if not source.exists():

@@ -52,6 +52,13 @@ def load_model(
         or numbers that contradict; on one line that names the file.
     OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> path = pendmap.save_model(pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08), "rig.toml")
+    >>> pendmap.load_model(path).w0
+    6.2
     """
     si, arguments = read_arguments(path, typed)
     with in_file(path):
