@@ -16,12 +16,12 @@ import numpy as np
 
 import decays
 import pendmap
-from pendmap import diagnosis, identification, render, viewer
+from pendmap import comparison, diagnosis, identification, render, viewer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-ROOMS = ("pendmap", "pendmap.identification", "pendmap.diagnosis")
+ROOMS = ("pendmap", "pendmap.comparison", "pendmap.identification", "pendmap.diagnosis")
 PATIENCE = 60
 """Seconds after which a child is taken to wait for ever."""
 
@@ -75,14 +75,14 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
     starts = np.linspace(-1.0, 1.0, 5)
     plane = {"p": (0.5, 1.0, 2), "gamma": (0.1, 0.2, 2)}
     halves = np.where(np.arange(200) < 97, 1, 2)[:, None].repeat(200, axis=1)
-    few = identification.Ensemble(members=20)
+    few = comparison.Ensemble(members=20)
     return {
         "advance": lambda: pendmap.advance(pendulum, starts, starts, 3),
         "basin_entropy": lambda: pendmap.basin_entropy(basins.label),
         "basins": lambda: pendmap.basins(pendulum, small),
         "basins_of": lambda: pendmap.basins_of(pendulum, starts, starts),
         "bifurcation": lambda: pendmap.bifurcation(pendulum, {"p": (0.6, 0.8, 3)}),
-        "compare": lambda: identification.compare(model, both, ensemble=few),
+        "compare": lambda: comparison.compare(model, both, ensemble=few),
         "diagnose": lambda: diagnosis.diagnose(free, max_effects=1),
         "diagnosed_model": lambda: diagnosis.diagnosed_model(found),
         "effects": pendmap.effects,

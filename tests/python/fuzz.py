@@ -69,7 +69,7 @@ def import_all() -> None:
     """Import what cases need once; every case is a fork of this process, which computes nothing."""
     os.environ["MPLBACKEND"] = "agg"
     for name in fuzz_cases.SMALL:
-        importlib.import_module(f"pendmap.cli.{name}_command")
+        importlib.import_module(f"pendmap.cli.{name}")
     for name in ("render", "viewer", "identification", "diagnosis", "virtual_rig", "records"):
         importlib.import_module(f"pendmap.{name}")
     for name in ("zarr", "scipy.signal", "scipy.optimize", "pyarrow.parquet"):

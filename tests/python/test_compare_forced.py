@@ -80,6 +80,7 @@ def test_the_start_is_known_as_well_as_the_noise_lets_it(tmp_path: Path) -> None
     assert np.ptp(Start(0.0, 1.0, 2.0, np.zeros((2, 2))).drawn(9, 0.0, 6.2, seed=3)[0]) == 0
 
 
+@pytest.mark.thorough
 def test_the_true_model_gives_what_the_rig_does_and_another_one_does_not(tmp_path: Path) -> None:
     """Runs that tumble; the chance of a true model's statistic is even between 0 and 1."""
     plans = [forced(0.4 * k, 3.0, 40.0, p=1.5, frequency=11.0) for k in range(6)]

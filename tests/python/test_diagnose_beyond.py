@@ -77,6 +77,7 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
     assert all(name in report for name in unknown)
 
 
+@pytest.mark.thorough
 def test_the_torque_of_a_spring_is_called_elastic_with_reserve(tmp_path: Path) -> None:
     # Its period does not grow with the swing: no pendulum, but one with a spring as strong.
     t = np.arange(0, 30, 0.02)
@@ -100,6 +101,7 @@ def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Pat
         pendmap.diagnosis.diagnose(pendmap.read_experiment(record), model=model)
 
 
+@pytest.mark.thorough
 def test_what_differs_from_run_to_run_is_said_and_widens_intervals(tmp_path: Path) -> None:
     time, noise = np.arange(0, 40, 0.04), np.random.default_rng(1)
     w0 = np.array([6.200, 6.209, 6.201, 6.207])

@@ -83,6 +83,7 @@ def test_json_and_a_model_that_every_command_takes(
     assert json.loads(more.stdout)["verdict"] == "none"
 
 
+@pytest.mark.thorough
 def test_a_viscous_model_lacks_coulomb_friction(tmp_path: Path, pendmap_command: Run) -> None:
     made = pendmap_command("rig", "hidden", "--effect", "none", "--seed", "5", "--out", "plain")
     assert made.returncode == 0, made.stderr
@@ -212,6 +213,7 @@ def test_a_wrong_unit_is_said_before_the_verdict(tmp_path: Path, pendmap_command
     assert not any("the unit or the scale is wrong" in line for line in others)
 
 
+@pytest.mark.thorough
 def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: Run) -> None:
     time = np.arange(3000) * 0.02
     theta = 0.05 * np.exp(-0.03 * time) * np.cos(6.0 * time)
@@ -228,6 +230,7 @@ def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: R
     assert "range of numbers" in found["not_computed"]["proposals"]
 
 
+@pytest.mark.thorough
 def test_what_was_no_candidate_is_said(hidden: str, pendmap_command: Run) -> None:
     none = pendmap_command("diagnose", hidden, "--max-effects", "0", "--out", "a.toml")
     assert "at most 0 effects were allowed" in none.stdout
@@ -237,6 +240,7 @@ def test_what_was_no_candidate_is_said(hidden: str, pendmap_command: Run) -> Non
     assert "left out of the candidates: quadratic_drag, power_law_drag" in less.stdout
 
 
+@pytest.mark.thorough
 def test_a_driven_record_taken_for_a_free_one_gets_no_name(
     hidden: str, tmp_path: Path, pendmap_command: Run
 ) -> None:

@@ -60,6 +60,7 @@ def _slope(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # n
     return parameters["size"] * np.sin(5 * theta)
 
 
+@pytest.mark.thorough
 def test_functions_are_scored_beside(tmp_path: Path) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
     functions = [TorqueFunction("table", _table), TorqueFunction("slope", _slope, {"size": 0.1})]

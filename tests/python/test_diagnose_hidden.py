@@ -48,6 +48,7 @@ def test_what_is_hidden_is_named_with_its_size(effect: str, parameter: str, tmp_
     assert gap.held_out_after < 1.05 * gap.noise_floor
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effect", "seed", "time"), [("base_sway", 7, "ws"), ("impulses", 3, "t0")]
 )
@@ -66,6 +67,7 @@ def test_when_and_how_often_is_found_with_the_size(
     assert high - low < 0.01 * truth[effect][time]
 
 
+@pytest.mark.thorough
 def test_the_drag_is_named_in_noise_that_hangs_together(tmp_path: Path) -> None:
     found, truth = diagnosed(
         tmp_path, "quadratic_drag", free=3, forced=0, size=3.0, correlation=0.8, noise=0.1
@@ -77,6 +79,7 @@ def test_the_drag_is_named_in_noise_that_hangs_together(tmp_path: Path) -> None:
     assert low - wide < truth["quadratic_drag"]["q"] < high + wide
 
 
+@pytest.mark.thorough
 def test_a_search_ends_that_drops_what_it_accepts(tmp_path: Path) -> None:
     # One friction is accepted beside nothing, and the drag that stands for it gains too little.
     found, _ = diagnosed(
@@ -110,6 +113,7 @@ def test_a_chirp_of_the_only_forced_run_is_named(
     assert [str(error) for error in lost if "range of numbers" not in str(error)] == []
 
 
+@pytest.mark.thorough
 def test_a_friction_that_sticks_is_among_the_names(tmp_path: Path) -> None:
     found, _ = diagnosed(tmp_path, "stribeck_friction", noise=0.05, size=2.0)
     assert found.verdict in {"named", "ambiguous"}
@@ -131,6 +135,7 @@ def test_where_nothing_is_hidden_nothing_is_claimed(seed: int, tmp_path: Path) -
     assert found.gap.before == found.gap.after < 1.05 * found.gap.noise_floor
 
 
+@pytest.mark.thorough
 def test_a_run_that_begins_at_rest_is_followed_from_rest(tmp_path: Path) -> None:
     # Friction holds a pendulum under the drive at first; a start that moves a little fits worse,
     # and a fit does not come back from it.
@@ -138,12 +143,14 @@ def test_a_run_that_begins_at_rest_is_followed_from_rest(tmp_path: Path) -> None
     assert found.verdict == "none"
 
 
+@pytest.mark.thorough
 def test_what_is_withheld_gets_no_confident_name(tmp_path: Path) -> None:
     found, _ = diagnosed(tmp_path, "bearing_harmonic", size=3.0, without=("bearing_harmonic",))
     assert found.verdict in {"unknown", "partial"}
     assert found.verdict == "unknown" or all(effect.approximate for effect in found.effects)
 
 
+@pytest.mark.thorough
 def test_what_no_library_has_is_named_with_reserve_where_it_closes_a_part(tmp_path: Path) -> None:
     found, _ = diagnosed(tmp_path, "base_sway", seed=1, without=("base_sway", "impulses"))
     assert found.verdict in {"unknown", "partial"}
@@ -153,6 +160,7 @@ def test_what_no_library_has_is_named_with_reserve_where_it_closes_a_part(tmp_pa
     assert set(found.best.fitted.names) - {"encoder_offset"} <= {e.name for e in found.effects}
 
 
+@pytest.mark.thorough
 def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
     # Through runs that amplify each step a thousandfold, from where nothing is added yet.
     found, _ = diagnosed(
@@ -167,6 +175,7 @@ def test_what_a_first_step_would_lose_is_found(tmp_path: Path) -> None:
     assert found.best.hold_out.chi2 < found.base.hold_out.chi2
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("most", [0, 1])
 def test_no_more_is_added_than_is_allowed(most: int, tmp_path: Path) -> None:
     # Of a pair one half leaves much: the search looks for other beginnings, pairs among them.

@@ -46,6 +46,7 @@ def _risen(found: Discrepancy, key: str, value: float) -> float:
     return (_from(found, key, value, held=True).chi2 - fitted.chi2) / fitted.widening
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effect", "shape", "seed", "noise"),
     [
@@ -68,6 +69,7 @@ def test_at_the_ends_of_an_interval_the_likelihood_has_fallen(
     assert low - wide < truth[effect][shape] < high + wide
 
 
+@pytest.mark.thorough
 def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> None:
     found, truth = diagnosed(tmp_path, "rough_spot", forced=0, size=0.3, seed=5)
     (named,) = found.effects
@@ -79,6 +81,7 @@ def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> No
     assert min(abs(there - th0), abs(other - th0)) < 3 * error
 
 
+@pytest.mark.thorough
 def test_a_place_that_is_known_is_given_once(tmp_path: Path) -> None:
     found, truth = diagnosed(tmp_path, "rough_spot", size=1.0)
     (named,) = found.effects

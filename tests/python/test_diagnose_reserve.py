@@ -58,6 +58,7 @@ def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> 
     assert found.assessment.form.chance < CHANCE
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [3, 5])
 def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: Path) -> None:
     # With its whole family taken out, two frictions do what a drag does, to within the noise.
@@ -164,6 +165,7 @@ def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
     assert each(alternative("cubic_damping", 30.0, contains=False)).equivalent == ["quadratic_drag"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [34, 43])
 def test_without_noise_nothing_is_made_of_what_the_arithmetic_leaves(
     seed: int, tmp_path: Path

@@ -21,6 +21,7 @@ CHANCE = Thresholds().rest
 MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("effects", "given"),
     [
@@ -81,6 +82,7 @@ def test_what_is_hidden_is_named_alone_with_its_parameters(
             assert low - 2.1 * error < true < high + 2.1 * error, (effect.name, name)
 
 
+@pytest.mark.thorough
 def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
     # The steady drift was a warming of 180 years: its own fit had lost the end of a run.
     found, _ = diagnosed(
@@ -96,6 +98,7 @@ def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
     assert sorted(effect.name for effect in found.effects) == ["rough_spot", "viscous_drift"]
 
 
+@pytest.mark.thorough
 def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path) -> None:
     # Phases of the drive, adapted to the runs held out, take up what its frequency did there.
     found, _ = diagnosed(
@@ -112,6 +115,7 @@ def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path
     assert {"drive_frequency", "timebase"} <= set(classed)
 
 
+@pytest.mark.thorough
 def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
     tmp_path: Path,
 ) -> None:
@@ -136,6 +140,7 @@ def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
     assert all(sure < otherwise for sure, otherwise in pairs)
 
 
+@pytest.mark.thorough
 def test_an_effect_of_nothing_does_not_stay_since_its_rest_was_lost(tmp_path: Path) -> None:
     # The drag alone had been found first, with a window that had slipped; a bearing harmonic of
     # nothing, give or take nothing, led out of there and was named for it.

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_every_public_function_works_in_a_forked_child() -> None:
     script = Path(__file__).with_name("forked.py")

@@ -49,6 +49,7 @@ DAMAGES: dict[str, Damage] = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_record_ends_in_a_result_or_a_line(name: str) -> None:
     rng = np.random.default_rng(len(name))

@@ -126,6 +126,7 @@ def test_smooth_basins_have_no_transient_chaos(p: float) -> None:
     assert a["summary"].startswith("No transient chaos")
 
 
+@pytest.mark.thorough
 def test_chaos_that_persists() -> None:
     found = pendmap.lifetime(pendmap.PRESETS["fig2b"], starts=2000)
     a = found.attrs

@@ -337,6 +337,7 @@ def test_hard_attractors_are_found(parameters: dict[str, float], name: str) -> N
     assert result.attrs["undecided"] == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("p", [0.0, 0.05])
 def test_slow_settling_is_not_called_chaos(p: float) -> None:
     """Nearly without damping nothing settles within the bound, and shear stretches tangents."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-import importlib
 import math
 from typing import TYPE_CHECKING
 
@@ -74,24 +72,3 @@ def test_model_files_are_checked(tmp_path: Path, text: str, complaint: str) -> N
     with pytest.raises(InputError, match=complaint) as error:
         Pendulum.from_toml(file)
     assert "model.toml" in str(error.value)
-
-
-@pytest.mark.parametrize(
-    "module",
-    [
-        *(
-            f"model.{name}"
-            for name in ("effects", "files", "formula", "library", "pendulum", "rig")
-        ),
-        "model.schema",
-        "virtual_rig.catalogue",
-        "virtual_rig.experiment",
-    ],
-)
-def test_the_examples_of_docstrings(
-    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    found = doctest.testmod(importlib.import_module(f"pendmap.{module}"))
-    assert found.attempted > 0
-    assert found.failed == 0

@@ -65,6 +65,7 @@ def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment,
     return request, records, diagnose(records)
 
 
+@pytest.mark.thorough
 def test_what_is_recommended_leaves_one_name() -> None:
     """Drifts that are alike within minutes: the rig does what was recommended."""
     request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
@@ -88,6 +89,7 @@ def test_what_is_recommended_leaves_one_name() -> None:
     assert power == pytest.approx(best.value, rel=3 * doubt)
 
 
+@pytest.mark.thorough
 def test_an_interval_becomes_as_narrow_as_predicted() -> None:
     request, records, before = hidden(3, "quadratic_drag", free=3)
     assert before.verdict == "named"
@@ -108,6 +110,7 @@ def test_an_interval_becomes_as_narrow_as_predicted() -> None:
     assert reached < 0.6 * outlook.now
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("what", ["from 0.5 rad", "from 2.8 rad", "flung through 0"])
 def test_a_proposal_says_what_its_record_says(what: str) -> None:
     """The information predicted, from thinned samples, is that of the record once it is there."""
@@ -178,6 +181,7 @@ def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
     assert np.mean(gains > 22.0) == pytest.approx(0.95, abs=0.002)
 
 
+@pytest.mark.thorough
 def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
     """The limit of clean records; the same rig then hides it, with other noise."""
     _, _, clean = hidden(11, free=2, noise=0.2)

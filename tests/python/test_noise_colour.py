@@ -100,6 +100,7 @@ def test_a_gain_has_the_chance_that_noise_gives_it() -> None:
         assert min(chances) > 1e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("seed", "correlation"), [(2, 0.5), (3, 0.7), (4, 0.5)])
 def test_coloured_noise_of_an_encoder_is_no_effect(
     seed: int, correlation: float, tmp_path: Path
@@ -112,6 +113,7 @@ def test_coloured_noise_of_an_encoder_is_no_effect(
     assert found.level > 2
 
 
+@pytest.mark.thorough
 def test_intervals_hold_in_coloured_noise(tmp_path: Path) -> None:
     inside = []
     for seed in range(1, 9):

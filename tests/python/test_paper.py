@@ -62,6 +62,7 @@ def test_one_figure(pendmap_command: Run, tmp_path: Path) -> None:
     assert json.loads(run.stdout) == {"files": ["a.svg"]}
 
 
+@pytest.mark.thorough
 def test_all_that_are_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paper_motions, "SECONDS", 60.0)  # 2500 s take the rig minutes
     monkeypatch.setattr(paper_motions, "TUMBLED", 30.0)
@@ -152,6 +153,7 @@ def model() -> pendmap.Rig:
     return paper_figures.report(0).methods["combined_repaired"].rig
 
 
+@pytest.mark.thorough
 def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
     model: pendmap.Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,6 +173,7 @@ def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
     assert "identified model" in drawn
 
 
+@pytest.mark.thorough
 def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path: Path) -> None:
     """The rig's run is one that the identified model could have made; no path lies on another."""
     runs = paper_motions.tumbling(model)

@@ -147,6 +147,7 @@ def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]
     return drag["parameters"], trials
 
 
+@pytest.mark.thorough
 def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
     scaled = []
     for seed in range(1, 17):
@@ -167,6 +168,7 @@ def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
     assert ((rms > 0.7) & (rms < 1.4)).all()
 
 
+@pytest.mark.thorough
 def test_a_diagnosis_says_how_well_the_power_is_known(tmp_path: Path) -> None:
     found, truth = diagnosed(
         tmp_path, "power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0

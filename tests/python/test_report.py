@@ -277,6 +277,7 @@ def test_bad_places_are_refused_at_once(report: str, tmp_path: Path, pendmap_com
     assert len(run.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command: Run) -> None:
     """Stretches are held back within the run, no drive has a phase, and nothing is compared."""
     made = pendmap_command("rig", "free_decay", "--out", "decay")

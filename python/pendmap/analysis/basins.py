@@ -216,6 +216,14 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     See Also
     --------
     basins_of : the same for a list of starts.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> result = pendmap.basins(pendulum, pendmap.Grid.square(20))
+    >>> list(map(str, result.attractor.values))
+    ['oscillation 2:0', 'rotation 1:-1', 'rotation 1:+1']
     """
     bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))

@@ -160,6 +160,14 @@ def uncertainty_exponent(
     ----------
     C. Grebogi, S. W. McDonald, E. Ott & J. A. Yorke (1983), Physics Letters A 99, 415;
     S. W. McDonald et al. (1985), Physica D 17, 125.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> smooth = 1 + (np.arange(300)[:, None] < np.arange(400)).astype(int)
+    >>> round(pendmap.uncertainty_exponent(smooth).value, 1)
+    1.0
     """
     if isinstance(labels, xr.Dataset):
         return _of_map(labels)
@@ -356,6 +364,14 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     ----------
     A. Daza, A. Wagemakers, B. Georgeot, D. Guery-Odelin & M. A. F. Sanjuan (2016), Scientific
     Reports 6, 31416.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> labels = np.random.default_rng(0).integers(1, 3, (100, 100))
+    >>> round(pendmap.basin_entropy(labels).value, 2)
+    0.67
     """
     cells, _ = numbered(labels)
     found = _core.texture(np.ascontiguousarray(cells).ravel(), cells.shape[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -201,7 +202,8 @@ def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -
     if layer == "turns":
         size = np.abs(values)
         top = max(1.0, float(np.ceil(np.quantile(size, 0.98))))
-        step = next(s for m in (1, 10, 100, 1000, 10**4) for s in (m, 2 * m, 5 * m) if 3 * s >= top)
+        powers = (10**k for k in itertools.count())
+        step = next(s for m in powers for s in (m, 2 * m, 5 * m) if 3 * s >= top)
         ticks = [float(k) for k in range(-3 * step, 3 * step + 1, step) if abs(k) <= top]
         over: Any = "both" if size.max() > top else "neither"
         return Colours(name, colours, -top, top, beyond=over, ticks=ticks)

@@ -207,7 +207,7 @@ def formulas_of(tables: object) -> dict[str, Formula]:
 
 
 def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
-    """Read the tables ``[[formula]]`` of a file.
+    r"""Read the tables ``[[formula]]`` of a file.
 
     Parameters
     ----------
@@ -220,6 +220,15 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
         If it is not TOML, has no formulas, or one that :class:`Formula` refuses.
     OSError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import pendmap
+    >>> text = '[[formula]]\nname = "lean"\nterm = "-k*sqrt(abs(v))*sign(v)"\n'
+    >>> _ = Path("own.toml").write_text(text + "parameters = { k = 1.5 }")
+    >>> [formula.name for formula in pendmap.load_formulas("own.toml")]
+    ['lean']
     """
     shown = os.fspath(path)
     content = read_toml(path)

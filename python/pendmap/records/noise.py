@@ -143,8 +143,16 @@ def noise_floor(run: Run) -> NoiseFloor:
 
     Examples
     --------
-    >>> floor = pendmap.records.noise_floor(experiment.runs[0])  # doctest: +SKIP >>> floor.sigma,
-    floor.stderr  # doctest: +SKIP
+    >>> import numpy as np
+    >>> import pendmap
+    >>> time = np.arange(0, 20, 0.01)
+    >>> theta = 0.5 * np.exp(-0.02 * time) * np.cos(6.2 * time)
+    >>> theta += np.random.default_rng(0).normal(0, 1e-3, time.size)
+    >>> rows = np.column_stack((time, theta))
+    >>> np.savetxt("run.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    >>> run = pendmap.read_experiment("run.csv").runs[0]
+    >>> round(pendmap.noise_floor(run).sigma, 4)
+    0.001
     """
     if run.peaks_only:
         return NoiseFloor(math.nan, math.nan)

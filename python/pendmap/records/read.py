@@ -103,8 +103,14 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
 
     Examples
     --------
-    >>> experiment = pendmap.read_experiment("lab")  # doctest: +SKIP >>> experiment.runs[0].theta
-    # doctest: +SKIP
+    >>> import numpy as np
+    >>> import pendmap
+    >>> time = np.arange(0, 20, 0.01)
+    >>> theta = 0.5 * np.exp(-0.02 * time) * np.cos(6.2 * time)
+    >>> rows = np.column_stack((time, theta))
+    >>> np.savetxt("run.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    >>> pendmap.read_experiment("run.csv").runs[0].theta.size
+    2000
     """
     place = Path(path)
     alone = ALONE if rate_hz is None else dataclasses.replace(ALONE, rate_hz=_rate(rate_hz))
