@@ -159,9 +159,17 @@ def _marker(
     shapes = "^>" if turn > 0 else "v<" if turn < 0 else _SHAPES.get(entry.kind, "o")
     shape = shapes[palette.lap(entry.name, entry.kind) % len(shapes)]
     return Points(
-        *at.T, marker=shape, size=size, colour=entry.colour, edge="#ffffff",
-        edge_width=0.17 * size, halo=INK, clip=False, order=5.0, name=name,
-    )  # fmt: skip
+        *at.T,
+        marker=shape,
+        size=size,
+        colour=entry.colour,
+        edge="#ffffff",
+        edge_width=0.17 * size,
+        halo=INK,
+        clip=False,
+        order=5.0,
+        name=name,
+    )
 
 
 def _layer(

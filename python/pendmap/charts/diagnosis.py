@@ -114,9 +114,12 @@ def parts(found: Discrepancy) -> dict[str, Chart]:
         pairs = [over[k : k + 2] for k in range(0, len(over), 2)]
         rows = [[torque(found, name) for name in pair] for pair in pairs]
         made["torque"] = _of_rows(
-            "Torque that the model lacks", "per moment of inertia; bands: 95 %", rows,
-            [1.0] * len(rows), (8.6, 1.1 + 2.3 * len(rows)),
-        )  # fmt: skip
+            "Torque that the model lacks",
+            "per moment of inertia; bands: 95 %",
+            rows,
+            [1.0] * len(rows),
+            (8.6, 1.1 + 2.3 * len(rows)),
+        )
     if found.scores.best():
         said = "what each effect of the library would explain by itself"
         made["ranking"] = _of_rows("Ranking", said, [[ranking(found)]], [1.0], (8.6, 3.5))
@@ -388,10 +391,8 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
         if x.size:
             spots = np.full(x.size, place)
             marks.append(
-                Points(
-                    x, spots, marker=mark, size=4.5, colour=QUIET, edge_width=1.0, name=said
-                )
-            )  # fmt: skip
+                Points(x, spots, marker=mark, size=4.5, colour=QUIET, edge_width=1.0, name=said)
+            )
     times = f"10$^{{{power}}}$ " if power else ""
     unit = f"{times}{unit_of(shown, found.definition)}".strip()
     own = shown.rpartition(".")[2]

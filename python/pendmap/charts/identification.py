@@ -19,6 +19,7 @@ MINUS: Final = "\N{MINUS SIGN}"
 RESTS: Final = "at rest"
 """What stands for an error where a simulation has come to rest before."""
 _MANY: Final = 100.0
+_FEW: Final = 1e-3
 
 
 def columns(report: IdentificationReport) -> list[str]:
@@ -47,9 +48,14 @@ def rows(report: IdentificationReport) -> list[list[str]]:
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
         if not report.table.left_out:
             errors = report.table.errors.get(name)
-            cells += ["\N{EN DASH}"] * 2 if errors is None else [
-                _percent(errors.period_rms), _percent(errors.peak_rms),
-            ]  # fmt: skip
+            cells += (
+                ["\N{EN DASH}"] * 2
+                if errors is None
+                else [
+                    _percent(errors.period_rms),
+                    _percent(errors.peak_rms),
+                ]
+            )
         made.append(cells)
     return made
 
@@ -68,6 +74,8 @@ def _percent(value: float) -> str:
     """Return three digits, or that the simulation rests by then."""
     if math.isnan(value):
         return RESTS
-    return f"{value:.0f}" if value >= _MANY else f"{value:.3g}" if value >= 1e-3 else (  # noqa: PLR2004
-        "0" if value == 0 else f"{value:.0e}"
-    )  # fmt: skip
+    if value >= _MANY:
+        return f"{value:.0f}"
+    if value >= _FEW or value == 0:
+        return f"{value:.3g}"
+    return f"{value:.0e}"

@@ -84,14 +84,25 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     }
     return [
         Line(
-            *path.T, width=1.6 if stable else 1.0, dash="-" if stable else (4.0, 2.0), halo=QUIET,
-            path=f"{number}/path", **look,
+            *path.T,
+            width=1.6 if stable else 1.0,
+            dash="-" if stable else (4.0, 2.0),
+            halo=QUIET,
+            path=f"{number}/path",
+            **look,
         ),
         Points(
-            *at.T, size=5.0, edge=INK, edge_width=1.0, fill="" if stable else "white", order=4.0,
-            clip=False, path=f"{number}/points", **look,
+            *at.T,
+            size=5.0,
+            edge=INK,
+            edge_width=1.0,
+            fill="" if stable else "white",
+            order=4.0,
+            clip=False,
+            path=f"{number}/points",
+            **look,
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:

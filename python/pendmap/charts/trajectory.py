@@ -116,8 +116,9 @@ def _phase(dataset: xr.Dataset) -> Panel:
         which = f", the last {MOST_PERIODS // 2} periods"
     marks: list[Mark] = []
     for part, colour, width in (
-        (slice(first, late + 1), _EARLY, 0.5), (slice(late, None), _LATE, 0.7),
-    ):  # fmt: skip
+        (slice(first, late + 1), _EARLY, 0.5),
+        (slice(late, None), _LATE, 0.7),
+    ):
         curve = plane.broken_at_wrap(theta[part], velocity[part])
         marks.append(Line(*curve.T, colour=colour, width=width))
     if (dataset.attrs.get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:

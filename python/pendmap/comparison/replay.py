@@ -111,9 +111,15 @@ def _fit_motion(
     ]
     own = motion.own
     return fit_runs(
-        whole, motion.model, tuple(own), start=own, windows=windows, profiled=(), hold=True,
+        whole,
+        motion.model,
+        tuple(own),
+        start=own,
+        windows=windows,
+        profiled=(),
+        hold=True,
         steps=steps,
-    )  # fmt: skip
+    )
 
 
 @dataclasses.dataclass(frozen=True)

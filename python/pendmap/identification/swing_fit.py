@@ -84,13 +84,22 @@ def fit_swings(
             far &= (used & ~far).sum(axis=1, keepdims=True) > 2  # noqa: PLR2004 (unknowns)
             used &= ~far
             trial = dataclasses.replace(windows, used=used)
-            local, shared, residual = (part * used[..., None] for part in (
-                local, shared, residual[..., None]
-            ))  # fmt: skip
+            local, shared, residual = (
+                part * used[..., None] for part in (local, shared, residual[..., None])
+            )
             residual = residual[..., 0]
-        move, _ = _step((local, shared, residual), blocks, None if prior is None else (
-            prior[0], prior[1], form, _scales(residual, used, blocks),
-        ))  # fmt: skip
+        move, _ = _step(
+            (local, shared, residual),
+            blocks,
+            None
+            if prior is None
+            else (
+                prior[0],
+                prior[1],
+                form,
+                _scales(residual, used, blocks),
+            ),
+        )
         instant += np.clip(move[:, 0], -0.1 / np.sqrt(form[:, 0]), 0.1 / np.sqrt(form[:, 0]))
         reach = 0.2 * np.abs(state) + 1e-9
         state += np.clip(move[:, 1], -reach, reach)
@@ -137,13 +146,15 @@ def _rows(
 ) -> tuple[Floats, Floats, Floats]:
     """Return derivatives by instant and state (W, M, 2), by the form (W, M, 4), and residuals."""
     count = instant.size
-    each = np.stack((
-        1e-5 * np.maximum(np.abs(state), 1e-3),
-        1e-5 * form[:, 0],
-        1e-5 * np.sqrt(form[:, 0]),
-        1e-6 * form[:, 0],
-        np.full(count, 1e-6),
-    ))  # fmt: skip
+    each = np.stack(
+        (
+            1e-5 * np.maximum(np.abs(state), 1e-3),
+            1e-5 * form[:, 0],
+            1e-5 * np.sqrt(form[:, 0]),
+            1e-6 * form[:, 0],
+            np.full(count, 1e-6),
+        )
+    )
     states, forms = [state], [form]
     for k in range(1 + FORM):
         states.append(state + each[0] if k == 0 else state)
@@ -226,10 +237,15 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     instant, state, form = found
     points = used.sum(axis=1)
     square = np.sum(rows[2] ** 2, axis=1)
-    freedom = np.array([
-        max(float(points[b].sum()) - 2 * (b.stop - b.start) - (FORM if known is None else 0), 1.0)
-        for b in blocks
-    ])  # fmt: skip
+    freedom = np.array(
+        [
+            max(
+                float(points[b].sum()) - 2 * (b.stop - b.start) - (FORM if known is None else 0),
+                1.0,
+            )
+            for b in blocks
+        ]
+    )
     noise = np.sqrt(np.array([float(square[b].sum()) for b in blocks]) / freedom)
     if known is not None:
         sigma, factor = known.sigma, known.factor
@@ -243,9 +259,9 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
         sigma = max(sigma, 1e-15)
         doubt = noise / sigma > 1 + _DOUBT * np.sqrt(0.5 / freedom)
         each = np.where(doubt, noise / sigma, 1.0)
-        factor = np.concatenate([
-            np.full(b.stop - b.start, f) for b, f in zip(blocks, each, strict=True)
-        ])  # fmt: skip
+        factor = np.concatenate(
+            [np.full(b.stop - b.start, f) for b, f in zip(blocks, each, strict=True)]
+        )
     held = None if prior is None else (*prior, form, np.full(points.size, sigma))
     _, (inverse, follows, form_inverse) = _step(rows, blocks, held)
     scale = (sigma * factor) ** 2

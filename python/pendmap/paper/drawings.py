@@ -84,9 +84,15 @@ def _guide(axes: Axes, font: float) -> None:
         -0.98, 0.3, f"\u2212Y {_DRIVE}", ha="right", va="center", color=_MOTION, fontsize=font
     )
     axes.text(
-        -0.98, -0.02, "the pivot's place,\nupward", ha="right", va="center", color=_HELP,
-        fontsize=0.78 * font, linespacing=1.3,
-    )  # fmt: skip
+        -0.98,
+        -0.02,
+        "the pivot's place,\nupward",
+        ha="right",
+        va="center",
+        color=_HELP,
+        fontsize=0.78 * font,
+        linespacing=1.3,
+    )
 
 
 def _rod(axes: Axes, font: float) -> None:
@@ -99,9 +105,11 @@ def _rod(axes: Axes, font: float) -> None:
     axes.add_patch(
         Polygon(
             [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)],
-            fc=_STEEL, ec="none", zorder=3,
+            fc=_STEEL,
+            ec="none",
+            zorder=3,
         )
-    )  # fmt: skip
+    )
     axes.add_patch(Circle((0, 0), 0.13, fc="white", ec=_DARK, lw=1.6, zorder=4))
     axes.add_patch(Circle((0, 0), 0.04, fc=_DARK, ec="none", zorder=5))
     axes.add_patch(Circle((x, y), BOB, fc=_DARK, ec="none", zorder=4))
@@ -110,9 +118,16 @@ def _rod(axes: Axes, font: float) -> None:
     )
     radius = 1.55
     axes.add_patch(
-        Arc((0, 0), 2 * radius, 2 * radius, theta1=270, theta2=270 + math.degrees(THETA) - 4,
-            color=_DARK, lw=1.3)
-    )  # fmt: skip
+        Arc(
+            (0, 0),
+            2 * radius,
+            2 * radius,
+            theta1=270,
+            theta2=270 + math.degrees(THETA) - 4,
+            color=_DARK,
+            lw=1.3,
+        )
+    )
     end = THETA - math.radians(0.5)
     before = THETA - math.radians(6)
     _arrow(
@@ -123,9 +138,14 @@ def _rod(axes: Axes, font: float) -> None:
     )
     half = THETA / 2
     axes.text(
-        (radius + 0.22) * math.sin(half), -(radius + 0.22) * math.cos(half), "\u03b8",
-        ha="center", va="center", fontsize=1.3 * font, color=_DARK,
-    )  # fmt: skip
+        (radius + 0.22) * math.sin(half),
+        -(radius + 0.22) * math.cos(half),
+        "\u03b8",
+        ha="center",
+        va="center",
+        fontsize=1.3 * font,
+        color=_DARK,
+    )
     # The length stands beside the rod, on the other side of the angle, from pivot to bob.
     move = (ASIDE * math.cos(THETA), ASIDE * math.sin(THETA))
     _arrow(axes, move, (x + move[0], y + move[1]), _HELP, both=True, thin=True)
@@ -134,34 +154,54 @@ def _rod(axes: Axes, font: float) -> None:
         axes.plot(
             [foot_x + end * math.cos(THETA) for end in ends],
             [foot_y + end * math.sin(THETA) for end in ends],
-            color=_HELP, lw=0.7, zorder=4,
-        )  # fmt: skip
+            color=_HELP,
+            lw=0.7,
+            zorder=4,
+        )
     axes.text(
-        x / 2 + 1.4 * move[0], y / 2 + 1.4 * move[1], "l", ha="center", va="center",
-        fontsize=1.1 * font, style="italic",
-    )  # fmt: skip
+        x / 2 + 1.4 * move[0],
+        y / 2 + 1.4 * move[1],
+        "l",
+        ha="center",
+        va="center",
+        fontsize=1.1 * font,
+        style="italic",
+    )
 
 
 def _forces(axes: Axes, font: float) -> None:
     """Gravity, and friction and drag against the motion."""
     x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
     _arrow(axes, (x, y - BOB), (x, y - BOB - 0.75), _FORCE)
-    axes.text(x + 0.14, y - BOB - 0.5, "m g", color=_FORCE, fontsize=font, va="center",
-              style="italic")  # fmt: skip
+    axes.text(
+        x + 0.14, y - BOB - 0.5, "m g", color=_FORCE, fontsize=font, va="center", style="italic"
+    )
     # The velocity is along the arc, upward.
     side = (math.cos(THETA), math.sin(THETA))
     start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
     _arrow(axes, start, (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1]), _MOTION)
     axes.text(
-        start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0",
-        color=_MOTION, fontsize=font, ha="center", va="bottom",
-    )  # fmt: skip
+        start[0] + 0.78 * side[0],
+        start[1] + 0.78 * side[1] + 0.12,
+        "d\u03b8/dt > 0",
+        color=_MOTION,
+        fontsize=font,
+        ha="center",
+        va="bottom",
+    )
     # A torque on the axle, against the turning.
     first, last, radius = math.radians(52), math.radians(-14), 0.98
     axes.add_patch(
-        Arc((0, 0), 2 * radius, 2 * radius, theta1=math.degrees(last) + 6,
-            theta2=math.degrees(first), color=_FORCE, lw=1.6)
-    )  # fmt: skip
+        Arc(
+            (0, 0),
+            2 * radius,
+            2 * radius,
+            theta1=math.degrees(last) + 6,
+            theta2=math.degrees(first),
+            color=_FORCE,
+            lw=1.6,
+        )
+    )
     before = last + math.radians(9)
     _arrow(
         axes,
@@ -170,10 +210,14 @@ def _forces(axes: Axes, font: float) -> None:
         _FORCE,
     )
     axes.text(
-        1.14, 0.42,
+        1.14,
+        0.42,
         "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)",
-        color=_FORCE, fontsize=0.82 * font, va="center", linespacing=1.4,
-    )  # fmt: skip
+        color=_FORCE,
+        fontsize=0.82 * font,
+        va="center",
+        linespacing=1.4,
+    )
 
 
 def _arrow(  # noqa: PLR0913 (from, to, look)

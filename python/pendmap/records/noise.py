@@ -216,9 +216,13 @@ def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) ->
         # A residual has the noise of all samples of its window, each with its own speed.
         square = np.convolve(speed**2, fit.shares, "same")[fit.middle]
         law = law_of(
-            fit.residual, square, worth=fit.sum_of_squares, fastest=phase, count=count,
+            fit.residual,
+            square,
+            worth=fit.sum_of_squares,
+            fastest=phase,
+            count=count,
             interval=interval,
-        )  # fmt: skip
+        )
     few = phase * interval > TOO_FEW
     sigma, error = rms(fit), stderr(fit)
     limited = sigma < least

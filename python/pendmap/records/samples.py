@@ -276,7 +276,7 @@ def _independent(time: Floats, theta: Floats, farthest: float) -> int:
         low, high = (
             normal_scale(local_fit(t, x, degree=degree, points=points, stride=stride).residual)
             for degree, points in ((4, 9), (6, 11))
-        )  # fmt: skip
+        )
         # Motion is left by a quartic but not by a sextic.
         noise.append(high if low < FOLLOWED * high else 0.0)
         whole.append(high)

@@ -90,9 +90,13 @@ def named(
     whole = figure.get_size_inches()
     top = box.bottom + box.height
     figure.text(
-        (box.left + 0.1) / whole[0], (top - 0.13) / whole[1], title, fontsize=10.5, weight="bold",
+        (box.left + 0.1) / whole[0],
+        (top - 0.13) / whole[1],
+        title,
+        fontsize=10.5,
+        weight="bold",
         va="center",
-    )  # fmt: skip
+    )
     used = HEADING if title else 0.08
     if texts:
         # A row each for as many columns as fit.

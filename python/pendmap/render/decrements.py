@@ -202,14 +202,28 @@ def _points(axes: Axes, some: Triplets, *, absolute: bool) -> None:
         inside = (y >= low) & (y <= high)
         fill = colour if odd else "white"
         axes.plot(
-            x[inside], y[inside], marker, color=colour, ms=3.0, mew=0.8, mfc=fill, ls="none",
+            x[inside],
+            y[inside],
+            marker,
+            color=colour,
+            ms=3.0,
+            mew=0.8,
+            mfc=fill,
+            ls="none",
             zorder=3,
-        )  # fmt: skip
+        )
         for beyond, edge, arrow in ((y > high, high, "^"), (y < low, low, "v")):
             axes.plot(
-                x[beyond], np.full(int(beyond.sum()), edge), arrow, color=colour, ms=3.6,
-                mew=0, ls="none", clip_on=False, zorder=3,
-            )  # fmt: skip
+                x[beyond],
+                np.full(int(beyond.sum()), edge),
+                arrow,
+                color=colour,
+                ms=3.6,
+                mew=0,
+                ls="none",
+                clip_on=False,
+                zorder=3,
+            )
 
 
 def _model(
@@ -243,6 +257,8 @@ def _model(
 
 
 BLOCK: Final = blocks.Block(
-    "decrement", f"The decrement {DELTA} of each three peaks", _height,
+    "decrement",
+    f"The decrement {DELTA} of each three peaks",
+    _height,
     _draw,
-)  # fmt: skip
+)

@@ -195,9 +195,15 @@ def _angle(
     some = peaks.select(seen)
     known = np.isfinite(some.stderr_amplitude)
     axes.errorbar(
-        some.time[known], some.amplitude[known], 1.96 * some.stderr_amplitude[known], fmt="none",
-        ecolor=MEASURED, elinewidth=0.8, capsize=2.0, zorder=3,
-    )  # fmt: skip
+        some.time[known],
+        some.amplitude[known],
+        1.96 * some.stderr_amplitude[known],
+        fmt="none",
+        ecolor=MEASURED,
+        elinewidth=0.8,
+        capsize=2.0,
+        zorder=3,
+    )
     _peaks(axes, some, 4.5, by_parity=only)
     axes.axhline(0.0, color=style.QUIET, lw=0.6, zorder=0)
     cross = (peaks.crossing_time >= ends[0]) & (peaks.crossing_time <= ends[1])

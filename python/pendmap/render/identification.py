@@ -62,9 +62,11 @@ def figure(  # noqa: PLR0913 (all of these may be chosen)
             f" {least[0]:.1f} x {least[1]:.1f} inches"
         )
     made = sheets.headed(
-        (width, height), dpi, title or f"Identification: {report.run.name}",
+        (width, height),
+        dpi,
+        title or f"Identification: {report.run.name}",
         _said(report) if subtitle is None else subtitle,
-    )  # fmt: skip
+    )
     letters = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
     wide = width / len(columns)
     bare = title is not None and len(chosen) == 1

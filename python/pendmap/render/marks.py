@@ -82,9 +82,14 @@ def _band(axes: Axes, mark: charts.Band) -> None:
 def _steps(axes: Axes, mark: charts.Steps) -> None:
     width = 0 if mark.filled else mark.width
     axes.stairs(
-        mark.values, mark.edges, fill=mark.filled, baseline=0 if mark.filled else None,
-        color=mark.colour, lw=width, **_common(mark),
-    )  # fmt: skip
+        mark.values,
+        mark.edges,
+        fill=mark.filled,
+        baseline=0 if mark.filled else None,
+        color=mark.colour,
+        lw=width,
+        **_common(mark),
+    )
 
 
 def _areas(axes: Axes, mark: charts.Areas) -> None:
@@ -113,16 +118,24 @@ def _text(axes: Axes, mark: charts.Text) -> None:
         look["bbox"] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2}
     across, up = mark.align
     axes.text(
-        mark.x, mark.y, mark.text, color=mark.colour, ha=across, va=up, fontsize=mark.size,
+        mark.x,
+        mark.y,
+        mark.text,
+        color=mark.colour,
+        ha=across,
+        va=up,
+        fontsize=mark.size,
         **(look | _common(mark)),
-    )  # fmt: skip
+    )
 
 
 def _image(axes: Axes, mark: charts.Image) -> None:
     where: dict[str, Any] = {
-        "extent": (*mark.x, *mark.y), "origin": "lower", "aspect": "auto",
+        "extent": (*mark.x, *mark.y),
+        "origin": "lower",
+        "aspect": "auto",
         "interpolation": "nearest",
-    }  # fmt: skip
+    }
     if mark.colours is None:
         shades = np.round(255 * np.array([to_rgb(colour) for _, colour in mark.classes]))
         axes.imshow(shades.astype(np.uint8).reshape(-1, 3)[mark.values], **where, **_common(mark))

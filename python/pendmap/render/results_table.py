@@ -54,9 +54,16 @@ def _draw(
     def write(k: int, down: float, text: str, colour: str, *, bold: bool = False) -> None:
         x, side = places[k]
         figure.text(
-            x / whole[0], (top - down) / whole[1], text, fontsize=FONT * shrink, ha=side,
-            va="bottom", color=colour, linespacing=1.15, weight="bold" if bold else "normal",
-        )  # fmt: skip
+            x / whole[0],
+            (top - down) / whole[1],
+            text,
+            fontsize=FONT * shrink,
+            ha=side,
+            va="bottom",
+            color=colour,
+            linespacing=1.15,
+            weight="bold" if bold else "normal",
+        )
 
     for k, name in enumerate(split):
         write(k, 2 * LINE - 0.06, name, style.QUIET)
@@ -70,9 +77,13 @@ def _draw(
         room = box.left + box.width - 0.1 - x
         size = FONT * min(1.0, room / max(style.inches(why, FONT), 1e-3))
         figure.text(
-            x / whole[0], (top - down) / whole[1], why, fontsize=size, va="bottom",
+            x / whole[0],
+            (top - down) / whole[1],
+            why,
+            fontsize=size,
+            va="bottom",
             color=style.QUIET,
-        )  # fmt: skip
+        )
     note = "in brackets: standard error of the last digits"
     if any(identification.RESTS in row for row in rows):
         note += f";   {identification.RESTS}: the simulation stands still by then"
