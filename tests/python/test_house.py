@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "pendmap"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-LINES = 47_540
+LINES = 47_545
 """Ratchet: lines of Python in python/pendmap."""
 DIRECT = 700
 """Ratchet: format specifications of numbers outside formatting.py."""

@@ -27,18 +27,20 @@ if TYPE_CHECKING:
 Floats: TypeAlias = NDArray[np.float64]
 
 _BENT = 2e-3
-"""A line may miss its curve by this part of the picture's height."""
+"""Largest distance of a drawn line from its curve, in parts of the picture's height."""
 
 _APART = 4e-3
-"""Where a curve turns back its two sides come so near, in parts of that height."""
+"""Distance of the two sides of a curve below which the curve ends there, in parts of the height."""
 
 _STRIP = 1e-6
 """A stable strip narrower than this is a line, and rounding decides whether its edges are found."""
 
 _STEP = 1 / 1000
 """Width of an interval, in parts of the picture's, below which bends are not resolved further."""
+
 _NOSE = 1e-6
-"""The same for turns, where the height goes with the root of the distance."""
+"""Width of an interval in which a curve turns back, below which it is not divided, in parts of the
+picture's width. Beside such a turn the height varies as the square root of the distance."""
 
 _GRADED = 4.5
 """Largest ratio of an interval to its neighbours."""

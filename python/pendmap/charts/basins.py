@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 BYTES_OF_CELL = 64
-"""What a cell of a basin map takes in all while its figure and its recording are made."""
+"""Memory of a cell of a basin map while its figure and its recording are made, bytes."""
 
 BYTES_OF_VALUE = 16
-"""What a value of a dataset takes, whatever it is, while a picture of it is made."""
+"""Memory of a value of any other dataset while its picture is made, bytes."""
 
 VARIABLES = {
     "labels": "label",
@@ -62,7 +62,7 @@ _SI_SYMBOLS = {
 }
 
 LABORATORY = {"stroke_mm": "p", "frequency_hz": "Omega"}
-"""What varies in a laboratory, and which of a rig's parameters it is."""
+"""Quantities that a laboratory varies, and the parameter of a rig that each of them sets."""
 
 
 SMALL: Final = 0.64

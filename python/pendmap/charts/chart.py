@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mark:
-    """What all marks have; those of a higher ``order`` lie on top."""
+    """Attributes of all marks; a mark of higher ``order`` covers the others."""
 
     colour: str = INK
     name: str = ""

@@ -43,7 +43,7 @@ OVER_SAID: Final = {
     "drive_phase": "phase of the drive (rad)",
     "lab_time": "time in the laboratory (s)",
 }
-"""What a residual torque is shown over, with units."""
+"""Axes of the residual torque, with units."""
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 """Candidates that are not told apart from what was found, and all others."""

@@ -15,7 +15,7 @@ EVEN: Final = "#0072b2"
 MEASURED: Final = "#222222"
 """What was measured."""
 NOISE: Final = "#d9d9d9"
-"""What the noise of the readings explains."""
+"""Name of the band that the noise of the readings explains."""
 
 
 @dataclasses.dataclass(frozen=True)

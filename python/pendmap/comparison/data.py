@@ -63,8 +63,8 @@ class DataSplit:
     experiment: Experiment
     runs: tuple[Run, ...]  # All runs with samples for fitting
     readings: tuple[Reading, ...]  # Noise of the readings of each run
-    fitted: tuple[FitRun, ...]  # What models are fitted to; dense readings are block means
-    held: tuple[FitRun, ...]  # What is held back
+    fitted: tuple[FitRun, ...]  # Records to fit; dense readings are block means
+    held: tuple[FitRun, ...]  # Records held back
     fitted_of: tuple[int, ...]  # Place in ``runs`` of each fitted record
     held_of: tuple[int, ...]  # Place in ``runs`` of each record held back
     # Whether stretches within fitted runs are held back, which the fitted motion passes through;

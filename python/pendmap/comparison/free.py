@@ -159,7 +159,7 @@ def compare(
     model : Rig
         In SI; :func:`pendmap.load_model` reads it.
     experiment : Experiment
-        As of :func:`pendmap.read_experiment`.
+        As for :func:`pendmap.read_experiment`.
     ensemble : Ensemble, optional
         How many starts a forced run has, and how far apart.
     threads : int, optional

@@ -64,7 +64,7 @@ def identify_experiment(
     Parameters
     ----------
     experiment : Experiment
-        As of :func:`pendmap.read_experiment`.
+        As for :func:`pendmap.read_experiment`.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
@@ -177,7 +177,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     Parameters
     ----------
     report : IdentificationReport
-        As of :func:`pendmap.identification.identify_experiment`.
+        As for :func:`pendmap.identification.identify_experiment`.
     command : str
         How it was called.
 

@@ -198,7 +198,7 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     time, theta : array, shape (N,)
         s, and rad from the downward rest, unwrapped.
     identifications : mapping of str to Identification
-        As of :func:`pendmap.identification.identify`; those that are not applicable are left out.
+        As for :func:`pendmap.identification.identify`; those that are not applicable are left out.
     sigma : float, optional
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional

@@ -165,7 +165,7 @@ def _suspects(work: Work, theta: Floats) -> tuple[NDArray[np.intp], Floats]:
         return np.empty(0, np.intp), np.empty(0)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
-    # What is false shows in every window that it is part of, most in its own.
+    # A false reading changes every window that contains it, its own the most.
     highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
     which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
     return fit.middle[which], scale[which]
@@ -348,7 +348,7 @@ def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[tuple[int,
     size = np.abs(fit.residual)
     if size.size < POINTS:
         return
-    # What is false shows in every window that it is part of, most in its own.
+    # A false reading changes every window that contains it, its own the most.
     highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
     at = fit.middle[(size > 2 * SUSPECT * broad_scale(size)) & (size >= highest)]
     inside = np.zeros(values.size, bool)

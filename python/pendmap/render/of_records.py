@@ -71,9 +71,9 @@ def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Pat
     Parameters
     ----------
     comparison : Comparison
-        What ``pendmap.comparison.free`` returned.
+        What :func:`pendmap.comparison.compare` returned.
     path : str or path
-        As of :func:`pendmap.render.draw`.
+        As for :func:`pendmap.render.draw`.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     found : Discrepancy
         What ``pendmap.diagnosis.diagnose`` returned.
     path : str or path
-        As of :func:`pendmap.render.draw`.
+        As for :func:`pendmap.render.draw`.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def draw_runs(
     runs : sequence of RunPanel
         One or more.
     path : str or path
-        As of :func:`pendmap.render.draw`.
+        As for :func:`pendmap.render.draw`.
     title, subtitle : str
         What stands above all panels.
 

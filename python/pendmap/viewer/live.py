@@ -81,7 +81,7 @@ class Live:
     Raises
     ------
     InputError, NobodyListensError
-        As of :func:`check_address`.
+        As for :func:`check_address`.
     """
 
     def __init__(
