@@ -62,13 +62,13 @@ fn chosen(pendulum: &Pendulum, path: Path) -> Strobe {
 }
 
 /// The effect in the middle of its typical range.
-fn typical(kind: Kind) -> Effect {
-    let middle = |p: &Parameter| {
+fn typical(kind: &Kind) -> Effect {
+    let middle = |p: Parameter| {
         let [low, high] = p.typical;
-        if p.name == "n" && kind == Kind::BearingHarmonic { 3.0 } else { f64::midpoint(low, high) }
+        if p.name == "n" && *kind == Kind::BearingHarmonic { 3.0 } else { f64::midpoint(low, high) }
     };
     let values: Vec<f64> = kind.definition().parameters.iter().map(middle).collect();
-    Effect::new(kind, &values).expect("in range")
+    Effect::new(kind.clone(), &values).expect("in range")
 }
 
 fn main() {
@@ -94,11 +94,11 @@ fn main() {
                 continue;
             }
             let base = if *kind == Kind::ViscousDamping { &base } else { &damped };
-            let mut pendulum = base.clone().with_effect(typical(*kind)).expect("once");
+            let mut pendulum = base.clone().with_effect(typical(kind)).expect("once");
             pendulum.lab_time = 100.0;
             let strobe = Strobe::new(&pendulum, STEPS, path);
             let [own, reference] = times(&strobe, &fast);
-            let formula = rewritten(&typical(*kind)).map(|effect| {
+            let formula = rewritten(&typical(kind)).map(|effect| {
                 let pendulum = base.clone().with_effect(effect).expect("once");
                 let pendulum = Pendulum { lab_time: 100.0, ..pendulum };
                 let [formula, library] = times(&Strobe::new(&pendulum, STEPS, path), &strobe);

@@ -32,7 +32,7 @@ fn pendulum(p: f64, effects: &[(Kind, &[f64])]) -> Pendulum {
     let bare = Pendulum::new(0.01, p, 2.1, 0.0, 0.0).expect("in range");
     let rubbing = bare.with_friction(0.01).expect("in range");
     effects.iter().fold(rubbing, |pendulum, (kind, values)| {
-        pendulum.with_effect(Effect::new(*kind, values).expect("in range")).expect("once")
+        pendulum.with_effect(Effect::new(kind.clone(), values).expect("in range")).expect("once")
     })
 }
 

@@ -17,9 +17,9 @@ pub enum Error {
     /// A parameter of an effect is not finite, or outside its range.
     Parameter {
         /// The effect.
-        effect: &'static str,
+        effect: String,
         /// Its parameter.
-        parameter: &'static str,
+        parameter: String,
         /// What was given.
         value: f64,
         /// The bounds.
@@ -45,14 +45,14 @@ pub enum Error {
     /// One thing said twice.
     Twice {
         /// What was given.
-        name: &'static str,
+        name: String,
         /// What it repeats.
-        other: &'static str,
+        other: String,
     },
     /// A map cannot have the effect.
     NotMappable {
         /// The effect.
-        effect: &'static str,
+        effect: String,
         /// Why not.
         why: &'static str,
     },
@@ -67,6 +67,13 @@ pub enum Error {
         given: (usize, usize),
         /// The names of the arrays.
         names: (&'static str, &'static str),
+    },
+    /// The wrong number of values for the parameters of an effect.
+    Values {
+        /// The effect.
+        effect: String,
+        /// How many it has, and how many were given.
+        given: [usize; 2],
     },
     /// `PENDMAP_SIMD` names no path of this processor.
     Simd {
@@ -133,6 +140,10 @@ impl fmt::Display for Error {
                 f,
                 "{} has {} values and {} has {}: they must be as many",
                 names.0, given.0, names.1, given.1
+            ),
+            Self::Values { effect, given: [own, given] } => write!(
+                f,
+                "{effect} has {own} values and the call has {given}: they must be as many"
             ),
             Self::Simd { name } => write!(
                 f,

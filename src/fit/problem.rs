@@ -41,7 +41,7 @@ impl Free {
             let Slot::Parameter(place) = *slot else { return None };
             let pendulum = &records[*record].pendulum;
             let (effect, own) = pendulum.owner(place)?;
-            Some(pendulum.effects[effect].kind.definition().parameters[own].range)
+            Some(pendulum.effects[effect].kind.definition().parameters.at(own).range)
         };
         self.places.first().and_then(of_effect).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
@@ -225,10 +225,10 @@ impl Shaped {
         let finite = numbers.iter().all(|(_, value)| value.is_finite());
         let in_range = self.pendulum.effects.iter().all(|effect| {
             let parameters = effect.kind.definition().parameters;
-            let fits = |(p, v): (&crate::model::effects::Parameter, &f64)| {
-                (p.range[0]..=p.range[1]).contains(v)
-            };
-            parameters.iter().zip(effect.values()).all(fits)
+            parameters
+                .iter()
+                .zip(effect.values())
+                .all(|(parameter, value)| (parameter.range[0]..=parameter.range[1]).contains(value))
         });
         let read = self.rod_sensor.is_none_or(|sensor| sensor.is_sound());
         finite && in_range && read && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0

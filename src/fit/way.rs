@@ -36,13 +36,13 @@ impl Way {
         let pendulum = &records[record].pendulum;
         let Some((effect, own)) = pendulum.owner(place) else { return Self::Straight };
         let parameters = pendulum.effects[effect].kind.definition().parameters;
-        let positive = |index: usize| parameters[index].range[0] > 0.0;
+        let positive = |index: usize| parameters.at(index).range[0] > 0.0;
         let is_free = |index: usize| {
             let slot = (record, Slot::Parameter(place - own + index));
             all.iter().any(|free| free.places.contains(&slot))
         };
         match own {
-            0 if (1..parameters.len()).any(|k| positive(k) && is_free(k)) => Self::Size,
+            0 if (1..parameters.count()).any(|k| positive(k) && is_free(k)) => Self::Size,
             1.. if positive(own) => Self::Width,
             _ => Self::Straight,
         }

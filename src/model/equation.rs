@@ -12,6 +12,7 @@
 mod mapped;
 
 use std::f64::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 use super::drive::Motion;
 use super::effects::{Action, Kind, MOST_PARAMETERS, Mappable, Point};
@@ -44,7 +45,7 @@ pub struct Equation<R> {
     /// Effects with a friction.
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The formulas once more, for what they hold at rest.
-    formulas: Vec<(&'static Formula, [R; MOST_PARAMETERS])>,
+    formulas: Vec<(Arc<Formula>, [R; MOST_PARAMETERS])>,
     /// What depends on the last turn: an effect with a torque, and the sensor's play.
     keepers: [Option<(Kind, [R; MOST_PARAMETERS])>; 2],
     /// The effect with a mode of the rig.
@@ -116,42 +117,43 @@ impl<R: Real> Equation<R> {
         let (mut frictions, mut formulas) = (Vec::new(), Vec::new());
         let (mut sideways, mut plain) = (false, true);
         let mut holds = [false; 2];
-        let (mut corner, mut mode, mut keepers) = (None, None, [None; 2]);
+        let (mut corner, mut mode, mut keepers) = (None, None, [None, None]);
         let probe = Point::nowhere(zero);
         for effect in &pendulum.effects {
             let parameters = effect.lift(&mut next);
             if effect.kind.switch(&parameters, &probe).is_some() {
-                corner = Some((effect.kind, parameters));
+                corner = Some((effect.kind.clone(), parameters));
             }
             if effect.kind.sway(&parameters, &probe).is_some() {
-                mode = Some((effect.kind, parameters));
+                mode = Some((effect.kind.clone(), parameters));
             }
             if effect.kind.kept(&parameters, &probe).is_some() {
-                keepers[usize::from(effect.is(&[Action::Play]))] = Some((effect.kind, parameters));
+                keepers[usize::from(effect.is(&[Action::Play]))] =
+                    Some((effect.kind.clone(), parameters));
             }
-            if let Kind::Formula(formula) = effect.kind {
+            if let Kind::Formula(formula) = &effect.kind {
                 holds[0] |= formula.is_driven();
                 holds[1] |= formula.definition().mappable == Mappable::Frozen;
-                torques.push((effect.kind, parameters));
-                formulas.push((formula, parameters));
+                torques.push((effect.kind.clone(), parameters));
+                formulas.push((formula.clone(), parameters));
                 continue;
             }
             match effect.kind.definition().action {
                 Action::Position | Action::Velocity | Action::Kinked => {
-                    torques.push((effect.kind, parameters));
+                    torques.push((effect.kind.clone(), parameters));
                 }
                 Action::Driven | Action::Timed => {
-                    torques.push((effect.kind, parameters));
+                    torques.push((effect.kind.clone(), parameters));
                     plain = false;
                 }
                 Action::Inertia => {
-                    torques.push((effect.kind, parameters));
-                    inertias.push((effect.kind, parameters));
+                    torques.push((effect.kind.clone(), parameters));
+                    inertias.push((effect.kind.clone(), parameters));
                 }
                 Action::Friction | Action::SlidingFriction | Action::LoadedFriction => {
                     holds[0] |= effect.is(&[Action::LoadedFriction]);
                     holds[1] |= effect.kind.definition().mappable == Mappable::Frozen;
-                    frictions.push((effect.kind, parameters));
+                    frictions.push((effect.kind.clone(), parameters));
                 }
                 Action::Drive => effect.kind.drive(&parameters, &mut motion),
                 Action::FurtherDrive => {

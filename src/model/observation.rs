@@ -23,7 +23,7 @@ impl<R: Real> Observation<R> {
                     index += 1;
                     number(index - 1, value)
                 });
-                readings.push((effect.kind, parameters));
+                readings.push((effect.kind.clone(), parameters));
             }
             first += effect.values().len();
         }

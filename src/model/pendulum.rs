@@ -87,7 +87,7 @@ impl Pendulum {
     /// # Errors
     /// [`Error::Twice`] if it is there already.
     pub fn with_effect(mut self, effect: Effect) -> Result<Self, Error> {
-        let name = effect.kind.definition().name;
+        let name = effect.kind.definition().name.to_owned();
         let place = match effect.kind {
             Kind::ViscousDamping => Some(("gamma", &mut self.gamma)),
             Kind::CoulombFriction => Some(("theta_r", &mut self.theta_r)),
@@ -96,14 +96,14 @@ impl Pendulum {
         };
         if let Some((other, slot)) = place {
             if *slot != 0.0 {
-                return Err(Error::Twice { name, other });
+                return Err(Error::Twice { name, other: other.to_owned() });
             }
             *slot = effect.parameters[0];
             return Ok(self);
         }
         let several = effect.kind == Kind::BearingHarmonic;
         if !several && self.effects.iter().any(|e| e.kind.definition().name == name) {
-            return Err(Error::Twice { name, other: name });
+            return Err(Error::Twice { other: name.clone(), name });
         }
         self.effects.push(effect);
         if self.effects.iter().filter(|e| e.has_corner()).count() > 1 {
@@ -331,7 +331,8 @@ impl Pendulum {
         for effect in &self.effects {
             let why = effect.kind.bars_maps(&effect.parameters);
             if let Some(why) = why.filter(|why| !(bounded && *why == NOT_PERIODIC)) {
-                return Err(Error::NotMappable { effect: effect.kind.definition().name, why });
+                let effect = effect.kind.definition().name.to_owned();
+                return Err(Error::NotMappable { effect, why });
             }
         }
         Ok(())
@@ -343,7 +344,7 @@ impl Pendulum {
         let mut shortest = self.period();
         for effect in &self.effects {
             for (value, parameter) in
-                effect.values().iter().zip(effect.kind.definition().parameters)
+                effect.values().iter().zip(effect.kind.definition().parameters.iter())
             {
                 shortest = match parameter.role {
                     Role::Frequency => shortest.min(TAU / value.abs()),

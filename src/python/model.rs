@@ -1,5 +1,7 @@
 //! A model as Python hands it over: a `pendmap.Pendulum`, read by its attributes.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 
 use crate::error::Error;
@@ -77,7 +79,7 @@ impl Model {
 
 impl GivenFormula {
     /// The formula, checked.
-    pub fn formula(self) -> Result<&'static Formula, Error> {
+    pub fn formula(self) -> Result<Arc<Formula>, Error> {
         let Self { name, term, revealed_by, parameters } = self;
         let parameters = parameters.into_iter().map(GivenParameter::spec).collect();
         Formula::new(&Spec { name, term, revealed_by, parameters })

@@ -199,7 +199,7 @@ fn steps_for_a_tolerance_are_those_of_other_effects() {
     for pendulum in models() {
         let steps = |p: &Pendulum| choose(p, &starts, 1e-6, path()).expect("steps").0.steps();
         let mut other = pendulum.clone();
-        other.effects = vec![drag];
+        other.effects = vec![drag.clone()];
         let [found, other] = [&pendulum, &other].map(steps);
         println!("{found} {other}");
         assert!(found <= 2 * other, "{pendulum:?}: {found} steps, {other} with drag");
@@ -261,7 +261,7 @@ fn a_load_that_only_just_touches_zero_is_not_missed() {
 #[test]
 fn one_effect_of_the_library_has_a_corner() {
     let cornered = Kind::ALL.iter().filter(|kind| {
-        let effect = Effect { kind: **kind, parameters: [1.0; 3] };
+        let effect = Effect { kind: (**kind).clone(), parameters: [1.0; 3] };
         let pendulum = Pendulum { effects: vec![effect], ..driven(0.1, 1.0, 2.0) };
         pendulum.equation().has_corner()
     });

@@ -27,14 +27,14 @@ fn mappable() -> Vec<(Kind, Pendulum)> {
         }
         for theta_r in [0.0, 0.05] {
             let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
-            let effect = draws.effect(*kind);
+            let effect = draws.effect(kind);
             let twice = match kind {
                 Kind::ViscousDamping => true,
                 Kind::CoulombFriction => theta_r > 0.0,
                 _ => false,
             };
             if !twice {
-                all.push((*kind, has(base, effect)));
+                all.push((kind.clone(), has(base, effect)));
             }
         }
     }
@@ -99,7 +99,7 @@ fn a_friction_that_turns_negative_holds_nothing() {
         (Kind::LoadDependentFriction, &[0.3]),
         (Kind::CoulombDrift, &[-4e-4]),
     ] {
-        let pendulum = has(base.clone(), Effect::new(kind, values).expect("in range"));
+        let pendulum = has(base.clone(), Effect::new(kind.clone(), values).expect("in range"));
         let [median, error] = errors_in_lanes(&pendulum, 200);
         println!("{kind:?} {median:e} {error:e}");
         assert!(error < 1e-8, "{kind:?}: {error:e}");
@@ -113,7 +113,8 @@ fn a_friction_that_turns_negative_holds_nothing() {
 fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
     let effect = |kind: Kind, r| {
         let shape = [r, 200.0];
-        Effect::new(kind, &shape[..kind.definition().parameters.len()]).expect("in range")
+        let count = kind.definition().parameters.count();
+        Effect::new(kind, &shape[..count]).expect("in range")
     };
     let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
     let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
@@ -131,7 +132,8 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
         (Kind::ViscousWarmUp, -5e-2),
     ] {
         // Two stretches, one after the other, are one.
-        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, size));
+        let early =
+            has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind.clone(), size));
         let mut late = early.clone();
         late.lab_time += 5.0;
         let end = |pendulum: &Pendulum, from: State, until: f64| {
@@ -148,7 +150,7 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
 
 #[test]
 fn maps_refuse_what_does_not_repeat_every_turn() {
-    let effect = |kind, values: &[f64]| Effect::new(kind, values).expect("in range");
+    let effect = |kind: Kind, values: &[f64]| Effect::new(kind, values).expect("in range");
     for (effect, allowed) in [
         (effect(Kind::ElasticRestoring, &[0.01]), true),
         (effect(Kind::BearingHarmonic, &[0.1, 2.5, 0.0]), false),
@@ -156,7 +158,7 @@ fn maps_refuse_what_does_not_repeat_every_turn() {
         (effect(Kind::BearingHarmonic, &[0.0, 2.5, 0.0]), true),
         (effect(Kind::EncoderOffset, &[0.1]), true),
     ] {
-        let pendulum = has(driven(0.1, 0.6, 2.0), effect);
+        let pendulum = has(driven(0.1, 0.6, 2.0), effect.clone());
         let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
         let strobe = Strobe::new(&pendulum, 20, path());
         let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());

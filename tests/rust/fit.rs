@@ -21,7 +21,12 @@ fn noise(k: usize) -> f64 {
 /// Three records, one of them forced, and the wrong values to start from.
 fn several() -> (Problem, Vec<f64>) {
     let gain: (Kind, &[f64]) = (Kind::EncoderOffset, &[0.01]);
-    let own = |p: f64| with(driven(0.02, p, 2.1).with_friction(0.03).expect("in range"), &[gain]);
+    let own = |p: f64| {
+        with(
+            driven(0.02, p, 2.1).with_friction(0.03).expect("in range"),
+            std::slice::from_ref(&gain),
+        )
+    };
     let mut records = vec![
         record(own(0.0), None, [2.8, -0.01], 60.0),
         record(own(0.0), None, [1.2, 0.3], 40.0),

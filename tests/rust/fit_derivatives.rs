@@ -153,7 +153,7 @@ fn derivatives_hold_where_a_contact_yields() {
     let dahl: (Kind, &[f64]) = (Kind::DahlFriction, &[0.05, 0.1]);
     let start = [1.2, -0.1];
     // To swings far smaller than the contact yields.
-    let decay = with(undriven(0.02, 0.0), &[dahl, (Kind::QuadraticDrag, &[0.01])]);
+    let decay = with(undriven(0.02, 0.0), &[dahl.clone(), (Kind::QuadraticDrag, &[0.01])]);
     let error = worst(record(decay, None, start, 60.0), None, start);
     assert!(error < 1e-6, "{error:e}");
     // Held fast now and then, and seen by an accelerometer.
@@ -189,9 +189,12 @@ fn derivatives_hold_where_the_pivot_gives_way() {
     };
     let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
     // Whirling, then swinging without friction.
-    check(with(undriven(0.1, 0.01), &[compliance]), [0.4, 2.8], 25.0);
+    check(with(undriven(0.1, 0.01), std::slice::from_ref(&compliance)), [0.4, 2.8], 25.0);
     // Turns at which the acceleration jumps, to a rest on which the mode rings.
-    let rubbing = with(undriven(0.02, 0.0).with_friction(0.06).expect("in range"), &[compliance]);
+    let rubbing = with(
+        undriven(0.02, 0.0).with_friction(0.06).expect("in range"),
+        std::slice::from_ref(&compliance),
+    );
     let start = [1.6, -0.1];
     assert!(happens(&rubbing, start, 40.0, EventKind::Turn) > 4);
     assert_eq!(happens(&rubbing, start, 40.0, EventKind::StuckForEver), 1);
@@ -223,7 +226,10 @@ fn a_motion_that_asks_for_ever_shorter_steps_is_given_up() {
 #[test]
 fn derivatives_hold_for_an_accelerometer_where_the_pivot_gives_way() {
     let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
-    let rubbing = with(undriven(0.02, 0.0).with_friction(0.06).expect("in range"), &[compliance]);
+    let rubbing = with(
+        undriven(0.02, 0.0).with_friction(0.06).expect("in range"),
+        std::slice::from_ref(&compliance),
+    );
     let start = [1.6, -0.1];
     let mut record = record(rubbing, None, start, 20.0);
     let (rate, place, gravity) = (0.0, 1.0, 1.0);

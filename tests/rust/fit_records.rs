@@ -21,7 +21,7 @@ pub fn every(interval: f64, until: f64) -> Vec<f64> {
 /// With effects.
 pub fn with(pendulum: Pendulum, effects: &[(Kind, &[f64])]) -> Pendulum {
     effects.iter().fold(pendulum, |pendulum, (kind, values)| {
-        pendulum.with_effect(Effect::new(*kind, values).expect("in range")).expect("once")
+        pendulum.with_effect(Effect::new(kind.clone(), values).expect("in range")).expect("once")
     })
 }
 

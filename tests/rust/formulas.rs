@@ -33,8 +33,8 @@ fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
         let seed = kind.definition().name.bytes().map(u64::from).sum();
         let own = match kind {
             // Below the friction of the tests: together they brake everywhere.
-            Kind::LoadDependentFriction => Effect::new(*kind, &[0.02]).expect("in range"),
-            _ => Draws(seed).effect(*kind),
+            Kind::LoadDependentFriction => Effect::new(kind.clone(), &[0.02]).expect("in range"),
+            _ => Draws(seed).effect(kind),
         };
         if let Some(other) = rewritten(&own) {
             // What has a parameter of its own in the model is there but once.
@@ -43,7 +43,7 @@ fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
                 Kind::CoulombFriction => Pendulum { theta_r: 0.0, ..base.clone() },
                 _ => base.clone(),
             };
-            all.push((*kind, has(bare.clone(), own), has(bare, other)));
+            all.push((kind.clone(), has(bare.clone(), own), has(bare, other)));
         }
     }
     assert!(all.len() > 12, "{}", all.len());
@@ -277,12 +277,12 @@ fn two_corners_do_not_hinder_each_other() {
     let load = Effect::new(Kind::LoadDependentFriction, &[0.15]).expect("in range");
     let kinked = effect(&formula("mine", "-k*v*abs(sin(theta) - 0.3)", &[("k", 1.0)]), &[0.1]);
     let base = driven(0.1, 0.6, 2.0);
-    let [one, other] =
-        [[load, kinked], [kinked, load]].map(|effects| effects.into_iter().fold(base.clone(), has));
+    let [one, other] = [[load.clone(), kinked.clone()], [kinked, load.clone()]]
+        .map(|effects| effects.into_iter().fold(base.clone(), has));
     let mut draws = Draws(12);
     for _ in 0..200 {
         let [theta, v] = [draws.between([-4.0, 4.0]), draws.between([-3.0, 3.0])];
-        let expected = has(base.clone(), load).acceleration(1.0, theta, v)
+        let expected = has(base.clone(), load.clone()).acceleration(1.0, theta, v)
             - 0.1 * v * (theta.sin() - 0.3).abs();
         for pendulum in [&one, &other] {
             assert!((pendulum.acceleration(1.0, theta, v) - expected).abs() < 1e-14);
@@ -335,7 +335,7 @@ fn what_is_wrong_is_said_in_one_line() {
         let error = Formula::new(&formula(name, term, &[(parameter, 2.0)])).expect_err(term);
         assert!(matches!(error, Error::Formula { .. }) && error.to_string().lines().count() == 1);
     }
-    assert_eq!(term(Kind::EncoderGain), None);
+    assert_eq!(term(&Kind::EncoderGain), None);
 }
 
 #[test]

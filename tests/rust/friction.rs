@@ -104,14 +104,14 @@ fn every_route_agrees_with_the_reference_integrator() {
     let smooth = driven(0.1, 0.6, 2.0);
     let rough = rubbing(0.1, 0.6, 2.0, 0.04);
     let with = |base: &Pendulum, effects: &[Effect]| {
-        effects.iter().fold(base.clone(), |p, e| p.with_effect(*e).expect("once"))
+        effects.iter().fold(base.clone(), |p, e| p.with_effect(e.clone()).expect("once"))
     };
     for pendulum in [
-        with(&smooth, &[ripple]),
-        with(&smooth, &[drag]),
-        with(&smooth, &[drag, ripple]),
-        with(&rough, &[ripple]),
-        with(&rough, &[drag]),
+        with(&smooth, std::slice::from_ref(&ripple)),
+        with(&smooth, std::slice::from_ref(&drag)),
+        with(&smooth, &[drag.clone(), ripple.clone()]),
+        with(&rough, std::slice::from_ref(&ripple)),
+        with(&rough, std::slice::from_ref(&drag)),
         with(&rough, &[drag, ripple]),
     ] {
         let (starts, ends) = references(&pendulum, 200);

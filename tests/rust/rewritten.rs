@@ -5,7 +5,7 @@ use pendmap::model::formula::{ParameterSpec, Spec};
 use pendmap::model::{Effect, Formula, Kind};
 
 /// The term of an effect whose torque a formula can say.
-pub fn term(kind: Kind) -> Option<&'static str> {
+pub fn term(kind: &Kind) -> Option<&'static str> {
     Some(match kind.definition().name {
         "viscous_damping" => "-gamma*v",
         "coulomb_friction" => "-theta_r*sign(v)",
@@ -30,8 +30,8 @@ pub fn term(kind: Kind) -> Option<&'static str> {
 }
 
 /// A parameter of a formula like one of the library.
-fn like(parameter: &Parameter) -> ParameterSpec {
-    let Parameter { name, unit, power, range, typical, meaning, .. } = *parameter;
+fn like(parameter: Parameter) -> ParameterSpec {
+    let Parameter { name, unit, power, range, typical, meaning, .. } = parameter;
     let (power, less) = match power {
         Power::Of(power) => (f64::from(power), None),
         Power::Real(power) => (power, None),
@@ -80,7 +80,7 @@ pub fn rewritten(effect: &Effect) -> Option<Effect> {
     let definition = effect.kind.definition();
     let spec = Spec {
         name: format!("own_{}", definition.name),
-        term: term(effect.kind)?.to_owned(),
+        term: term(&effect.kind)?.to_owned(),
         revealed_by: String::new(),
         parameters: definition.parameters.iter().map(like).collect(),
     };

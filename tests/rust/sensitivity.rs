@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 1e-14;
 
 fn with_effects(pendulum: Pendulum, effects: &[(Kind, &[f64])]) -> Pendulum {
     effects.iter().fold(pendulum, |pendulum, (kind, values)| {
-        let effect = Effect::new(*kind, values).expect("in range");
+        let effect = Effect::new(kind.clone(), values).expect("in range");
         pendulum.with_effect(effect).expect("once")
     })
 }
@@ -135,7 +135,8 @@ fn a_friction_of_zero_has_a_derivative() {
 #[test]
 fn passes_agree_bit_for_bit() {
     // Seventeen names take two passes and more: all have the values of the plain trajectory.
-    let harmonics: [(Kind, &[f64]); 3] = [(Kind::BearingHarmonic, &[0.05, 3.0, 0.4]); 3];
+    let harmonics: [(Kind, &[f64]); 3] =
+        [(); 3].map(|()| (Kind::BearingHarmonic, &[0.05, 3.0, 0.4][..]));
     let pendulum = with_effects(driven(0.1, 1.5, 0.87).with_friction(0.1).expect("ok"), &harmonics);
     let (start, times) = ([-2.82, 0.83], every(0.5, 20.0));
     let run = sensitivities(&pendulum, None, start, 0.0, &times, TOLERANCE);

@@ -5,6 +5,7 @@ use std::hint::black_box;
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 use crate::model::drive::Motion;
+use crate::model::formula::ParameterSpec;
 
 /// No effect has more parameters.
 pub const MOST_PARAMETERS: usize = 3;
@@ -197,13 +198,13 @@ impl Role {
 
 /// A parameter of an effect.
 #[derive(Clone, Copy, Debug)]
-pub struct Parameter {
+pub struct Parameter<'a> {
     /// Its name in model files.
-    pub name: &'static str,
+    pub name: &'a str,
     /// What it does.
     pub role: Role,
     /// Its unit in SI.
-    pub unit: &'static str,
+    pub unit: &'a str,
     /// How it scales with `w0`.
     pub power: Power,
     /// The least and the greatest value that make sense, without dimensions.
@@ -211,14 +212,51 @@ pub struct Parameter {
     /// Smallest and largest value of interest: where a search looks.
     pub typical: [f64; 2],
     /// What it is.
-    pub meaning: &'static str,
+    pub meaning: &'a str,
+}
+
+/// The parameters of an effect, in order.
+#[derive(Clone, Copy, Debug)]
+pub enum Parameters<'a> {
+    /// Those of an effect of the library.
+    Library(&'static [Parameter<'static>]),
+    /// Those of a formula.
+    Formula(&'a [ParameterSpec]),
+}
+
+impl<'a> Parameters<'a> {
+    /// How many there are.
+    #[must_use]
+    pub const fn count(self) -> usize {
+        match self {
+            Self::Library(all) => all.len(),
+            Self::Formula(all) => all.len(),
+        }
+    }
+
+    /// The parameter at a place.
+    ///
+    /// # Panics
+    /// If there is no such place.
+    #[must_use]
+    pub fn at(self, place: usize) -> Parameter<'a> {
+        match self {
+            Self::Library(all) => all[place],
+            Self::Formula(all) => all[place].parameter(),
+        }
+    }
+
+    /// All of them.
+    pub fn iter(self) -> impl Iterator<Item = Parameter<'a>> {
+        (0..self.count()).map(move |place| self.at(place))
+    }
 }
 
 /// All that is said about an effect, besides its formulas.
 #[derive(Clone, Copy, Debug)]
-pub struct Definition {
+pub struct Definition<'a> {
     /// Its name, the field's standard term.
-    pub name: &'static str,
+    pub name: &'a str,
     /// Where it acts.
     pub group: Group,
     /// Its family.
@@ -226,11 +264,11 @@ pub struct Definition {
     /// What it depends on.
     pub action: Action,
     /// The term on the right of `th'' = ...`, per inertia, or the reading, or the drive.
-    pub formula: &'static str,
+    pub formula: &'a str,
     /// Its parameters, in order.
-    pub parameters: &'static [Parameter],
+    pub parameters: Parameters<'a>,
     /// Which data show it.
-    pub revealed_by: &'static str,
+    pub revealed_by: &'a str,
     /// Whether maps can have it.
     pub mappable: Mappable,
 }
@@ -327,7 +365,7 @@ impl<R: Real> Point<R> {
 /// derivatives, by the state and by the parameters alike, run through the same lines.
 pub trait Law {
     /// Name, formula, parameters and the rest.
-    const DEFINITION: Definition;
+    const DEFINITION: Definition<'static>;
 
     /// The parameters as the formulas below take them: what takes its time, like a reciprocal, is
     /// done once.

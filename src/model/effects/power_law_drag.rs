@@ -5,7 +5,7 @@
 //! are dry friction in all but name, too abrupt for steps without events of their own.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,13 +15,13 @@ const FLOOR: f64 = 1e-12;
 pub struct PowerLawDrag;
 
 impl Law for PowerLawDrag {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "power_law_drag",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Kinked,
         formula: "-q |v|^n sign(v)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "q",
                 role: Role::Size,
@@ -40,7 +40,7 @@ impl Law for PowerLawDrag {
                 typical: [1.1, 3.0],
                 meaning: "power of the velocity",
             },
-        ],
+        ]),
         revealed_by: "large amplitudes and rotation, against small ones",
         mappable: Mappable::Yes,
     };

@@ -32,27 +32,34 @@ impl Equation<f64> {
             inertias: Vec::new(),
             frictions: Vec::new(),
             formulas: Vec::new(),
-            keepers: [None; 2],
+            keepers: [None, None],
             mode: None,
             corner: self
                 .corner
+                .clone()
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
             sideways: self.sideways,
             plain: self.plain,
             holds: self.holds,
         };
         for (kind, [a, b, c]) in &self.torques {
-            equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .torques
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (kind, [a, b, c]) in &self.inertias {
-            equation.inertias.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .inertias
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (kind, [a, b, c]) in &self.frictions {
-            equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .frictions
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (formula, [a, b, c]) in &self.formulas {
             let parameters = [number.like(*a), number.like(*b), number.like(*c)];
-            equation.formulas.push((formula, parameters));
+            equation.formulas.push((formula.clone(), parameters));
         }
         equation
     }
