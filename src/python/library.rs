@@ -1,10 +1,11 @@
 //! The library of effects, as Python sees it.
 
+use pendmap::model::Kind;
+use pendmap::model::effects::{Definition as Of, Parameter as OfParameter, Power, Role};
 use pyo3::prelude::*;
 
 use super::model::GivenFormula;
-use crate::model::Kind;
-use crate::model::effects::{Definition as Of, Parameter as OfParameter, Power, Role};
+use super::raise;
 
 /// An effect, as a dictionary.
 #[derive(IntoPyObject)]
@@ -88,6 +89,6 @@ pub fn roles() -> Vec<&'static str> {
 /// parameter.
 #[pyfunction]
 pub fn formula(given: GivenFormula) -> PyResult<(Definition, bool)> {
-    let formula = given.formula()?;
+    let formula = given.formula().map_err(raise)?;
     Ok((formula.definition().into(), formula.is_proportional()))
 }

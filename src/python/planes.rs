@@ -1,17 +1,18 @@
 //! Bindings of maps over parameters.
 
 use numpy::PyReadonlyArray1;
+use pendmap::attractor::Attractor;
+use pendmap::integrate::State;
+use pendmap::lanes::Path;
+use pendmap::maps::bifurcation as diagram;
+use pendmap::maps::cell::{Found, HINTED};
+use pendmap::maps::parameter_map::{self as maps, Request, parameter_map as search};
 use pyo3::prelude::*;
 
-use super::convert::{Array, array};
+use super::convert::{Array, array, states};
 use super::model::{Model, range};
+use super::raise;
 use super::watch::watched;
-use crate::attractor::Attractor;
-use crate::integrate::State;
-use crate::lanes::Path;
-use crate::maps::bifurcation as diagram;
-use crate::maps::cell::{Found, HINTED};
-use crate::maps::parameter_map::{self as maps, Request, parameter_map as search};
 
 /// `(name of a parameter, values)`.
 type RangeTuple = (String, Vec<f64>);
@@ -90,7 +91,7 @@ impl ParameterMap {
             chaos_periods: array(py, cells.map(|cell| cell.watched).collect()),
             reached_error: map.resolution.reached_error,
             searched_again: map.searched_again,
-            simd: Path::choose()?.name(),
+            simd: Path::choose().map_err(raise)?.name(),
         })
     }
 }
@@ -128,8 +129,7 @@ pub fn parameter_map(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ParameterMap> {
     let pendulum = model.pendulum()?;
-    let starts: Vec<State> =
-        theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
+    let starts = states(&theta, &velocity)?;
     let request = Request {
         axes: [range(&pendulum, axes.0)?, range(&pendulum, axes.1)?],
         starts,
@@ -161,8 +161,7 @@ pub fn bifurcation(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Py<Bifurcation>> {
     let pendulum = model.pendulum()?;
-    let starts: Vec<State> =
-        theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
+    let starts = states(&theta, &velocity)?;
     let request = diagram::Request {
         axis: range(&pendulum, axis)?,
         starts,

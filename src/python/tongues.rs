@@ -1,11 +1,11 @@
 //! Bindings of critical curves.
 
+use pendmap::error::Error;
+use pendmap::maps::tongues::{Balance, Critical, tongues as search};
 use pyo3::prelude::*;
 
 use super::model::Model;
 use super::watch::watched;
-use crate::error::Error;
-use crate::maps::tongues::{Balance, Critical, tongues as search};
 
 /// Critical amplitudes of the drive at one frequency, ascending.
 #[pyclass(frozen, get_all, module = "pendmap._core")]

@@ -4,11 +4,12 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
+use pendmap::error::Error;
+use pendmap::maps::control::{Control, pool};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::error::Error;
-use crate::maps::control::{Control, pool};
+use super::raise;
 
 /// How often signals and progress are looked at.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -25,7 +26,7 @@ pub fn watched<T: Send>(
         None => Ok(()),
     };
     let (result, stop) = stopped(py, report, work)?;
-    stop.map_or_else(|| result.map_err(PyErr::from), Err)
+    stop.map_or_else(|| result.map_err(raise), Err)
 }
 
 /// Like [`watched`], in a pool of this call's own: threads that outlived a call would be missing in a
@@ -56,7 +57,7 @@ pub fn stopped<T: Send>(
                 let _ = sender.send(work(shared));
             };
             let begun = thread::Builder::new().spawn_scoped(scope, task);
-            begun.map_err(|why| Error::Threads(why.to_string()))?;
+            begun.map_err(|why| raise(Error::Threads(why.to_string())))?;
             let mut stop: Option<PyErr> = None;
             loop {
                 match receiver.recv_timeout(PAUSE) {

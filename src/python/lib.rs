@@ -15,30 +15,28 @@ mod planes;
 mod tongues;
 mod watch;
 
+use pendmap::error::Error;
+use pendmap::lanes::Path;
+use pendmap::maps::bounds::{LEAST, cell_periods, max_periods};
+use pendmap::memory;
+use pendmap::model::Angle;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::error::Error;
-use crate::lanes::Path;
-use crate::maps::bounds::{LEAST, cell_periods, max_periods};
-use crate::memory;
-use crate::model::Angle;
 use model::Model;
 
 pyo3::create_exception!(_core, Diverged, PyValueError, "A motion left the range of numbers.");
 
-/// One mapping of errors for all functions: what the caller gave is a `ValueError`, what the system
-/// refuses a `MemoryError` or an `OSError`.
-impl From<Error> for PyErr {
-    fn from(error: Error) -> Self {
-        use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError};
-        match error {
-            Error::Diverges => Diverged::new_err(error.to_string()),
-            Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-            Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
-            Error::Threads(_) => PyOSError::new_err(error.to_string()),
-            _ => PyValueError::new_err(error.to_string()),
-        }
+/// The Python exception of an error of the core: invalid input is a `ValueError`, what the system refuses a
+/// `MemoryError` or an `OSError`.
+fn raise(error: Error) -> PyErr {
+    use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyOSError};
+    match error {
+        Error::Diverges => Diverged::new_err(error.to_string()),
+        Error::Interrupted => PyKeyboardInterrupt::new_err(()),
+        Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
+        Error::Threads(_) => PyOSError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
     }
 }
 
@@ -65,7 +63,7 @@ fn bounds(model: Model) -> PyResult<(u32, u32, u32)> {
 /// The instruction set that a call would use now.
 #[pyfunction]
 fn simd() -> PyResult<&'static str> {
-    Ok(Path::choose()?.name())
+    Ok(Path::choose().map_err(raise)?.name())
 }
 
 /// The instruction sets that this processor has, quickest first.
@@ -77,7 +75,7 @@ fn simd_available() -> Vec<&'static str> {
 /// Refuses `count` of `what`, with `each` bytes each, where that is more memory than is free.
 #[pyfunction]
 fn reckon(what: &str, count: usize, each: usize) -> PyResult<()> {
-    Ok(memory::reckon(what, count, each)?)
+    memory::reckon(what, count, each).map_err(raise)
 }
 
 /// Number of threads that a call uses if none is given.
