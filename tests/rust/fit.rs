@@ -112,7 +112,7 @@ fn initial_states_are_eliminated_exactly() {
 
 #[test]
 fn chaotic_motion_takes_no_digits_from_the_covariance() {
-    // The state's part of the information is 1e10 times what is left of the parameters' part.
+    // The state's part of the information is 1e10 times the rest of the parameters' part.
     let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
     let start = [1.0, 0.4];
     let record = record(pendulum, None, start, 45.0);
