@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-CORE := $(shell find src -name '*.rs') Cargo.toml Cargo.lock pyproject.toml
+CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .PHONY: demo test test-all fuzz lint bench build-times clean develop
 
@@ -12,7 +12,7 @@ demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 develop: $(VENV)/.develop ## set up everything for work on pendmap itself
 
 # The modules of tests/rust that ask for the instruction set themselves: what the lanes compute.
-LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bpath()' tests/rust/*.rs)))
+LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bsimd()' tests/rust/*.rs)))
 PYTEST := $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
 test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
@@ -21,8 +21,8 @@ test: $(VENV)/.develop ## set up everything and run the tests, all but the thoro
 
 test-all: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
 	cargo test --locked --quiet
-	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
-		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
+	for simd in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
+		PENDMAP_SIMD=$$simd cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
 	$(PYTEST)
 
 SEED ?= 1
@@ -31,11 +31,10 @@ fuzz: $(VENV)/.develop ## COUNT cases of bad input and faults drawn from SEED, e
 	$(BIN)/python tests/python/fuzz.py --seed $(SEED) --count $(COUNT)
 
 lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of imports
-	cargo fmt --check
-	cargo clippy --locked --quiet --all-targets -- -D warnings
-	cargo clippy --locked --quiet --lib --features python -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --quiet --no-deps
-	! grep -rlE '\b(pyo3|numpy)\b' src --include=*.rs | grep -vE '^src/(python/|lib.rs)'
+	cargo fmt --all --check
+	cargo clippy --locked --quiet --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --quiet --workspace --no-deps
+	! grep -rlE '\b(pyo3|numpy)\b' src Cargo.toml --include=*.rs --include=Cargo.toml | grep -v '^src/python/'
 	! grep -rl '\brayon\b' src --include=*.rs | grep -vE '^src/(maps|fit)/'
 	$(BIN)/ruff check --quiet
 	$(BIN)/ruff format --check --quiet
@@ -52,9 +51,9 @@ bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 
 TIMED := bash -c 'TIMEFORMAT="$$0: %R s, %U s + %S s of processors"; time maturin develop --release --locked --quiet'
 build-times: $(VENV)/.develop ## how long the crate takes to build: from nothing, and after a change in src/python
-	cargo clean --quiet --release --package pendmap
+	cargo clean --quiet --release --package pendmap --package pendmap-python
 	. $(BIN)/activate && $(TIMED) 'the crate'
-	touch src/python/mod.rs
+	touch src/python/lib.rs
 	. $(BIN)/activate && $(TIMED) 'the crate again after a change in src/python'
 	touch $(VENV)/.develop $(VENV)/.demo
 

@@ -50,5 +50,3 @@ pub mod maps;
 pub mod memory;
 pub mod model;
 pub mod orbit;
-#[cfg(feature = "python")]
-mod python;

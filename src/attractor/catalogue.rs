@@ -1,4 +1,4 @@
-//! The attractors of a map, numbered by a key of their own and named by what they are.
+//! The attractors of a map, numbered by their keys and named by kind, period and winding.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,8 +6,8 @@ use nalgebra::Complex;
 
 use super::chaos::ChaoticSet;
 use super::kind::Kind;
+use super::long_runs::Senses;
 use super::region::Region;
-use super::walk::Senses;
 use crate::integrate::State;
 use crate::model::{Angle, Pendulum};
 use crate::orbit::PeriodicOrbit;
@@ -20,7 +20,7 @@ const EXACT: f64 = 1e-9;
 /// An attractor.
 #[derive(Clone, Debug)]
 pub struct Attractor {
-    /// What it looks like.
+    /// Its kind.
     pub kind: Kind,
     /// Period in forcing periods; `None` where it has no meaning.
     pub n: Option<usize>,
@@ -49,7 +49,7 @@ pub struct Attractor {
 }
 
 impl Attractor {
-    /// From a closed orbit; one that does not attract is described alike.
+    /// The attractor of a closed orbit; one that does not attract is described alike.
     #[must_use]
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
@@ -121,7 +121,7 @@ impl Attractor {
         self.kind == Kind::Rotation && self.multipliers.len() == 1
     }
 
-    /// From a running state without drive; its one multiplier is that of the angle section.
+    /// The attractor of a running state without drive; its one multiplier is that of the angle section.
     #[must_use]
     pub fn running(rotation: &Rotation) -> Self {
         Self {
@@ -141,7 +141,7 @@ impl Attractor {
         }
     }
 
-    /// From a set of trajectories that nothing captures.
+    /// The attractor of a set of trajectories that no trap captures.
     #[must_use]
     pub fn sampled(set: &ChaoticSet) -> Self {
         Self {
@@ -175,7 +175,7 @@ impl Attractor {
         self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
     }
 
-    /// What stays when a catalogue is sorted anew: the bits of the first point.
+    /// A key that stays when a catalogue is sorted again: the bits of the first point.
     #[must_use]
     pub fn mark(&self) -> [u64; 2] {
         self.points.first().map_or([0; 2], |p| p.map(f64::to_bits))

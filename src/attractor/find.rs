@@ -6,8 +6,8 @@ use super::capture::{self, Fate, Outcome, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::ChaoticSet;
 use super::effort::Effort;
+use super::near_returns::{escape_speed, near_returns};
 use super::rest;
-use super::returns::{escape_speed, near_returns};
 use super::trap::{self, Band, Ellipse, ellipses};
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
@@ -32,7 +32,7 @@ pub enum Ending {
     Failed,
 }
 
-/// What a search has found so far.
+/// The results of a search so far.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     /// The attractors, sorted and named.
@@ -49,7 +49,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// What is known without a search: the running states of an undriven pendulum.
+    /// The attractors known without a search: the running states of an undriven pendulum.
     #[must_use]
     pub fn new(strobe: &Strobe, effort: Effort) -> Self {
         let band = |r: &Rotation| Band::around(strobe, &r.curve, 0);
@@ -84,7 +84,7 @@ impl Catalogue {
     /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
     /// found to close on a new one, or `bound` periods are over.
     ///
-    /// Those left over are watched for some times as long again ([`Effort::watch`]). If then still
+    /// The remaining trajectories are watched for a multiple of `bound` ([`Effort::watch`]). If then still
     /// none of a set of them has been captured and their exponent is positive, the set is a chaotic
     /// attractor; else they stay undecided. Returns how each start ended.
     pub fn endings(
@@ -114,7 +114,7 @@ impl Catalogue {
             round *= 2;
             let free = open(&endings);
             if self.find_cycles(strobe, &map, &free, cancel) {
-                // What the new traps hold is captured at once.
+                // Trajectories within the new traps are captured at once.
                 self.run(strobe, &mut endings, self.effort.first_round, elapsed, cancel);
             }
             alive = endings.iter().any(|e| matches!(e, Ending::Open(_)));

@@ -46,7 +46,7 @@ impl Ellipse {
 /// Half widths of a band that are sampled, each `RATIO` of the one before.
 const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
-/// Of the linear shrinking, so much must be left in the nonlinear map.
+/// Part of the linear shrinking that the nonlinear map must have.
 const LEFT: f64 = 0.2;
 /// Ellipses need not shrink faster than this, however strong the damping.
 const LEAST_SHRINK: f64 = 0.3;
@@ -94,7 +94,7 @@ pub fn ellipses(
     traps
 }
 
-/// The same ellipses around the mirror image of their orbit, whose points have moved by `moved`
+/// These ellipses around the mirror image of their orbit, whose points have moved by `moved`
 /// places (see [`PeriodicOrbit::mirrored`]).
 #[must_use]
 pub fn mirrored(ellipses: &[Ellipse], moved: usize) -> Vec<Ellipse> {
@@ -220,7 +220,7 @@ impl Band {
     #[must_use]
     pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
         if strobe.angle == Angle::Line {
-            // What turns for ever there never comes back.
+            // A trajectory that turns for ever there never comes back.
             return None;
         }
         let curve = tabulate(states)?;

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::counted::{Said, said};
 use super::problem::{Columns, MOST_READINGS, Problem, Shaped, Slot};
+use super::quantised::{Likelihood, likelihood};
 use super::window::Window;
 use crate::integrate::State;
-use crate::integrate::course::Course;
-use crate::integrate::sample::sample;
+use crate::integrate::reference::problem::OdeProblem;
+use crate::integrate::reference::sample::sample;
 use crate::integrate::tangent::{Number, Tangent};
 use crate::lanes::dispatch::Register;
 use crate::lanes::pack::Bundle;
@@ -33,9 +33,9 @@ pub struct Linear {
     pub states: Vec<State>,
     /// Reading less model; 0 where a sample does not count.
     pub apart: Vec<f64>,
-    /// The same over the standard error; of a reading rounded to counts, what stands for it there.
+    /// Residuals over the standard error; of a reading rounded to counts, [`Likelihood::residual`].
     pub residuals: Vec<f64>,
-    /// One over the standard error, or what stands for it; 0 where a sample does not count.
+    /// One over the standard error, or [`Likelihood::weight`]; 0 where a sample does not count.
     pub weights: Vec<f64>,
     /// For each sample a row of derivatives of the model times that weight: by the record's
     /// columns, then by the initial angle and velocity.
@@ -73,7 +73,7 @@ impl Linear {
 #[must_use]
 pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: &Window) -> Linear {
     let directions = columns.motion.len() + 2;
-    let register = problem.path.register();
+    let register = problem.simd.register();
     let stride = directions.next_multiple_of(register.width());
     let samples = window.to - window.from;
     let mut motion = Motion {
@@ -86,7 +86,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let mut first = 0;
     while first < directions {
         let left = directions - first;
-        // The narrowest numbers that hold what is left.
+        // The narrowest numbers that hold the remaining derivatives.
         match register {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Register::Avx512(isa) => match left {
@@ -110,11 +110,11 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     follow.read(motion)
 }
 
-/// What the integrator tells of a window.
+/// The motion in a window.
 struct Motion {
     /// Angle and velocity at the samples.
     states: Vec<State>,
-    /// What the sensor is given: the same, or a rod sensor's reading and nothing.
+    /// The input of the sensor: angle and velocity, or the reading of a rod sensor and 0.
     heard: Vec<State>,
     /// Its derivatives: for each sample two rows.
     slopes: Vec<f64>,
@@ -144,32 +144,32 @@ impl Follow<'_> {
         };
         let Shaped { pendulum, gravity, rod_sensor, rate } = self.shaped;
         let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
-        let mut course =
-            Course::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
+        let mut ode =
+            OdeProblem::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
                 .watched()
                 .with_gravity(number(Slot::Gravity, *gravity));
         if let Some(recorded) = &record.recorded {
-            course = course.driven_by(Arc::clone(recorded));
+            ode = ode.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
-        // A mode of the rig asks for steps of its own, however slow the rest.
-        let rate = if course.field().sways() { rate.min(QUICKEST) } else { 1.0 };
+        // A mode of the rig needs short steps, however slow the pendulum is.
+        let rate = if ode.field().sways() { rate.min(QUICKEST) } else { 1.0 };
         let rate = rate.max(pendulum.motion().omega);
         let most =
             MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
         let begin = |of: usize| along(self.window.start[of], motion.len() + of);
         let run =
-            sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
+            sample(&ode, times[0], [begin(0), begin(1)], times, |driver, _| driver.steps < most);
         into.states.clear();
         into.heard.clear();
         let rows = into.slopes.chunks_exact_mut(2 * into.stride);
         for (k, (state, rows)) in run.states.iter().zip(rows).enumerate() {
             let given = match rod_sensor {
-                None => [run.given(&course, k), state[1]],
+                None => [run.given(&ode, k), state[1]],
                 Some(sensor) => {
                     let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
                     let moving = run.signs[k].map(|signs| (signs, run.past(k)));
-                    let reading = sensor.read(&course, times[k], *state, moving, own);
+                    let reading = sensor.read(&ode, times[k], *state, moving, own);
                     [reading, reading.like(0.0)]
                 }
             };
@@ -181,7 +181,7 @@ impl Follow<'_> {
         }
     }
 
-    /// What the sensor makes of what it is given.
+    /// The reading of the sensor, by its input.
     fn read(&self, motion: Motion) -> Linear {
         let Motion { states, heard, slopes, stride } = motion;
         let record = &self.problem.records[self.window.record];
@@ -217,7 +217,8 @@ impl Follow<'_> {
                     (weight, residual)
                 }
                 Some(counts) => {
-                    let Said { deviance, residual, weight } = said(away, counts.step, weight);
+                    let Likelihood { deviance, residual, weight } =
+                        likelihood(away, counts.step, weight);
                     chi2 += deviance - counts.surplus[sample];
                     (weight, residual)
                 }

@@ -2,10 +2,10 @@
 
 use super::record::{Record, range};
 use super::rod_sensor::RodSensor;
-use super::way::Way;
+use super::step_scale::StepScale;
 use crate::error::Error;
-use crate::integrate::course::greatest_rate;
-use crate::lanes::Path;
+use crate::integrate::reference::problem::greatest_rate;
+use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 use crate::model::effects::Action;
 
@@ -17,7 +17,7 @@ pub const MOST_READINGS: usize = 7;
 pub enum Slot {
     /// `(w0 / w_ref)^2`.
     Gravity,
-    /// That place in [`Pendulum::parameters`].
+    /// The parameter at that place in [`Pendulum::parameters`].
     Parameter(usize),
     /// [`RodSensor::bias`].
     Bias,
@@ -28,25 +28,25 @@ pub enum Slot {
 /// A free parameter.
 #[derive(Clone, Debug)]
 pub struct Free {
-    /// What it is in which records; the same number in all of them, at most once in each.
+    /// Its records and its place in each; one number for all of them, at most once in each.
     pub places: Vec<(usize, Slot)>,
     /// Where the search starts.
     pub start: f64,
 }
 
 impl Free {
-    /// Between which values it means something: the ends of an effect's parameter, else all.
+    /// The range of its values: that of the parameter of an effect, otherwise unbounded.
     fn range(&self, records: &[Record]) -> [f64; 2] {
         let of_effect = |(record, slot): &(usize, Slot)| {
             let Slot::Parameter(place) = *slot else { return None };
             let pendulum = &records[*record].pendulum;
             let (effect, own) = pendulum.owner(place)?;
-            Some(pendulum.effects[effect].kind.definition().parameters[own].range)
+            Some(pendulum.effects[effect].kind.definition().parameters.at(own).range)
         };
         self.places.first().and_then(of_effect).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
-    /// What it is in record `index`.
+    /// Its place in record `index`.
     fn slot(&self, index: usize) -> Option<Slot> {
         self.places.iter().find(|(record, _)| *record == index).map(|(_, slot)| *slot)
     }
@@ -60,13 +60,13 @@ pub struct Problem {
     /// The free parameters.
     pub free: Vec<Free>,
     /// How each of them goes along a step.
-    pub ways: Vec<Way>,
+    pub scales: Vec<StepScale>,
     /// Between which values each of them means something.
     pub ranges: Vec<[f64; 2]>,
     /// The error allowed to a step of the integrator.
     pub tolerance: f64,
     /// The instruction set that derivatives are computed with.
-    pub path: Path,
+    pub simd: InstructionSet,
 }
 
 /// A record's pendulum with values for the free parameters.
@@ -85,9 +85,9 @@ pub struct Shaped {
 /// The free parameters of one record: their places in [`Problem::free`], and what they are.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
-    /// Those that the motion depends on.
+    /// Parameters on which the motion depends.
     pub motion: Vec<(usize, Slot)>,
-    /// Those that only the reading depends on, with their place in [`Pendulum::parameters`].
+    /// Parameters on which only the reading depends, with their place in [`Pendulum::parameters`].
     pub reading: Vec<(usize, usize)>,
 }
 
@@ -111,7 +111,7 @@ impl Problem {
     /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
     /// that is not finite, a time that is not after the one before it, a negative weight, a record
     /// with fewer than 3 trusted samples, or a free parameter that its record does not have;
-    /// [`Error::Simd`] as of [`Path::choose`].
+    /// [`Error::Simd`], see [`InstructionSet::choose`].
     pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
         for record in &records {
             record.check()?;
@@ -139,9 +139,10 @@ impl Problem {
                 }
             }
         }
-        let ways = free.iter().map(|one| Way::of(one, &free, &records)).collect();
+        let scales = free.iter().map(|one| StepScale::of(one, &free, &records)).collect();
         let ranges = free.iter().map(|one| one.range(&records)).collect();
-        let problem = Self { records, free, ways, ranges, tolerance, path: Path::choose()? };
+        let problem =
+            Self { records, free, scales, ranges, tolerance, simd: InstructionSet::choose()? };
         for index in 0..problem.records.len() {
             let count = problem.columns(index).reading.len();
             if count > MOST_READINGS {
@@ -225,10 +226,10 @@ impl Shaped {
         let finite = numbers.iter().all(|(_, value)| value.is_finite());
         let in_range = self.pendulum.effects.iter().all(|effect| {
             let parameters = effect.kind.definition().parameters;
-            let fits = |(p, v): (&crate::model::effects::Parameter, &f64)| {
-                (p.range[0]..=p.range[1]).contains(v)
-            };
-            parameters.iter().zip(effect.values()).all(fits)
+            parameters
+                .iter()
+                .zip(effect.values())
+                .all(|(parameter, value)| (parameter.range[0]..=parameter.range[1]).contains(value))
         });
         let read = self.rod_sensor.is_none_or(|sensor| sensor.is_sound());
         finite && in_range && read && self.pendulum.motion().omega > 0.0 && self.gravity > 0.0

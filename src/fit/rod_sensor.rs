@@ -13,12 +13,12 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use crate::integrate::course::{Course, Past};
+use crate::integrate::reference::problem::{OdeProblem, Past};
 use crate::integrate::tangent::Number;
 use crate::lanes::Work;
 use crate::lanes::sine::Fine;
 
-/// What a sensor on the rod reads of a motion: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
+/// The reading of a sensor on the rod: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
 /// gravity sin(th + tilt) + bias`, in any unit that the readings have. A gyroscope has a rate alone,
 /// an accelerometer none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct RodSensor {
     pub place: f64,
     /// The factor on gravity's part; 0 where gravity has been taken out.
     pub gravity: f64,
-    /// What it reads of nothing.
+    /// Its reading at rest without gravity.
     pub bias: f64,
     /// The interval that a reading is the mean over, in `1 / w_ref`.
     pub interval: f64,
@@ -42,7 +42,7 @@ impl RodSensor {
     /// what was kept at the last turn, none where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
     pub fn read<N: Number>(
         &self,
-        course: &Course<N>,
+        ode: &OdeProblem<N>,
         tau: f64,
         state: [N; 2],
         moving: Option<([f64; 2], Past<N>)>,
@@ -50,7 +50,7 @@ impl RodSensor {
     ) -> N {
         let mut reading = own[0];
         let (sensor, into) = (*self, &mut reading);
-        own[0].aside(Reading { sensor, course, tau, state, moving, own, into });
+        own[0].aside(Reading { sensor, ode, tau, state, moving, own, into });
         reading
     }
     /// Whether all of it are numbers, and it shows anything.
@@ -61,10 +61,10 @@ impl RodSensor {
     }
 }
 
-/// A reading, in a function of its own.
+/// A reading, in its own function.
 struct Reading<'a, N> {
     sensor: RodSensor,
-    course: &'a Course<N>,
+    ode: &'a OdeProblem<N>,
     tau: f64,
     state: [N; 2],
     moving: Option<([f64; 2], Past<N>)>,
@@ -99,16 +99,16 @@ impl<N: Number> Reading<'_, N> {
     /// is `|th'| / |th''|` away.
     #[inline(always)]
     fn mean_acceleration(&self, [sense, side]: [f64; 2], past: Past<N>) -> N {
-        let (course, tau, state) = (self.course, self.tau, self.state);
+        let (ode, tau, state) = (self.ode, self.tau, self.state);
         let velocity = state[1];
-        let here = course.acceleration(tau, state, [sense, side], past);
+        let here = ode.acceleration(tau, state, [sense, side], past);
         let away = velocity.scale(sense);
         let reach = here.scale((0.5 * self.sensor.interval).copysign(here.value()));
-        if !course.jumps() || away.value() >= reach.value() {
+        if !ode.jumps() || away.value() >= reach.value() {
             return here;
         }
-        let past = course.turned(state[0], sense, past);
-        let mut there = course.acceleration(tau, state, [-sense, side], past);
+        let past = ode.turned(state[0], sense, past);
+        let mut there = ode.acceleration(tau, state, [-sense, side], past);
         // Before a turn the pull is against the motion; where it would be so after it, too, friction
         // holds the pendulum.
         if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {

@@ -1,10 +1,10 @@
-//! A record cut into windows, each with an initial state of its own.
+//! A record cut into windows, each with its own initial state.
 
 use super::problem::Problem;
 use super::record::Record;
 use crate::integrate::State;
 
-/// A window needs so many trusted samples to say anything about the parameters.
+/// Least number of trusted samples of a window that determines parameters.
 const FEWEST: usize = 8;
 /// The initial state comes from a cubic through the readings within this time on either side; at an
 /// end of the record, where a cubic's slope is uncertain, from a parabola over twice the time.
@@ -13,7 +13,7 @@ const REACH: f64 = 0.5;
 /// A stretch of a record, from sample `from` to before sample `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Of which record.
+    /// Its record.
     pub record: usize,
     /// Its first sample.
     pub from: usize,

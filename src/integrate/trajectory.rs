@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
-use super::course::{Course, FINEST};
-use super::event::{Event, EventKind};
-use super::sample::{Sampled, sample};
-use super::stroboscopic::State;
+use super::kernel::stroboscopic::State;
+use super::reference::event::{Event, EventKind};
+use super::reference::problem::{FINEST, OdeProblem};
+use super::reference::sample::{Sampled, sample};
 use super::tangent::{Number, Tangent};
 use crate::error::Error;
 use crate::memory;
@@ -16,7 +16,7 @@ use crate::model::Pendulum;
 
 /// The first error of a step tried, over the tolerance.
 const FIRST_TRY: f64 = 0.1;
-/// By how much a step's error is tightened to see what that changes.
+/// Factor by which the error of a step is tightened to measure the effect on the result.
 const TIGHTENING: f64 = 16.0;
 /// Errors below this may be those of rounding, amplified by the motion.
 const ROUNDING: f64 = 1e-7;
@@ -43,7 +43,7 @@ pub struct Trajectory {
     /// Distance that a 16 times smaller error of each step makes after five periods, or at the end
     /// if that is sooner.
     pub reached_error: f64,
-    /// The same at the end.
+    /// The error at the end.
     pub end_error: f64,
     /// Steps a period, on average.
     pub steps: usize,
@@ -58,7 +58,7 @@ pub struct Trajectory {
     pub interrupted: bool,
 }
 
-/// What to compute.
+/// A request for a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     /// Angle and velocity at `tau = 0`.
@@ -88,11 +88,11 @@ pub fn simulate(
     if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
 }
 
-/// The same, and each sample is shown to `seen`, with its time, as soon as it is known. If `cancel` is
-/// set after the first of them the trajectory ends with the last one.
+/// Computes a trajectory and shows each sample, with its time, to `seen` as soon as it is known. If
+/// `cancel` is set after the first sample, the trajectory ends with the last one.
 ///
 /// # Errors
-/// As of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
+/// Those of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
 pub fn simulate_watched(
     pendulum: &Pendulum,
     request: &Request,
@@ -154,12 +154,12 @@ fn from(
         return Err(Error::Diverges);
     }
     let last = time[time.len() - 1];
-    // What the last, unfinished step met lies beyond the last sample.
+    // Events of the last, unfinished step lie beyond the last sample.
     run.events.retain(|event| !interrupted || event.tau <= last);
     let coarse = Run::to(pendulum, request, &[last], TIGHTENING * tolerance, cancel, &mut |_| ());
     let unknown = cancel.load(Ordering::Relaxed);
     let periods = last / pendulum.period();
-    // What is held for ever neither parts nor comes together any more.
+    // States that are held for ever neither diverge nor converge.
     let held = run.events.last().is_some_and(|e| e.kind == EventKind::StuckForEver);
     Ok(Trajectory {
         theta: run.states.iter().map(|state| state[0]).collect(),
@@ -253,14 +253,14 @@ impl Run {
         cancel: &AtomicBool,
         show: Show<'_>,
     ) -> Self {
-        let course = Course::new(pendulum, true, tolerance, |_, value| value).watched();
-        sample(&course, 0.0, request.start, times, |_, new| {
+        let ode = OdeProblem::new(pendulum, true, tolerance, |_, value| value).watched();
+        sample(&ode, 0.0, request.start, times, |_, new| {
             show(&mut new.iter().copied());
             !cancel.load(Ordering::Relaxed)
         })
     }
 
-    /// The same with the growth of a tangent from sample to sample, as logarithms.
+    /// The samples, and the growth of a tangent from sample to sample, as logarithms.
     fn stretched(
         pendulum: &Pendulum,
         request: &Request,
@@ -270,17 +270,17 @@ impl Run {
         show: Show<'_>,
     ) -> (Self, Vec<f64>) {
         let constant = |_, value| Tangent::<f64, 1>::constant(value);
-        let course = Course::new(pendulum, true, tolerance, constant).watched();
+        let ode = OdeProblem::new(pendulum, true, tolerance, constant).watched();
         let start = request.start.map(|value| Tangent { value, slope: [FRAC_1_SQRT_2] });
         let (mut lengths, mut scale) = (vec![0.0], 0.0);
-        let run = sample(&course, 0.0, start, times, |flight, new| {
+        let run = sample(&ode, 0.0, start, times, |driver, new| {
             show(&mut new.iter().map(|state| state.map(Number::value)));
             lengths.extend(new.iter().map(|state| scale + length(state).ln()));
             // Held near 1, so that it neither overflows nor vanishes.
-            let now = length(&flight.state);
+            let now = length(&driver.state);
             if now > 0.0 && now.is_finite() {
                 scale += now.ln();
-                flight.scale_derivatives(1.0 / now);
+                driver.scale_derivatives(1.0 / now);
             }
             !cancel.load(Ordering::Relaxed)
         });

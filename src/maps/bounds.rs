@@ -1,4 +1,4 @@
-//! How many periods a trajectory is given to settle.
+//! Numbers of periods within which a trajectory must settle.
 //!
 //! Motions settle at the pace of the damping, so each bound is the time in which it shrinks a free motion
 //! by some power of e, within limits.
@@ -6,20 +6,20 @@
 use crate::attractor::Effort;
 use crate::model::Pendulum;
 
-/// Least bound of a start, in periods: what resonances and transient chaos take under strong damping.
+/// Least bound of a start, in periods: resonances and transient chaos last as long under strong damping.
 pub const LEAST: u32 = 4000;
 /// Greatest bound, in periods.
 const MOST: f64 = 1e6;
 /// Damping shrinks a free motion by `exp(-DECAY)` within the bound of a start.
 const DECAY: f64 = 200.0;
-/// The same of a cell of a map over parameters, and its least bound.
+/// These numbers for a cell of a map over parameters, and its least bound.
 const CELL: (f64, f64) = (40.0, 64.0);
-/// The part of a start's bound after which a search begins to watch what is left.
+/// Part of the bound of a start after which a search begins to watch uncaptured trajectories.
 const SEARCHED: u32 = 4;
 
 /// Periods in which damping shrinks a free motion by `exp(-decay)`, `2 decay / (gamma T)`, within limits.
 ///
-/// Of dry friction alone the same with `theta_r` for `gamma`, its pace at velocities near 1.
+/// Under dry friction alone `theta_r` replaces `gamma`: its rate at velocities near 1.
 fn shrinking(pendulum: &Pendulum, decay: f64, least: f64) -> u32 {
     let rate = pendulum.damping_rate();
     let periods = if rate > 0.0 { 2.0 * decay / (rate * pendulum.period()) } else { 0.0 };
@@ -32,7 +32,7 @@ pub fn max_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, DECAY, f64::from(LEAST))
 }
 
-/// Periods after which a cell of a map over parameters begins to watch what is left, where none are
+/// Periods after which a cell of a map over parameters begins to watch uncaptured trajectories, where none are
 /// given.
 #[must_use]
 pub fn cell_periods(pendulum: &Pendulum) -> u32 {
@@ -40,7 +40,7 @@ pub fn cell_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, decay, least)
 }
 
-/// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
+/// Periods after which a search begins to watch uncaptured trajectories, whatever bound is set for the starts:
 /// what counts as chaos does not depend on it.
 #[must_use]
 pub fn search_periods(pendulum: &Pendulum) -> u32 {

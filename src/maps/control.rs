@@ -1,4 +1,4 @@
-//! What a long computation shares with whoever waits for it: how far it is, and whether to stop.
+//! Progress and cancellation of a long computation, and its threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -30,12 +30,14 @@ impl Control {
         (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
     }
 
-    pub(crate) fn begin(&self, total: usize) {
+    /// Begins a part of `total` cells.
+    pub fn begin(&self, total: usize) {
         self.done.store(0, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
     }
 
-    pub(crate) fn add(&self, count: usize) {
+    /// Counts `count` cells as done.
+    pub fn add(&self, count: usize) {
         self.done.fetch_add(count, Ordering::Relaxed);
     }
 

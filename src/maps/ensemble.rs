@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::control::Control;
-use super::growth::Bundle;
+use super::tangent_growth::Bundle;
 use crate::attractor::chaos::mean_and_error;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
@@ -39,7 +39,7 @@ pub struct Ensemble {
     pub sum: (f64, f64),
 }
 
-/// What an ensemble is followed with.
+/// The arguments of an ensemble.
 pub(super) struct Run<'a> {
     pub(super) strobe: &'a Strobe,
     /// Standard error over the exponent that it goes on for.

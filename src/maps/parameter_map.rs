@@ -13,7 +13,7 @@ use super::resolution::Resolution;
 use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::State;
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::Pendulum;
 
@@ -24,9 +24,9 @@ const COARSEST: usize = 8;
 const EXCHANGES: [usize; 3] = [8, 4, 2];
 /// Passes between next neighbours at the most; they end where no cell has gained an attractor.
 const MOST_PASSES: usize = 64;
-/// Bytes of a cell: its attractors, and the arrays that they become ...
+/// Bytes of a cell: its attractors, and their arrays.
 const EACH: usize = 4096;
-/// ... and of each point that is kept of those that do not close.
+/// Bytes of each point kept of an attractor that does not close.
 const ROOM: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
@@ -40,7 +40,7 @@ pub struct Range {
     pub values: Vec<f64>,
 }
 
-/// What to compute, and how well.
+/// A request and its numerical choices.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// The parameters of columns and rows.
@@ -74,7 +74,7 @@ pub struct ParameterMap {
 /// A grid of pendulums.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane<'a> {
-    /// What does not vary.
+    /// The parameters that do not vary.
     pub base: &'a Pendulum,
     /// Columns and rows.
     pub axes: &'a [Range; 2],
@@ -110,7 +110,7 @@ impl Plane<'_> {
         pendulum
     }
 
-    /// Those cells at the distance `stride` in both directions, or in one, that exist.
+    /// The existing cells at the distance `stride` in both directions, or in one.
     fn neighbours(&self, cell: usize, stride: usize, diagonal: bool) -> Vec<usize> {
         let [columns, rows] = self.size();
         let [i, j] = self.place(cell);
@@ -150,8 +150,8 @@ pub fn parameter_map(
     (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
     let pool = pool(request.threads)?;
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);
-    let path = Path::choose()?;
-    let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, path))?;
+    let simd = InstructionSet::choose()?;
+    let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, simd))?;
     let &Request { each, bound, kept, .. } = request;
     let search = Search { starts: request.starts.clone(), each, bound, kept };
     let strobe = |cell: usize| resolution.strobe(&plane.pendulum(cell), plane.place(cell));

@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::chebyshev::{Interpolant, Values};
-use super::continued;
+use super::continuation;
 use super::control::{Control, pool};
 use crate::error::Error;
 use crate::model::Pendulum;
@@ -52,7 +52,7 @@ impl Balance {
     }
 }
 
-/// What happens at a critical amplitude. Under a torque the orbit that continues rest ceases where its
+/// A critical amplitude. Under a torque the orbit that continues rest ceases where its
 /// multiplier is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
@@ -125,7 +125,7 @@ pub fn tongues(
             let moved = pendulum.torque != 0.0;
             let mut curve = along(&level, balance, *omega, p_max, folds && !moved);
             if moved {
-                curve = continued::curve(pendulum, balance, &curve, p_max);
+                curve = continuation::curve(pendulum, balance, &curve, p_max);
             }
             control.add(1);
             Ok(curve)
@@ -134,7 +134,7 @@ pub fn tongues(
     })
 }
 
-/// The same pendulum under another drive.
+/// This pendulum under another drive.
 pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     let mut other = pendulum.clone();
     (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);

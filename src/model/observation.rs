@@ -1,4 +1,4 @@
-//! What the sensor makes of the angle and of how fast it passes. The motion does not depend on it, so maps leave it out.
+//! The reading of the sensor, by angle and velocity. The motion does not depend on it: maps leave it out.
 
 use super::effects::{Action, Kind, MOST_PARAMETERS};
 use super::pendulum::Pendulum;
@@ -11,7 +11,7 @@ pub struct Observation<R> {
 }
 
 impl<R: Real> Observation<R> {
-    /// Of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
+    /// The observation of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
     /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
     pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
         let mut first = Pendulum::OWN_PARAMETERS;
@@ -23,7 +23,7 @@ impl<R: Real> Observation<R> {
                     index += 1;
                     number(index - 1, value)
                 });
-                readings.push((effect.kind, parameters));
+                readings.push((effect.kind.clone(), parameters));
             }
             first += effect.values().len();
         }

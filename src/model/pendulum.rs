@@ -40,7 +40,7 @@ pub enum Symmetry {
 pub enum Route {
     /// Torques of angle and time, viscous damping: Runge-Kutta-Nystrom.
     Smooth,
-    /// The same with a friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
+    /// A friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
     Friction,
     /// Torques of the velocity: Runge-Kutta, with events where something changes with its sign.
     General,
@@ -67,7 +67,7 @@ impl Pendulum {
         Ok(Self { gamma, drive, torque, theta_r: 0.0, effects: Vec::new(), lab_time: 0.0 })
     }
 
-    /// The same with Coulomb friction.
+    /// This pendulum with Coulomb friction.
     ///
     /// # Errors
     /// [`Error::Range`] if it is negative or not finite.
@@ -79,7 +79,7 @@ impl Pendulum {
         Ok(self)
     }
 
-    /// The same with one effect more.
+    /// This pendulum with one effect more.
     ///
     /// Viscous damping, Coulomb friction and a bias torque become `gamma`, `theta_r` and `torque`:
     /// they are the same effects under the paper's names.
@@ -87,7 +87,7 @@ impl Pendulum {
     /// # Errors
     /// [`Error::Twice`] if it is there already.
     pub fn with_effect(mut self, effect: Effect) -> Result<Self, Error> {
-        let name = effect.kind.definition().name;
+        let name = effect.kind.definition().name.to_owned();
         let place = match effect.kind {
             Kind::ViscousDamping => Some(("gamma", &mut self.gamma)),
             Kind::CoulombFriction => Some(("theta_r", &mut self.theta_r)),
@@ -96,14 +96,14 @@ impl Pendulum {
         };
         if let Some((other, slot)) = place {
             if *slot != 0.0 {
-                return Err(Error::Twice { name, other });
+                return Err(Error::Twice { name, other: other.to_owned() });
             }
             *slot = effect.parameters[0];
             return Ok(self);
         }
         let several = effect.kind == Kind::BearingHarmonic;
         if !several && self.effects.iter().any(|e| e.kind.definition().name == name) {
-            return Err(Error::Twice { name, other: name });
+            return Err(Error::Twice { other: name.clone(), name });
         }
         self.effects.push(effect);
         if self.effects.iter().filter(|e| e.has_corner()).count() > 1 {
@@ -192,10 +192,7 @@ impl Pendulum {
     /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
     #[must_use]
     pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
-        let equation = self.equation();
-        let forcing = equation.forcing(tau);
-        let at = equation.point(&forcing, theta, velocity, 1_f64.copysign(velocity));
-        equation.acceleration(&forcing, &at)
+        self.equation().acceleration_at(tau, theta, velocity)
     }
 
     /// The pivot's motion with all that effects add to it.
@@ -210,7 +207,7 @@ impl Pendulum {
         let motion = self.motion();
         let (mut own, mut further) = (1.0, 1.0);
         for effect in self.effects.iter().filter(|e| e.is(&[Action::Driven])) {
-            // What drifts acts on gravity as on the drive.
+            // A drift acts on gravity and on the drive alike.
             let drifts = effect.kind.definition().mappable == Mappable::Frozen;
             let share = effect.parameters[0].abs() * if drifts { self.lab_time.abs() } else { 1.0 };
             further += share;
@@ -331,7 +328,8 @@ impl Pendulum {
         for effect in &self.effects {
             let why = effect.kind.bars_maps(&effect.parameters);
             if let Some(why) = why.filter(|why| !(bounded && *why == NOT_PERIODIC)) {
-                return Err(Error::NotMappable { effect: effect.kind.definition().name, why });
+                let effect = effect.kind.definition().name.to_owned();
+                return Err(Error::NotMappable { effect, why });
             }
         }
         Ok(())
@@ -343,7 +341,7 @@ impl Pendulum {
         let mut shortest = self.period();
         for effect in &self.effects {
             for (value, parameter) in
-                effect.values().iter().zip(effect.kind.definition().parameters)
+                effect.values().iter().zip(effect.kind.definition().parameters.iter())
             {
                 shortest = match parameter.role {
                     Role::Frequency => shortest.min(TAU / value.abs()),

@@ -6,7 +6,7 @@
 use super::spline::Spline;
 use crate::error::Error;
 
-/// What of the motion was recorded.
+/// The recorded quantity of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Where the pivot is.
@@ -20,7 +20,7 @@ pub enum Quantity {
 /// Samples of one component of the motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// What they are.
+    /// Their quantity.
     pub quantity: Quantity,
     /// One for each time.
     pub values: &'a [f64],
@@ -40,7 +40,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// From samples at `times` of the upward motion, the motion toward positive theta, or both.
+    /// The motion from samples at `times` of the upward motion, the motion toward positive theta, or both.
     ///
     /// # Errors
     /// [`Error::Range`] for a number that is not finite, a time that is not after the one before it,

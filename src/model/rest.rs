@@ -21,11 +21,11 @@ const HALVINGS: usize = 60;
 /// Steps of the golden section.
 const SECTIONS: usize = 45;
 
-/// What loads a pendulum at rest.
+/// The load of a pendulum at rest.
 pub trait Load {
-    /// The load at rest, and what it must exceed to move the pendulum.
+    /// The load at rest, and the friction that it must exceed to move the pendulum.
     fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2];
-    /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
+    /// The excess of the load at rest over the friction that holds the pendulum against moving in the sense
     /// `sense`; it stays at rest while this is not positive for either sense.
     fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
         let [load, hold] = self.load_and_hold(tau, theta);
@@ -64,7 +64,7 @@ impl Load for Equation<f64> {
 }
 
 impl Equation<f64> {
-    /// What a drive without sideways motion does where its vertical factor is known.
+    /// The drive without sideways motion, by its vertical factor.
     fn at_rest(&self, vertical: f64) -> Forcing<f64> {
         self.pushed(vertical, 0.0, 0.0)
     }
@@ -75,14 +75,14 @@ impl Equation<f64> {
         self.excess(theta) <= EDGE * self.hold(theta)
     }
 
-    /// What a load must exceed to move the pendulum from `theta`, at `tau = 0`.
+    /// The friction that a load must exceed to move the pendulum from `theta`, at `tau = 0`.
     #[must_use]
     pub fn hold(&self, theta: f64) -> f64 {
         let forcing = self.forcing(0.0);
         self.friction(&self.point(&forcing, theta, 0.0, 1.0)).max(0.0)
     }
 
-    /// By how much the load at rest at `theta` exceeds the friction at its greatest, over the drive's
+    /// The greatest excess of the load at rest at `theta` over the friction, over the drive's
     /// period; negative where it never does.
     #[must_use]
     pub fn excess(&self, theta: f64) -> f64 {

@@ -1,12 +1,12 @@
-//! Running states without drive: closed on the angle section, with a period of their own.
+//! Running states without drive: closed on the angle section, with their own period.
 
 use std::f64::consts::TAU;
 
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
-use crate::integrate::flow::{Arrival, Flow};
-use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
+use crate::integrate::kernel::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
+use crate::integrate::reference::flow::{Arrival, Flow};
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
 use crate::model::pendulum::Route;
@@ -71,7 +71,7 @@ fn carry(
     ([theta.value, velocity.value], Matrix2::new(a, b, c, d))
 }
 
-/// From `theta = 0` with `velocity` once round; `None` if the pendulum turns back first.
+/// One turn from `theta = 0` with `velocity`; `None` if the pendulum turns back first.
 fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Option<Turn> {
     let sense = velocity.signum();
     let goal = sense * TAU;

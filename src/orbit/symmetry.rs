@@ -3,7 +3,7 @@
 use super::newton::{self, PeriodicOrbit};
 use super::poincare::PoincareMap;
 use crate::integrate::State;
-use crate::integrate::flow::Flow;
+use crate::integrate::reference::flow::Flow;
 use crate::model::pendulum::Symmetry;
 use crate::model::{Angle, Pendulum};
 
@@ -21,7 +21,7 @@ pub struct Mirror {
 }
 
 impl Mirror {
-    /// Of `pendulum`; none where it has no such symmetry.
+    /// The symmetry of `pendulum`; none where it has no such symmetry.
     #[must_use]
     pub fn of(pendulum: &Pendulum) -> Option<Self> {
         let half = match pendulum.symmetry()? {

@@ -1,9 +1,12 @@
-//! What several results have: arrays, and attractors.
+//! Arrays, states and attractors, which several results have.
 
-use numpy::{Element, IntoPyArray, PyArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
+use pendmap::attractor;
+use pendmap::error::Error;
+use pendmap::integrate::State;
 use pyo3::prelude::*;
 
-use crate::attractor;
+use super::raise;
 
 /// An array of one dimension.
 pub type Array<T> = Py<PyArray1<T>>;
@@ -11,6 +14,19 @@ pub type Array<T> = Py<PyArray1<T>>;
 /// The array that takes over `values`.
 pub fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Array<T> {
     values.into_pyarray(py).unbind()
+}
+
+/// The states of which `theta` and `velocity` are the components.
+pub fn states(
+    theta: &PyReadonlyArray1<'_, f64>,
+    velocity: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Vec<State>> {
+    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
+    if theta.len() != velocity.len() {
+        let given = (theta.len(), velocity.len());
+        return Err(raise(Error::Lengths { given, names: ("theta", "velocity") }));
+    }
+    Ok(theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect())
 }
 
 /// An attractor, or a closed orbit.

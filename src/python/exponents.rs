@@ -1,20 +1,18 @@
 //! Bindings of Lyapunov exponents.
 
 use numpy::{PyArray2, PyReadonlyArray1};
+use pendmap::attractor::Attractor as Found;
+use pendmap::maps::control::pool;
+use pendmap::maps::ensemble::{self, WINDOW};
+use pendmap::maps::lyapunov::{End, Request, lyapunov as exponent_of};
+use pendmap::maps::tangent_growth::Bundle;
 use pyo3::prelude::*;
 
-use super::convert::{Array, Attractor, array};
+use super::convert::{Array, Attractor, array, states};
+use super::long_calls::watched;
 use super::model::Model;
-use super::watch::watched;
-use crate::attractor::Attractor as Found;
-use crate::error::Error;
-use crate::integrate::{State, Strobe};
-use crate::lanes::Path;
-use crate::maps::control::pool;
-use crate::maps::ensemble::{self, WINDOW};
-use crate::maps::growth::Bundle;
-use crate::maps::lyapunov::{End, Request, lyapunov as exponent_of};
-use crate::memory;
+use super::motion::strobe;
+use super::{raise, reckon};
 
 /// Numerical choices as Python hands them over.
 #[derive(FromPyObject)]
@@ -108,12 +106,12 @@ pub fn lyapunov(
         attractor: attractor.map(|a| Py::new(py, a)).transpose()?,
         transient: found.transient,
         lost: found.lost,
-        course: array(py, found.course),
+        course: array(py, found.growth),
         bound: found.bound,
         chaos_bound: found.chaos_bound,
         steps_per_period: found.steps,
         reached_error: found.reached_error,
-        simd: found.path.name(),
+        simd: found.simd.name(),
         window: WINDOW,
         ensemble,
     })
@@ -135,21 +133,12 @@ pub fn growth<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let pendulum = model.pendulum()?;
-    pendulum.check_mappable()?;
-    if steps_per_period == 0 {
-        let allowed = "1 or more";
-        return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
-    }
-    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
-    if theta.len() != velocity.len() {
-        let given = (theta.len(), velocity.len());
-        return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
-    }
+    pendulum.check_mappable().map_err(raise)?;
+    let strobe = strobe(&pendulum, steps_per_period)?;
+    let states = states(&theta, &velocity)?;
     // A row of windows for each start, and the array of all.
-    memory::reckon("starts", theta.len(), 16 * windows.saturating_add(8))?;
-    let states: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
-    let strobe = Strobe::new(&pendulum, steps_per_period, Path::choose()?);
-    let pool = pool(threads)?;
+    reckon("starts", states.len(), 16 * windows.saturating_add(8))?;
+    let pool = pool(threads).map_err(raise)?;
     let rows = watched(py, progress.as_ref(), |control| {
         control.begin(states.len());
         Bundle::new(&states).grow(&strobe, windows, window, &pool, control)

@@ -4,23 +4,22 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pendmap::error::Error;
+use pendmap::fit::levenberg_marquardt::Point;
+use pendmap::fit::normal::linearised;
+use pendmap::fit::profile::intervals;
+use pendmap::fit::replay::replay as replayed;
+use pendmap::fit::window::Window;
+use pendmap::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
+use pendmap::model::Recorded;
+use pendmap::model::recorded::{Quantity, Samples};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::convert::{Array, array};
+use super::convert::{Array, array, states};
+use super::long_calls::pooled;
 use super::model::Model;
-use super::watch::pooled;
-use crate::error::Error;
-use crate::fit::descent::Point;
-use crate::fit::normal::linearised;
-use crate::fit::profile::intervals;
-use crate::fit::replay::replay as replayed;
-use crate::fit::window::Window;
-use crate::fit::{Counts, Free, Problem, Record, RodSensor, Settings, Slot, fit};
-use crate::integrate::State;
-use crate::memory;
-use crate::model::Recorded;
-use crate::model::recorded::{Quantity, Samples};
+use super::{raise, reckon};
 
 /// Bytes of a reading that is made: its state, itself in a row, and in the array of all.
 const EACH_READING: usize = 40;
@@ -57,7 +56,7 @@ impl Pivot<'_> {
         let (vertical, horizontal) = (slice(&self.vertical)?, slice(&self.horizontal)?);
         let vertical = vertical.as_deref().map(|values| Samples { quantity, values });
         let horizontal = horizontal.as_deref().map(|values| Samples { quantity, values });
-        Ok(Recorded::new(self.time.as_slice()?, vertical, horizontal)?)
+        Recorded::new(self.time.as_slice()?, vertical, horizontal).map_err(raise)
     }
 }
 
@@ -101,7 +100,8 @@ impl Run<'_> {
                 tilt: 0.0,
             });
         let weights = self.weight.as_slice()?.to_vec();
-        let counts = self.count.map(|step| Counts::new(step, &weights)).transpose()?;
+        let counts =
+            self.count.map(|step| Counts::new(step, &weights)).transpose().map_err(raise)?;
         Ok(Record {
             pendulum: self.model.pendulum()?,
             recorded: recorded.map(Arc::new),
@@ -148,8 +148,8 @@ fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<P
         let places = places.iter().map(slot).collect::<Result<_, Error>>()?;
         Ok(Free { places, start: *start })
     });
-    let free = free.collect::<Result<_, Error>>()?;
-    Ok(Problem::new(records, free, tolerance)?)
+    let free = free.collect::<Result<_, Error>>();
+    free.and_then(|free| Problem::new(records, free, tolerance)).map_err(raise)
 }
 
 fn windows(given: Vec<WindowTuple>, problem: &Problem) -> PyResult<Vec<Window>> {
@@ -173,9 +173,9 @@ pub struct FitPoint {
     chi2: f64,
     samples: usize,
     degrees: usize,
-    /// Half the curvature of the sum of squares by the free parameters, the states following ...
+    /// Half the curvature of the sum of squares by the free parameters, the states following.
     information: Py<PyArray2<f64>>,
-    /// ... and half its slope.
+    /// Half the slope of the sum of squares.
     pull: Array<f64>,
     windows: Vec<WindowTuple>,
     runs: Vec<Py<FittedRun>>,
@@ -185,7 +185,7 @@ pub struct FitPoint {
 #[pyclass(frozen, get_all, extends = FitPoint, module = "pendmap._core")]
 pub struct Fit {
     covariance: Py<PyArray2<f64>>,
-    /// Of the profiled parameters.
+    /// Intervals of the profiled parameters.
     intervals: Vec<(f64, f64)>,
     widening: f64,
     steps: usize,
@@ -209,8 +209,8 @@ pub struct FittedRun {
 pub struct WindowRows {
     /// The free parameters of its record.
     free: Vec<usize>,
-    /// Of each sample the derivatives of the model, times its weight, by these parameters and by the
-    /// initial angle and velocity.
+    /// Derivatives of the model at each sample, times its weight, by these parameters and by the initial
+    /// angle and velocity.
     rows: Py<PyArray2<f64>>,
     residuals: Array<f64>,
     weights: Array<f64>,
@@ -325,7 +325,7 @@ pub fn fit_rows(
     each.collect()
 }
 
-/// What a record's sensor of the angle would have read at `times` from each start, all at the first of
+/// Readings of the record's sensor of the angle at `times` from each start, all at the first of
 /// these: a row for each.
 #[pyfunction]
 #[pyo3(signature = (run, theta, velocity, times, tolerance, threads, progress=None))]
@@ -341,14 +341,9 @@ pub fn replay<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let record = run.record()?;
-    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
-    if theta.len() != velocity.len() {
-        let given = (theta.len(), velocity.len());
-        return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
-    }
-    let starts: Vec<State> = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
+    let starts = states(&theta, &velocity)?;
     let times = times.as_slice()?.to_vec();
-    memory::reckon("readings", starts.len().saturating_mul(times.len()), EACH_READING)?;
+    reckon("readings", starts.len().saturating_mul(times.len()), EACH_READING)?;
     let all = pooled(py, threads, progress.as_ref(), |control| {
         control.begin(starts.len());
         let done = || control.add(1);

@@ -1,19 +1,20 @@
 //! The library of effects, as Python sees it.
 
+use pendmap::model::Kind;
+use pendmap::model::effects::{Definition as Of, Parameter as OfParameter, Power, Role};
 use pyo3::prelude::*;
 
 use super::model::GivenFormula;
-use crate::model::Kind;
-use crate::model::effects::{Definition as Of, Parameter as OfParameter, Power, Role};
+use super::raise;
 
 /// An effect, as a dictionary.
 #[derive(IntoPyObject)]
 pub struct Definition {
-    name: &'static str,
+    name: String,
     group: &'static str,
     family: &'static str,
-    formula: &'static str,
-    revealed_by: &'static str,
+    formula: String,
+    revealed_by: String,
     mappable: &'static str,
     parameters: Vec<Parameter>,
 }
@@ -21,15 +22,15 @@ pub struct Definition {
 /// A parameter of an effect, as a dictionary.
 #[derive(IntoPyObject)]
 struct Parameter {
-    name: &'static str,
+    name: String,
     role: &'static str,
-    unit: &'static str,
+    unit: String,
     power_of_w0: Number,
     /// The parameter whose value is subtracted from the power.
-    power_of_w0_less: Option<&'static str>,
+    power_of_w0_less: Option<String>,
     range: [f64; 2],
     typical: [f64; 2],
-    meaning: &'static str,
+    meaning: String,
 }
 
 /// A whole number, or any.
@@ -39,31 +40,33 @@ enum Number {
     Real(f64),
 }
 
-impl From<&'static Of> for Definition {
-    fn from(own: &'static Of) -> Self {
-        let parameter = |parameter: &OfParameter| {
+impl From<Of<'_>> for Definition {
+    fn from(own: Of<'_>) -> Self {
+        let parameter = |parameter: OfParameter| {
             let (power_of_w0, less) = match parameter.power {
                 Power::Of(power) => (Number::Whole(power), None),
                 Power::Real(power) => (Number::Real(power), None),
-                Power::TwoMinus(place) => (Number::Whole(2), Some(own.parameters[place].name)),
+                Power::TwoMinus(place) => {
+                    (Number::Whole(2), Some(own.parameters.at(place).name.to_owned()))
+                }
             };
             Parameter {
-                name: parameter.name,
+                name: parameter.name.to_owned(),
                 role: parameter.role.words(),
-                unit: parameter.unit,
+                unit: parameter.unit.to_owned(),
                 power_of_w0,
                 power_of_w0_less: less,
                 range: parameter.range,
                 typical: parameter.typical,
-                meaning: parameter.meaning,
+                meaning: parameter.meaning.to_owned(),
             }
         };
         Self {
-            name: own.name,
+            name: own.name.to_owned(),
             group: own.group.word(),
             family: own.family.words(),
-            formula: own.formula,
-            revealed_by: own.revealed_by,
+            formula: own.formula.to_owned(),
+            revealed_by: own.revealed_by.to_owned(),
             mappable: own.mappable.word(),
             parameters: own.parameters.iter().map(parameter).collect(),
         }
@@ -86,6 +89,6 @@ pub fn roles() -> Vec<&'static str> {
 /// parameter.
 #[pyfunction]
 pub fn formula(given: GivenFormula) -> PyResult<(Definition, bool)> {
-    let formula = given.formula()?;
+    let formula = given.formula().map_err(raise)?;
     Ok((formula.definition().into(), formula.is_proportional()))
 }

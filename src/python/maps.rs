@@ -1,21 +1,27 @@
 //! Bindings of `maps`.
 
 use numpy::PyReadonlyArray1;
+use pendmap::error::Error;
+use pendmap::maps::basin_entropy::{Texture as Entropies, of_cells};
+use pendmap::maps::basins::{BasinMap as Found, Labelling, Options, basins};
+use pendmap::maps::control::pool;
+use pendmap::maps::starts::{Axis, Starts};
+use pendmap::maps::uncertainty::Uncertainty;
 use pyo3::prelude::*;
 
-use super::convert::{Array, Attractor, array};
+use super::convert::{Array, Attractor, array, states};
+use super::long_calls::watched;
 use super::model::Model;
-use super::watch::watched;
-use crate::error::Error;
-use crate::maps::basins::{BasinMap as Found, Options, Plane, basins};
-use crate::maps::control::pool;
-use crate::maps::starts::{Axis, Starts};
-use crate::maps::texture::{Texture as Entropies, of_cells};
-use crate::maps::uncertainty::Uncertainty;
-use crate::memory;
+use super::{raise, reckon};
 
 /// `(low, high, count)` as Python hands it over.
 pub type AxisTuple = (f64, f64, usize);
+
+/// The axes of a grid of starts.
+pub fn axes(theta: AxisTuple, velocity: AxisTuple) -> PyResult<[Axis; 2]> {
+    let axis = |name, (low, high, count)| Axis::new(name, low, high, count).map_err(raise);
+    Ok([axis("theta", theta)?, axis("velocity", velocity)?])
+}
 
 /// Numerical choices as Python hands them over.
 #[derive(FromPyObject)]
@@ -101,13 +107,13 @@ impl BasinMap {
         let Uncertainty { eps, uncertain, tried } = map.uncertainty.clone().unwrap_or_default();
         Ok(Self {
             attractors: attractors.collect::<PyResult<_>>()?,
-            undecided: if map.plane == Plane::Conservative { 1.0 } else { map.share(0) },
+            undecided: if map.labelling == Labelling::Conservative { 1.0 } else { map.share(0) },
             failed: map.share(-1),
             mean_periods: map.mean_periods(),
-            plane: match map.plane {
-                Plane::Basins => "basins",
-                Plane::Conservative => "conservative",
-                Plane::OnlyChaos => "only_chaos",
+            plane: match map.labelling {
+                Labelling::Basins => "basins",
+                Labelling::Conservative => "conservative",
+                Labelling::OnlyChaos => "only_chaos",
             },
             chaos_bound: map.chaos_bound,
             searched_starts: map.searched,
@@ -115,7 +121,7 @@ impl BasinMap {
             bound: map.bound,
             steps_per_period: map.steps,
             reached_error: map.reached_error,
-            simd: map.path.name(),
+            simd: map.simd.name(),
             texture: Py::new(py, Texture::new(&map.texture))?,
             uncertainty_eps: array(py, eps),
             uncertain: array(py, uncertain),
@@ -143,8 +149,7 @@ pub fn basins_grid(
     choices: Choices,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BasinMap> {
-    let theta = Axis::new("theta", theta.0, theta.1, theta.2)?;
-    let velocity = Axis::new("velocity", velocity.0, velocity.1, velocity.2)?;
+    let [theta, velocity] = axes(theta, velocity)?;
     run(py, model, Starts::Grid { theta, velocity }, choices, progress)
 }
 
@@ -159,18 +164,13 @@ pub fn basins_list(
     choices: Choices,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BasinMap> {
-    let (theta, velocity) = (theta.as_slice()?, velocity.as_slice()?);
-    if theta.len() != velocity.len() {
-        let given = (theta.len(), velocity.len());
-        return Err(Error::Lengths { given, names: ("theta", "velocity") }.into());
-    }
-    if let Some(value) = theta.iter().chain(velocity).find(|x| !x.is_finite()) {
+    let states = states(&theta, &velocity)?;
+    if let Some(value) = states.iter().flatten().find(|x| !x.is_finite()) {
         let allowed = "a finite number";
-        return Err(Error::Range { name: "start", value: *value, allowed }.into());
+        return Err(raise(Error::Range { name: "start", value: *value, allowed }));
     }
     // Angle and velocity, and all that a map and its dataset have of a start.
-    memory::reckon("starts", theta.len(), 100)?;
-    let states = theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect();
+    reckon("starts", states.len(), 100)?;
     run(py, model, Starts::List(states), choices, progress)
 }
 

@@ -1,12 +1,15 @@
 //! A model as Python hands it over: a `pendmap.Pendulum`, read by its attributes.
 
+use std::sync::Arc;
+
+use pendmap::error::Error;
+use pendmap::maps::parameter_map::Range;
+use pendmap::model::effects::Role;
+use pendmap::model::formula::{ParameterSpec, Spec};
+use pendmap::model::{Effect, Formula, Kind, Pendulum};
 use pyo3::prelude::*;
 
-use crate::error::Error;
-use crate::maps::parameter_map::Range;
-use crate::model::effects::Role;
-use crate::model::formula::{ParameterSpec, Spec};
-use crate::model::{Effect, Formula, Kind, Pendulum};
+use super::raise;
 
 /// A pendulum, nondimensional.
 #[derive(FromPyObject)]
@@ -60,7 +63,11 @@ struct GivenParameter {
 
 impl Model {
     /// The pendulum, its numbers and effects checked.
-    pub fn pendulum(self) -> Result<Pendulum, Error> {
+    pub fn pendulum(self) -> PyResult<Pendulum> {
+        self.checked().map_err(raise)
+    }
+
+    fn checked(self) -> Result<Pendulum, Error> {
         let Self { gamma, p, omega, phase, torque, theta_r, lab_time, effects } = self;
         let mut pendulum = Pendulum::new(gamma, p, omega, phase, torque)?.with_friction(theta_r)?;
         pendulum.lab_time = lab_time;
@@ -77,7 +84,7 @@ impl Model {
 
 impl GivenFormula {
     /// The formula, checked.
-    pub fn formula(self) -> Result<&'static Formula, Error> {
+    pub fn formula(self) -> Result<Arc<Formula>, Error> {
         let Self { name, term, revealed_by, parameters } = self;
         let parameters = parameters.into_iter().map(GivenParameter::spec).collect();
         Formula::new(&Spec { name, term, revealed_by, parameters })
@@ -93,6 +100,6 @@ impl GivenParameter {
 }
 
 /// The range of the parameter `name` of a pendulum.
-pub fn range(pendulum: &Pendulum, (name, values): (String, Vec<f64>)) -> Result<Range, Error> {
-    Ok(Range { index: pendulum.place(&name)?, values })
+pub fn range(pendulum: &Pendulum, (name, values): (String, Vec<f64>)) -> PyResult<Range> {
+    Ok(Range { index: pendulum.place(&name).map_err(raise)?, values })
 }

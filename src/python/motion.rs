@@ -4,18 +4,20 @@ use std::mem::take;
 use std::sync::Mutex;
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pendmap::error::Error;
+use pendmap::integrate::trajectory::{self, Request};
+use pendmap::integrate::{State, Strobe, accuracy};
+use pendmap::lanes::InstructionSet;
+use pendmap::maps::advance::advance as advance_all;
+use pendmap::model::Pendulum;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use super::convert::{Array, array};
+use super::convert::{Array, array, states};
+use super::long_calls::{stopped, watched};
 use super::model::Model;
-use super::watch::{stopped, watched};
-use crate::error::Error;
-use crate::integrate::trajectory::{self, Request};
-use crate::integrate::{State, Strobe, accuracy};
-use crate::lanes::Path;
-use crate::maps::advance::advance as advance_all;
+use super::raise;
 
 /// Angle in [-pi, pi], velocity and net turns.
 type Advanced<'py> =
@@ -30,11 +32,20 @@ pub fn acceleration<'py>(
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let pendulum = model.pendulum()?;
+    let equation = model.pendulum()?.equation();
     let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
     let states = tau.iter().zip(theta).zip(velocity);
-    let all: Vec<f64> = states.map(|((t, x), v)| pendulum.acceleration(*t, *x, *v)).collect();
+    let all: Vec<f64> = states.map(|((t, x), v)| equation.acceleration_at(*t, *x, *v)).collect();
     Ok(all.into_pyarray(py))
+}
+
+/// The stroboscopic map with `steps` a period.
+pub fn strobe(pendulum: &Pendulum, steps: usize) -> PyResult<Strobe> {
+    if steps == 0 {
+        let allowed = "1 or more";
+        return Err(raise(Error::Range { name: "steps_per_period", value: 0.0, allowed }));
+    }
+    Ok(Strobe::new(pendulum, steps, InstructionSet::choose().map_err(raise)?))
 }
 
 /// Many starts, the same number of forcing periods on.
@@ -52,14 +63,9 @@ pub fn advance<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Advanced<'py>> {
     let pendulum = model.pendulum()?;
-    if steps_per_period == 0 {
-        let allowed = "1 or more";
-        return Err(Error::Range { name: "steps_per_period", value: 0.0, allowed }.into());
-    }
+    let strobe = strobe(&pendulum, steps_per_period)?;
     let mut theta = theta.as_slice()?.to_vec();
     let mut velocity = velocity.as_slice()?.to_vec();
-    let path = Path::choose()?;
-    let strobe = Strobe::new(&pendulum, steps_per_period, path);
     let turns = watched(py, progress.as_ref(), |control| {
         advance_all(&strobe, &mut theta, &mut velocity, periods, threads, control)
     })?;
@@ -75,10 +81,10 @@ pub fn choose_steps(
     tol: f64,
 ) -> PyResult<(usize, f64)> {
     let pendulum = model.pendulum()?;
-    pendulum.check_mappable()?;
-    let states: Vec<State> =
-        theta.as_slice()?.iter().zip(velocity.as_slice()?).map(|(a, b)| [*a, *b]).collect();
-    let (strobe, error) = accuracy::choose(&pendulum, &states, tol, Path::choose()?)?;
+    pendulum.check_mappable().map_err(raise)?;
+    let states = states(&theta, &velocity)?;
+    let simd = InstructionSet::choose().map_err(raise)?;
+    let (strobe, error) = accuracy::choose(&pendulum, &states, tol, simd).map_err(raise)?;
     Ok((strobe.steps(), error))
 }
 
@@ -166,7 +172,7 @@ pub fn simulate(
     if let Some(error) = stop.filter(|e| !e.is_instance_of::<PyKeyboardInterrupt>(py)) {
         return Err(error);
     }
-    let run = result?;
+    let run = result.map_err(raise)?;
     hand_over(py)?;
     Ok(Trajectory::new(py, run))
 }

@@ -1,15 +1,14 @@
 //! Bindings of closed orbits.
 
+use pendmap::attractor;
+use pendmap::attractor::catalogue::arrange;
+use pendmap::maps::orbits::{Request, orbits as search};
 use pyo3::prelude::*;
 
 use super::convert::Attractor;
-use super::maps::AxisTuple;
+use super::long_calls::watched;
+use super::maps::{AxisTuple, axes};
 use super::model::Model;
-use super::watch::watched;
-use crate::attractor;
-use crate::attractor::catalogue::arrange;
-use crate::maps::orbits::{Request, orbits as search};
-use crate::maps::starts::Axis;
 
 /// A closed orbit.
 #[pyclass(frozen, get_all, extends = Attractor, module = "pendmap._core")]
@@ -42,13 +41,8 @@ pub fn orbits(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<OrbitSearch> {
     let pendulum = model.pendulum()?;
-    let request = Request {
-        n: winding.0,
-        w: winding.1,
-        theta: Axis::new("theta", theta.0, theta.1, theta.2)?,
-        velocity: Axis::new("velocity", velocity.0, velocity.1, velocity.2)?,
-        threads,
-    };
+    let [theta, velocity] = axes(theta, velocity)?;
+    let request = Request { n: winding.0, w: winding.1, theta, velocity, threads };
     let found = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     let closed = found.closed.iter().map(|orbit| attractor::Attractor::periodic(&pendulum, orbit));
     let all: Vec<attractor::Attractor> =

@@ -1,11 +1,11 @@
 //! Bindings of critical curves.
 
+use pendmap::error::Error;
+use pendmap::maps::tongues::{Balance, Critical, tongues as search};
 use pyo3::prelude::*;
 
+use super::long_calls::watched;
 use super::model::Model;
-use super::watch::watched;
-use crate::error::Error;
-use crate::maps::tongues::{Balance, Critical, tongues as search};
 
 /// Critical amplitudes of the drive at one frequency, ascending.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
@@ -26,7 +26,7 @@ pub struct CriticalAmplitudes {
 
 #[pymethods]
 impl CriticalAmplitudes {
-    /// Those of a pendulum that has no rest there: none.
+    /// The result for a pendulum without rest there: none.
     #[staticmethod]
     fn no_rest() -> Self {
         Self { stable: vec![false], ..Self::default() }

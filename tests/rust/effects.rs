@@ -27,8 +27,8 @@ impl Draws {
     }
 
     /// The effect with typical values; one that counts periods counts whole ones.
-    pub fn effect(&mut self, kind: Kind) -> Effect {
-        let value = |p: &Parameter| {
+    pub fn effect(&mut self, kind: &Kind) -> Effect {
+        let value = |p: Parameter| {
             let value = self.between(p.typical);
             if matches!(kind, Kind::BearingHarmonic | Kind::InertiaRipple) && p.name == "n" {
                 value.round()
@@ -37,7 +37,7 @@ impl Draws {
             }
         };
         let values: Vec<f64> = kind.definition().parameters.iter().map(value).collect();
-        Effect::new(kind, &values).expect("typical values are in range")
+        Effect::new(kind.clone(), &values).expect("typical values are in range")
     }
 }
 
@@ -67,10 +67,10 @@ fn definitions_are_whole() {
     assert_eq!(names.len(), Kind::ALL.len(), "names are unique");
     for kind in Kind::ALL {
         let Definition { name, group, family, action, formula, parameters, revealed_by, mappable } =
-            *kind.definition();
-        assert_eq!(Kind::named(name), Ok(*kind));
+            kind.definition();
+        assert_eq!(Kind::named(name), Ok(kind.clone()));
         assert!(!revealed_by.is_empty(), "{name}");
-        assert!((1..=MOST_PARAMETERS).contains(&parameters.len()), "{name}");
+        assert!((1..=MOST_PARAMETERS).contains(&parameters.count()), "{name}");
         let expected = match action {
             Action::Velocity
             | Action::Kinked
@@ -87,26 +87,26 @@ fn definitions_are_whole() {
         assert_ne!(family, Family::Own, "{name}");
         let words: Vec<&str> = formula.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
         for (k, parameter) in parameters.iter().enumerate() {
-            let Parameter { name: own, role, unit, range, typical, meaning, power } = *parameter;
+            let Parameter { name: own, role, unit, range, typical, meaning, power } = parameter;
             assert_eq!(k == 0, role == Role::Size, "{name}.{own}");
             assert!(words.contains(&own), "{name}: {formula} has no {own}");
-            assert!(parameters[..k].iter().all(|p| p.name != own), "{name}: {own} twice");
+            assert!(parameters.iter().take(k).all(|p| p.name != own), "{name}: {own} twice");
             assert!(!unit.is_empty() && !meaning.is_empty(), "{name}.{own}");
             assert!(range[0] < range[1] && typical[0] < typical[1], "{name}.{own}");
             assert!(range[0] <= typical[0] && typical[1] <= range[1], "{name}.{own}");
             assert!(typical.iter().all(|x| x.is_finite()), "{name}.{own}");
             if let Power::TwoMinus(other) = power {
-                assert!(other < parameters.len() && other != k, "{name}.{own}");
+                assert!(other < parameters.count() && other != k, "{name}.{own}");
             }
         }
-        let barred = kind.bars_maps(&Draws(1).effect(*kind).parameters).is_some();
+        let barred = kind.bars_maps(&Draws(1).effect(kind).parameters).is_some();
         assert_eq!(barred, mappable == Mappable::No, "{name}");
     }
 }
 
 /// Every effect's acceleration in SI, as textbooks have it: velocities in rad/s, times in s.
 #[allow(clippy::too_many_lines)] // one line an effect
-fn in_si(kind: Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64, t: f64) -> f64 {
+fn in_si(kind: &Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64, t: f64) -> f64 {
     let (p, omega, phase) = (0.7, 1.3 * w0, 0.4);
     let sign = velocity.signum();
     let speed = velocity.abs();
@@ -194,18 +194,18 @@ fn formulas_and_powers_of_w0_are_right() {
     let mut draws = Draws(2);
     for kind in Kind::ALL {
         for _ in 0..200 {
-            let mut effect = draws.effect(*kind);
+            let mut effect = draws.effect(kind);
             if *kind == Kind::Impulses {
                 effect.parameters[1] = 250.0 + draws.between([-0.1, 0.1]);
             }
-            let pendulum = alone(effect);
+            let pendulum = alone(effect.clone());
             let w0 = draws.between([0.5, 8.0]);
             let [theta, velocity] = [draws.between([-9.0, 9.0]), draws.between([-3.0, 3.0])];
             let tau = draws.between([0.0, 20.0]);
             let values: Vec<f64> = effect
                 .values()
                 .iter()
-                .zip(kind.definition().parameters)
+                .zip(kind.definition().parameters.iter())
                 .map(|(value, parameter)| match parameter.power {
                     Power::Of(k) => value * w0.powi(k),
                     Power::Real(k) => value * w0.powf(k),
@@ -213,7 +213,7 @@ fn formulas_and_powers_of_w0_are_right() {
                 })
                 .collect();
             let (lab, t) = (pendulum.lab_time / w0, tau / w0);
-            let expected = in_si(*kind, &values, w0, theta, w0 * velocity, lab, t);
+            let expected = in_si(kind, &values, w0, theta, w0 * velocity, lab, t);
             let found = w0 * w0 * pendulum.acceleration(tau, theta, velocity);
             let error = (found - expected).abs() / (w0 * w0);
             assert!(error < 1e-11, "{effect:?} at {theta} {velocity} {tau}: {error:e}");
@@ -231,7 +231,7 @@ fn readings_are_what_they_say() {
         (Kind::EncoderEccentricity, &[0.1, 0.5 * PI], 2.0 * PI, 2.0 * PI + 0.1),
         (Kind::SensorLag, &[0.01], 2.0, 2.0 - 0.01 * 3.0),
     ] {
-        let pendulum = alone(Effect::new(kind, values).expect("in range"));
+        let pendulum = alone(Effect::new(kind.clone(), values).expect("in range"));
         let found = Observation::lift(&pendulum, |_, value| value).read(theta, 3.0, 290.0);
         assert!((found - expected).abs() < 1e-14, "{kind:?}: {found}");
     }
@@ -241,8 +241,10 @@ fn readings_are_what_they_say() {
 fn readings_follow_one_another_in_order() {
     let offset = Effect::new(Kind::EncoderOffset, &[0.1]).expect("in range");
     let gain = Effect::new(Kind::EncoderGain, &[0.5]).expect("in range");
-    for (effects, expected) in [([offset, gain], 1.5 * 1.1), ([gain, offset], 1.5 + 0.1)] {
-        let pendulum = effects.into_iter().fold(driven(0.1, 1.0, 2.0), has);
+    for (effects, expected) in
+        [([offset.clone(), gain.clone()], 1.5 * 1.1), ([gain, offset], 1.5 + 0.1)]
+    {
+        let pendulum = effects.clone().into_iter().fold(driven(0.1, 1.0, 2.0), has);
         let found = Observation::lift(&pendulum, |_, value| value).read(1.0, 3.0, 0.0);
         assert!((found - expected).abs() < 1e-14, "{effects:?}: {found}");
     }
@@ -291,7 +293,7 @@ fn derivatives_agree_with_differences() {
     let mut draws = Draws(3);
     for kind in Kind::ALL {
         for _ in 0..100 {
-            let pendulum = alone(draws.effect(*kind));
+            let pendulum = alone(draws.effect(kind));
             let at = [draws.between([-9.0, 9.0]), draws.between([-3.0, 3.0])];
             let tau = draws.between([0.0, 20.0]);
             let exact = derivatives(&pendulum, tau, at);
@@ -328,12 +330,12 @@ fn near_no_load(tau: f64, [theta, velocity]: State) -> bool {
 fn derivatives_are_finite_at_rest_and_everywhere() {
     let mut draws = Draws(4);
     for kind in Kind::ALL {
-        let mut effect = draws.effect(*kind);
+        let mut effect = draws.effect(kind);
         // The least power has the steepest torque.
         if *kind == Kind::PowerLawDrag {
-            effect.parameters[1] = kind.definition().parameters[1].range[0];
+            effect.parameters[1] = kind.definition().parameters.at(1).range[0];
         }
-        let pendulum = alone(effect);
+        let pendulum = alone(effect.clone());
         for theta in [0.0, PI, -PI, 1e3, 1e-300] {
             for velocity in [0.0, -0.0, 1e-300, -1e-12, 40.0, -1e4] {
                 for number in derivatives(&pendulum, 0.3, [theta, velocity]) {
@@ -350,7 +352,7 @@ fn derivatives_are_finite_at_rest_and_everywhere() {
 fn what_keeps_the_mirror_image_says_so() {
     let mut draws = Draws(5);
     let psi = |psi: f64| Effect::new(Kind::BearingHarmonic, &[0.1, 3.0, psi]).expect("in range");
-    let mut all: Vec<Effect> = Kind::ALL.iter().map(|kind| draws.effect(*kind)).collect();
+    let mut all: Vec<Effect> = Kind::ALL.iter().map(|kind| draws.effect(kind)).collect();
     all.extend([psi(0.0), psi(PI), psi(-PI), psi(0.4)]);
     all.push(Effect::new(Kind::LateralDrive, &[0.0, 0.3]).expect("in range"));
     all.push(Effect::new(Kind::AsymmetricViscous, &[0.0]).expect("in range"));
@@ -358,7 +360,7 @@ fn what_keeps_the_mirror_image_says_so() {
         if effect.kind == Kind::Impulses {
             effect.parameters[1] = 250.0;
         }
-        let pendulum = alone(effect);
+        let pendulum = alone(effect.clone());
         let mut worst = 0_f64;
         for state in spread(100, 9.0, 3.0) {
             let [a, b] = [1.0, -1.0].map(|side| {

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use pendmap::error::Error;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::flow::Flow;
-use pendmap::integrate::sample::sample;
+use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::basins;
@@ -15,7 +15,9 @@ use pendmap::model::effects::Mappable;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::effects::{Draws, has};
-use crate::support::{advanced, bits, columns, driven, path, paths, plane, spread, unchecked};
+use crate::support::{
+    advanced, bits, columns, driven, instruction_sets, plane, simd, spread, unchecked,
+};
 
 /// All that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {
@@ -27,14 +29,14 @@ fn mappable() -> Vec<(Kind, Pendulum)> {
         }
         for theta_r in [0.0, 0.05] {
             let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
-            let effect = draws.effect(*kind);
+            let effect = draws.effect(kind);
             let twice = match kind {
                 Kind::ViscousDamping => true,
                 Kind::CoulombFriction => theta_r > 0.0,
                 _ => false,
             };
             if !twice {
-                all.push((*kind, has(base, effect)));
+                all.push((kind.clone(), has(base, effect)));
             }
         }
     }
@@ -44,8 +46,8 @@ fn mappable() -> Vec<(Kind, Pendulum)> {
 #[test]
 fn one_at_a_time_gives_the_same_bits() {
     for (_, pendulum) in mappable() {
-        for path in paths() {
-            let strobe = Strobe::new(&pendulum, 30, path);
+        for simd in instruction_sets() {
+            let strobe = Strobe::new(&pendulum, 30, simd);
             let states = spread(100, PI, 3.0);
             let run = |singly: bool| {
                 let (mut theta, mut velocity) = columns(&states);
@@ -58,7 +60,7 @@ fn one_at_a_time_gives_the_same_bits() {
                 }
                 [bits(&theta), bits(&velocity), bits(&turns)]
             };
-            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
+            assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
         }
     }
 }
@@ -67,7 +69,7 @@ fn one_at_a_time_gives_the_same_bits() {
 fn errors_in_lanes(pendulum: &Pendulum, steps: usize) -> [f64; 2] {
     let starts = spread(60, PI, 3.0);
     let flow = Flow::new(pendulum);
-    let strobe = Strobe::new(pendulum, steps, path());
+    let strobe = Strobe::new(pendulum, steps, simd());
     let ends = advanced(&strobe, &starts, 3);
     let far = |(start, end): (&State, &State)| {
         distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
@@ -99,7 +101,7 @@ fn a_friction_that_turns_negative_holds_nothing() {
         (Kind::LoadDependentFriction, &[0.3]),
         (Kind::CoulombDrift, &[-4e-4]),
     ] {
-        let pendulum = has(base.clone(), Effect::new(kind, values).expect("in range"));
+        let pendulum = has(base.clone(), Effect::new(kind.clone(), values).expect("in range"));
         let [median, error] = errors_in_lanes(&pendulum, 200);
         println!("{kind:?} {median:e} {error:e}");
         assert!(error < 1e-8, "{kind:?}: {error:e}");
@@ -113,13 +115,14 @@ fn a_friction_that_turns_negative_holds_nothing() {
 fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
     let effect = |kind: Kind, r| {
         let shape = [r, 200.0];
-        Effect::new(kind, &shape[..kind.definition().parameters.len()]).expect("in range")
+        let count = kind.definition().parameters.count();
+        Effect::new(kind, &shape[..count]).expect("in range")
     };
     let plain = driven(0.1, 0.6, 2.0).with_friction(0.05).expect("in range");
     let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
     let drifting = has(plain, effect(Kind::CoulombDrift, 4e-4));
     let states = spread(50, PI, 3.0);
-    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, path()), &states, 3));
+    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, simd()), &states, 3));
     for (a, b) in a.iter().zip(&b) {
         assert!(distance(*a, *b) < 1e-10, "{a:?} {b:?}");
     }
@@ -131,12 +134,13 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
         (Kind::ViscousWarmUp, -5e-2),
     ] {
         // Two stretches, one after the other, are one.
-        let early = has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind, size));
+        let early =
+            has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind.clone(), size));
         let mut late = early.clone();
         late.lab_time += 5.0;
         let end = |pendulum: &Pendulum, from: State, until: f64| {
-            let course = Course::new(pendulum, true, 1e-13, |_, value| value);
-            sample(&course, 0.0, from, &[until], |_, _| true).states[0]
+            let ode = OdeProblem::new(pendulum, true, 1e-13, |_, value| value);
+            sample(&ode, 0.0, from, &[until], |_, _| true).states[0]
         };
         let whole = end(&early, [2.0, 0.0], 9.0);
         let parts = end(&late, end(&early, [2.0, 0.0], 5.0), 4.0);
@@ -148,7 +152,7 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
 
 #[test]
 fn maps_refuse_what_does_not_repeat_every_turn() {
-    let effect = |kind, values: &[f64]| Effect::new(kind, values).expect("in range");
+    let effect = |kind: Kind, values: &[f64]| Effect::new(kind, values).expect("in range");
     for (effect, allowed) in [
         (effect(Kind::ElasticRestoring, &[0.01]), true),
         (effect(Kind::BearingHarmonic, &[0.1, 2.5, 0.0]), false),
@@ -156,9 +160,9 @@ fn maps_refuse_what_does_not_repeat_every_turn() {
         (effect(Kind::BearingHarmonic, &[0.0, 2.5, 0.0]), true),
         (effect(Kind::EncoderOffset, &[0.1]), true),
     ] {
-        let pendulum = has(driven(0.1, 0.6, 2.0), effect);
+        let pendulum = has(driven(0.1, 0.6, 2.0), effect.clone());
         let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
-        let strobe = Strobe::new(&pendulum, 20, path());
+        let strobe = Strobe::new(&pendulum, 20, simd());
         let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());
         for result in [map, moved] {
             match result {

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector};
-use pendmap::fit::descent::{Limit, Point, descend};
+use pendmap::fit::levenberg_marquardt::{Limit, Point, descend};
 use pendmap::fit::normal::Normal;
 use pendmap::fit::profile::intervals;
 use pendmap::fit::window::{Window, cut};
@@ -21,7 +21,12 @@ fn noise(k: usize) -> f64 {
 /// Three records, one of them forced, and the wrong values to start from.
 fn several() -> (Problem, Vec<f64>) {
     let gain: (Kind, &[f64]) = (Kind::EncoderOffset, &[0.01]);
-    let own = |p: f64| with(driven(0.02, p, 2.1).with_friction(0.03).expect("in range"), &[gain]);
+    let own = |p: f64| {
+        with(
+            driven(0.02, p, 2.1).with_friction(0.03).expect("in range"),
+            std::slice::from_ref(&gain),
+        )
+    };
     let mut records = vec![
         record(own(0.0), None, [2.8, -0.01], 60.0),
         record(own(0.0), None, [1.2, 0.3], 40.0),
@@ -107,7 +112,7 @@ fn initial_states_are_eliminated_exactly() {
 
 #[test]
 fn chaotic_motion_takes_no_digits_from_the_covariance() {
-    // The state's part of the information is 1e10 times what is left of the parameters' part.
+    // The state's part of the information is 1e10 times the rest of the parameters' part.
     let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
     let start = [1.0, 0.4];
     let record = record(pendulum, None, start, 45.0);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::flow::Flow;
 use pendmap::maps::advance::advance;
 use pendmap::maps::control::Control;
 use pendmap::model::effects::{Action, Mappable};
@@ -14,9 +14,10 @@ use pendmap::model::{Effect, Formula, Kind, Pendulum};
 use proptest::prelude::*;
 
 use crate::effects::{Draws, derivatives, evaluated, has};
-use crate::rewritten::{formula, rewritten, term};
+use crate::effects_as_formulas::{formula, rewritten, term};
 use crate::support::{
-    advanced, basins_on_plane, bits, cell_names, columns, driven, path, paths, spread, undriven,
+    advanced, basins_on_plane, bits, cell_names, columns, driven, instruction_sets, simd, spread,
+    undriven,
 };
 
 /// The formula with values for its parameters.
@@ -33,17 +34,17 @@ fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
         let seed = kind.definition().name.bytes().map(u64::from).sum();
         let own = match kind {
             // Below the friction of the tests: together they brake everywhere.
-            Kind::LoadDependentFriction => Effect::new(*kind, &[0.02]).expect("in range"),
-            _ => Draws(seed).effect(*kind),
+            Kind::LoadDependentFriction => Effect::new(kind.clone(), &[0.02]).expect("in range"),
+            _ => Draws(seed).effect(kind),
         };
         if let Some(other) = rewritten(&own) {
-            // What has a parameter of its own in the model is there but once.
+            // An effect with its own parameter in the model may occur only once.
             let bare = match kind {
                 Kind::ViscousDamping => Pendulum { gamma: 0.0, ..base.clone() },
                 Kind::CoulombFriction => Pendulum { theta_r: 0.0, ..base.clone() },
                 _ => base.clone(),
             };
-            all.push((*kind, has(bare.clone(), own), has(bare, other)));
+            all.push((kind.clone(), has(bare.clone(), own), has(bare, other)));
         }
     }
     assert!(all.len() > 12, "{}", all.len());
@@ -95,7 +96,7 @@ fn a_formula_s_trajectories_are_the_library_s() {
             if own.check_mappable().is_ok() && own.route() == library.route() {
                 let starts = spread(200, PI, 3.0);
                 let [a, b] =
-                    [&library, &own].map(|p| advanced(&Strobe::new(p, 60, path()), &starts, 3));
+                    [&library, &own].map(|p| advanced(&Strobe::new(p, 60, simd()), &starts, 3));
                 for ((a, b), start) in a.iter().zip(&b).zip(&starts) {
                     let apart = distance(*a, *b);
                     // Without fused operations the two round differently, at corners too.
@@ -117,7 +118,7 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
                 let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, side));
                 let (a, b) = (cell_names(&a), cell_names(&b));
                 let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();
-                // What costs the library nothing goes through steps of its own: a cell within their
+                // Effects that cost the library nothing take general steps as formulas: a cell within their
                 // error of a boundary may be on its other side.
                 let other = matches!(kind, Kind::ViscousDamping | Kind::BiasTorque);
                 let allowed = if other { a.len() / 200 } else { 0 };
@@ -180,8 +181,8 @@ fn one_at_a_time_gives_a_formula_s_bits() {
         for theta_r in [0.0, 0.05] {
             let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
             let pendulum = has(base, of(term, &[0.1, 0.4]));
-            for path in paths() {
-                let strobe = Strobe::new(&pendulum, 30, path);
+            for simd in instruction_sets() {
+                let strobe = Strobe::new(&pendulum, 30, simd);
                 let states = spread(100, PI, 3.0);
                 let run = |singly: bool| {
                     let (mut theta, mut velocity) = columns(&states);
@@ -194,7 +195,7 @@ fn one_at_a_time_gives_a_formula_s_bits() {
                     }
                     [bits(&theta), bits(&velocity), bits(&turns)]
                 };
-                assert_eq!(run(false), run(true), "{path}, {}", term.0);
+                assert_eq!(run(false), run(true), "{simd}, {}", term.0);
             }
         }
     }
@@ -206,7 +207,7 @@ fn lanes_follow_formulas_as_the_reference_does() {
         let pendulum = has(driven(0.1, 0.6, 2.0), of(term, &[0.1, 0.4]));
         let starts = spread(60, PI, 3.0);
         let flow = Flow::new(&pendulum);
-        let ends = advanced(&Strobe::new(&pendulum, 200, path()), &starts, 3);
+        let ends = advanced(&Strobe::new(&pendulum, 200, simd()), &starts, 3);
         let far = starts.iter().zip(&ends).map(|(start, end)| {
             distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
         });
@@ -264,7 +265,7 @@ fn maps_refuse_formulas_that_do_not_repeat() {
     ] {
         let own = effect(&formula("mine", term, &[("k", power)]), &[0.1]);
         assert_eq!(own.kind.definition().mappable, Mappable::No, "{term}");
-        let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, path());
+        let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, simd());
         let error = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default());
         let line = error.map(|_| ()).expect_err(term).to_string();
         let begin = "mine can be in one trajectory, not in maps: ";
@@ -277,12 +278,12 @@ fn two_corners_do_not_hinder_each_other() {
     let load = Effect::new(Kind::LoadDependentFriction, &[0.15]).expect("in range");
     let kinked = effect(&formula("mine", "-k*v*abs(sin(theta) - 0.3)", &[("k", 1.0)]), &[0.1]);
     let base = driven(0.1, 0.6, 2.0);
-    let [one, other] =
-        [[load, kinked], [kinked, load]].map(|effects| effects.into_iter().fold(base.clone(), has));
+    let [one, other] = [[load.clone(), kinked.clone()], [kinked, load.clone()]]
+        .map(|effects| effects.into_iter().fold(base.clone(), has));
     let mut draws = Draws(12);
     for _ in 0..200 {
         let [theta, v] = [draws.between([-4.0, 4.0]), draws.between([-3.0, 3.0])];
-        let expected = has(base.clone(), load).acceleration(1.0, theta, v)
+        let expected = has(base.clone(), load.clone()).acceleration(1.0, theta, v)
             - 0.1 * v * (theta.sin() - 0.3).abs();
         for pendulum in [&one, &other] {
             assert!((pendulum.acceleration(1.0, theta, v) - expected).abs() < 1e-14);
@@ -335,7 +336,7 @@ fn what_is_wrong_is_said_in_one_line() {
         let error = Formula::new(&formula(name, term, &[(parameter, 2.0)])).expect_err(term);
         assert!(matches!(error, Error::Formula { .. }) && error.to_string().lines().count() == 1);
     }
-    assert_eq!(term(Kind::EncoderGain), None);
+    assert_eq!(term(&Kind::EncoderGain), None);
 }
 
 #[test]

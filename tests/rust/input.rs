@@ -1,4 +1,4 @@
-//! What is refused, and in which words: each names the value, what it must be and what was got.
+//! Invalid input and its messages: each names the quantity, the allowed values and the value given.
 
 use std::sync::atomic::AtomicBool;
 
@@ -6,7 +6,7 @@ use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::trajectory::{Request, simulate};
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::Control;
@@ -14,7 +14,7 @@ use pendmap::maps::starts::{Axis, Starts};
 use pendmap::memory;
 use pendmap::model::{HarmonicDrive, Pendulum};
 
-use crate::support::{driven, path, plane, spread};
+use crate::support::{driven, plane, simd, spread};
 
 /// The message of a refusal; a success is the failure of the test.
 fn refusal<T>(result: Result<T, Error>) -> String {
@@ -84,7 +84,7 @@ fn trajectories() {
 
 #[test]
 fn arrays_of_different_lengths() {
-    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, simd());
     let lengths = |given, names| Some(Error::Lengths { given, names });
     let go = |a: usize, b: usize, c: usize| {
         let (mut a, mut b, mut c) = (vec![0.0; a], vec![0.0; b], vec![0.0; c]);
@@ -97,7 +97,7 @@ fn arrays_of_different_lengths() {
     assert_eq!(go(3, 2, 3), lengths((3, 2), ("theta", "velocity")));
     assert_eq!(go(3, 3, 4), lengths((3, 4), ("theta", "turns")));
     let error = go(3, 2, 3).expect("refused").to_string();
-    assert_eq!(error, "theta has 3 values and velocity has 2: they must be as many");
+    assert_eq!(error, "theta and velocity must be as many values, got 3 and 2");
 
     let stretch = |n: [usize; 6]| {
         let [mut a, mut b, mut c, mut d, mut e, mut f] = n.map(|n| vec![1.0; n]);
@@ -118,34 +118,35 @@ fn arrays_of_different_lengths() {
 #[test]
 fn tolerances() {
     let starts = spread(100, 3.0, 3.0);
-    let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, path()));
+    let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, simd()));
     assert_eq!(range(0.5), "tol must be a number from 1e-13 to 1e-2, got 0.5");
     assert_eq!(range(0.0), "tol must be a number from 1e-13 to 1e-2, got 0");
     assert_eq!(range(-1e-6), "tol must be a number from 1e-13 to 1e-2, got -1e-6");
     assert_eq!(range(1e300), "tol must be a number from 1e-13 to 1e-2, got 1e300");
     assert_eq!(range(f64::NAN), "tol must be a number from 1e-13 to 1e-2, got NaN");
     // Chaos makes more of rounding errors than 1e-13 within five periods.
-    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).expect_err("refused");
+    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, simd()).expect_err("refused");
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
     assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
     let error = Error::Tolerance { tol: 1e-13, reached: 2.34e-11 }.to_string();
-    let expected = "tol is 1e-13: the smallest error that steps can reach here is 2.3e-11";
+    let expected =
+        "tol must be 2.3e-11 or more here, the smallest error that steps can reach, got 1e-13";
     assert_eq!(error, expected);
 }
 
 #[test]
 fn instruction_sets() {
-    for path in Path::ALL {
-        assert_eq!(path.name().parse::<Path>(), Ok(path));
-        assert_eq!(path.to_string(), path.name());
+    for simd in InstructionSet::ALL {
+        assert_eq!(simd.name().parse::<InstructionSet>(), Ok(simd));
+        assert_eq!(simd.to_string(), simd.name());
     }
-    let error = "avx1024".parse::<Path>().expect_err("refused");
+    let error = "avx1024".parse::<InstructionSet>().expect_err("refused");
     assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
     let expected = "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
                     them, got 'avx1024'";
     assert_eq!(error.to_string(), expected);
-    assert!("AVX2".parse::<Path>().is_err() && "".parse::<Path>().is_err());
-    assert!(Path::Portable.available());
+    assert!("AVX2".parse::<InstructionSet>().is_err() && "".parse::<InstructionSet>().is_err());
+    assert!(InstructionSet::Portable.available());
 }
 
 #[test]

@@ -7,20 +7,20 @@
 //! is an error of the drive's amplitude.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct AddedMass;
 
 impl Law for AddedMass {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "added_mass",
         group: Group::Torque,
         family: Family::Drive,
         action: Action::Driven,
         formula: "-e a sin(theta), a the pivot's acceleration over gravity, all per whole inertia",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "e",
             role: Role::Size,
             unit: "1",
@@ -28,7 +28,7 @@ impl Law for AddedMass {
             range: [-0.9, 10.0],
             typical: [-0.1, 0.1],
             meaning: "inertia that moves along without weight, over that of the pendulum",
-        }],
+        }]),
         revealed_by: "w0 in the fluid and without it; forced runs only if the stroke is well known",
         mappable: Mappable::Yes,
     };

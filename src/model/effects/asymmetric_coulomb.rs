@@ -5,20 +5,20 @@
 //! constant torque `-d`, for as long as `|d| <= theta_r`. No record of one rig tells it from a bias torque.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct AsymmetricCoulomb;
 
 impl Law for AsymmetricCoulomb {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "asymmetric_coulomb",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::Position,
         formula: "-d |sign(v)|",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "d",
             role: Role::Size,
             unit: "rad/s^2",
@@ -26,7 +26,7 @@ impl Law for AsymmetricCoulomb {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.3, 0.3],
             meaning: "half the difference between the frictions forth and back, below theta_r",
-        }],
+        }]),
         revealed_by: "the rig turned round: a bias torque keeps its sense, a friction turns with it",
         mappable: Mappable::Yes,
     };

@@ -1,20 +1,20 @@
 //! Viscous damping that differs between the two senses of rotation.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct AsymmetricViscous;
 
 impl Law for AsymmetricViscous {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "asymmetric_viscous",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Kinked,
         formula: "-b |v|",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "b",
             role: Role::Size,
             unit: "1/s",
@@ -22,7 +22,7 @@ impl Law for AsymmetricViscous {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.3, 0.3],
             meaning: "half the difference between the coefficients forth and back",
-        }],
+        }]),
         revealed_by: "decays from both sides; amplitudes against a bias torque",
         mappable: Mappable::Yes,
     };

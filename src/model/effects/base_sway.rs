@@ -1,9 +1,9 @@
-//! A floor, a table or a tower that sways sideways, at a frequency of its own.
+//! A floor, a table or a tower that sways sideways, at its own frequency.
 
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -11,13 +11,13 @@ use crate::lanes::sine::Fine;
 pub struct BaseSway;
 
 impl Law for BaseSway {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "base_sway",
         group: Group::Torque,
         family: Family::Drive,
         action: Action::Timed,
         formula: "-w0^2 amplitude cos(ws t + psi) cos(theta), t time in the laboratory",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "amplitude",
                 role: Role::Size,
@@ -45,7 +45,7 @@ impl Law for BaseSway {
                 typical: [-3.15, 3.15],
                 meaning: "phase at t = 0",
             },
-        ],
+        ]),
         revealed_by: "a pendulum left at rest, and the ends of decays",
         mappable: Mappable::No,
     };

@@ -1,7 +1,7 @@
 //! A torque that repeats with the angle: the poles of a motor, an oval race.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Parameters, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -10,13 +10,13 @@ use crate::lanes::sine::Fine;
 pub struct BearingHarmonic;
 
 impl Law for BearingHarmonic {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "bearing_harmonic",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Position,
         formula: "+amplitude sin(n theta + psi)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "amplitude",
                 role: Role::Size,
@@ -44,7 +44,7 @@ impl Law for BearingHarmonic {
                 typical: [-3.15, 3.15],
                 meaning: "phase at theta = 0",
             },
-        ],
+        ]),
         revealed_by: "turns and large swings",
         mappable: Mappable::Yes,
     };

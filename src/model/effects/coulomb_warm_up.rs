@@ -4,20 +4,20 @@
 //! what depends on it, comes to its end exponentially (Newton's law of cooling).
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct CoulombWarmUp;
 
 impl Law for CoulombWarmUp {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "coulomb_warm_up",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::Friction,
         formula: "+f (1 - exp(-t/tau)) sign(v), t time in the laboratory",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "f",
                 role: Role::Size,
@@ -28,7 +28,7 @@ impl Law for CoulombWarmUp {
                 meaning: "what theta_r falls by in the end; below 0 it rises",
             },
             TIME_CONSTANT,
-        ],
+        ]),
         revealed_by: "the same run before, while and after the rig warms up",
         mappable: Mappable::Frozen,
     };

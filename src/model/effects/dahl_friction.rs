@@ -7,20 +7,20 @@
 //! motion begins with `z = 0`.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct DahlFriction;
 
 impl Law for DahlFriction {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "dahl_friction",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::Kinked,
         formula: "-f z, z' = (v - |v| z)/zc",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "f",
                 role: Role::Size,
@@ -39,7 +39,7 @@ impl Law for DahlFriction {
                 typical: [0.01, 0.3],
                 meaning: "angle over which it builds up after a turn",
             },
-        ],
+        ]),
         revealed_by: "the last swings of a decay, which do not stop where Coulomb friction holds",
         mappable: Mappable::No,
     };

@@ -1,19 +1,19 @@
 //! A drive whose amplitude is not what it was set to.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct DriveAmplitude;
 
 impl Law for DriveAmplitude {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "drive_amplitude",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::Drive,
         formula: "p (1 + e)",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "e",
             role: Role::Size,
             unit: "1",
@@ -21,7 +21,7 @@ impl Law for DriveAmplitude {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.3, 0.3],
             meaning: "error of the amplitude over it",
-        }],
+        }]),
         revealed_by: "forced runs",
         mappable: Mappable::Yes,
     };

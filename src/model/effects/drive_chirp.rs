@@ -1,19 +1,19 @@
 //! A drive whose frequency creeps.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct DriveChirp;
 
 impl Law for DriveChirp {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "drive_chirp",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "phase omega t + r t^2/2 + phi, t since the run began",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "r",
             role: Role::Size,
             unit: "rad/s^2",
@@ -21,7 +21,7 @@ impl Law for DriveChirp {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [1e-7, 1e-3],
             meaning: "rate of change of the drive's angular frequency",
-        }],
+        }]),
         revealed_by: "long forced runs",
         mappable: Mappable::No,
     };

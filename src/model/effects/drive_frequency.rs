@@ -1,19 +1,19 @@
 //! A drive whose frequency is not what it was set to.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct DriveFrequency;
 
 impl Law for DriveFrequency {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "drive_frequency",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::Drive,
         formula: "omega (1 + e)",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "e",
             role: Role::Size,
             unit: "1",
@@ -21,7 +21,7 @@ impl Law for DriveFrequency {
             range: [-0.9, 10.0],
             typical: [-0.01, 0.01],
             meaning: "error of the frequency over it",
-        }],
+        }]),
         revealed_by: "forced runs, the longer the better",
         mappable: Mappable::Yes,
     };

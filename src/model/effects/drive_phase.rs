@@ -1,19 +1,19 @@
 //! A drive whose phase is not what it was taken for; the same as a trigger that comes late.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct DrivePhase;
 
 impl Law for DrivePhase {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "drive_phase",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::Drive,
         formula: "phase + d",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "d",
             role: Role::Size,
             unit: "rad",
@@ -21,7 +21,7 @@ impl Law for DrivePhase {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.5, 0.5],
             meaning: "error of the phase",
-        }],
+        }]),
         revealed_by: "forced runs whose phase is known",
         mappable: Mappable::Yes,
     };

@@ -1,19 +1,19 @@
 //! A drive that is not quite harmonic: a crank of finite length, a shaker at its limit.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct DriveSecondHarmonic;
 
 impl Law for DriveSecondHarmonic {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "drive_second_harmonic",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "a = p cos(x) + e p cos(2 x + phase), x the drive's phase",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "e",
                 role: Role::Size,
@@ -32,7 +32,7 @@ impl Law for DriveSecondHarmonic {
                 typical: [-3.15, 3.15],
                 meaning: "its phase against the drive",
             },
-        ],
+        ]),
         revealed_by: "forced runs",
         mappable: Mappable::Yes,
     };

@@ -5,20 +5,20 @@
 //! (1991), IEE Proc. B 138, 153).
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct EddyBrake;
 
 impl Law for EddyBrake {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "eddy_brake",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Velocity,
         formula: "-b v/(1 + (v/vc)^2)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "b",
                 role: Role::Size,
@@ -37,7 +37,7 @@ impl Law for EddyBrake {
                 typical: [0.3, 5.0],
                 meaning: "critical velocity, at which the brake is strongest",
             },
-        ],
+        ]),
         revealed_by: "fast rotation, against the damping of small swings",
         mappable: Mappable::Yes,
     };

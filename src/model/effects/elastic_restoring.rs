@@ -1,7 +1,7 @@
 //! A cable or a spiral spring that winds up turn by turn.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -9,13 +9,13 @@ use crate::lanes::Real;
 pub struct ElasticRestoring;
 
 impl Law for ElasticRestoring {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "elastic_restoring",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Position,
         formula: "-k theta, theta not wrapped",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "k",
             role: Role::Size,
             unit: "1/s^2",
@@ -23,7 +23,7 @@ impl Law for ElasticRestoring {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [1e-4, 0.3],
             meaning: "stiffness over the moment of inertia",
-        }],
+        }]),
         revealed_by: "many turns in one direction",
         mappable: Mappable::Yes,
     };

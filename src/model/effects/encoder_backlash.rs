@@ -5,20 +5,20 @@
 //! since. A motion begins in the middle of the play.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct EncoderBacklash;
 
 impl Law for EncoderBacklash {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "encoder_backlash",
         group: Group::Reading,
         family: Family::Reading,
         action: Action::Play,
         formula: "reading y, |theta - y| <= b/2, moved only when pushed",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "b",
             role: Role::Size,
             unit: "rad",
@@ -26,7 +26,7 @@ impl Law for EncoderBacklash {
             range: [0.0, f64::INFINITY],
             typical: [1e-4, 0.1],
             meaning: "play",
-        }],
+        }]),
         revealed_by: "turns, where the reading stands still",
         mappable: Mappable::Yes,
     };

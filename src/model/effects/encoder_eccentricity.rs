@@ -1,19 +1,19 @@
 //! A sensor whose disc does not turn about its centre.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 
 pub struct EncoderEccentricity;
 
 impl Law for EncoderEccentricity {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "encoder_eccentricity",
         group: Group::Reading,
         family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta + e sin(theta + psi)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "e",
                 role: Role::Size,
@@ -32,7 +32,7 @@ impl Law for EncoderEccentricity {
                 typical: [-3.15, 3.15],
                 meaning: "phase at theta = 0",
             },
-        ],
+        ]),
         revealed_by: "any motion through large angles",
         mappable: Mappable::Yes,
     };

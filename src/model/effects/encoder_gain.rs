@@ -1,18 +1,18 @@
 //! A sensor with a wrong scale.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderGain;
 
 impl Law for EncoderGain {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "encoder_gain",
         group: Group::Reading,
         family: Family::Reading,
         action: Action::Reading,
         formula: "reading (1 + e) theta",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "e",
             role: Role::Size,
             unit: "1",
@@ -20,7 +20,7 @@ impl Law for EncoderGain {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.1, 0.1],
             meaning: "error of the scale over it",
-        }],
+        }]),
         revealed_by: "turns; in swings the period against the amplitude",
         mappable: Mappable::Yes,
     };

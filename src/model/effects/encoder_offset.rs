@@ -1,18 +1,18 @@
 //! A sensor whose zero is not where the pendulum hangs; in one free decay equal to a tilt of the rig.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 
 pub struct EncoderOffset;
 
 impl Law for EncoderOffset {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "encoder_offset",
         group: Group::Reading,
         family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta + d",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "d",
             role: Role::Size,
             unit: "rad",
@@ -20,7 +20,7 @@ impl Law for EncoderOffset {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.1, 0.1],
             meaning: "reading at theta = 0",
-        }],
+        }]),
         revealed_by: "decays, whose peaks then differ between the sides",
         mappable: Mappable::Yes,
     };

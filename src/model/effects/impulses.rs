@@ -4,7 +4,7 @@
 //! for a step of the integrator. The velocity changes by `J`.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -16,13 +16,13 @@ const NORMAL: f64 = 0.398_942_280_401_432_7;
 pub struct Impulses;
 
 impl Law for Impulses {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "impulses",
         group: Group::Torque,
         family: Family::Drive,
         action: Action::Timed,
         formula: "+J exp(-s^2/2)/(w sqrt(2 pi)), s = (t - t0)/w, w = 0.05/w0, t time in the laboratory",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "J",
                 role: Role::Size,
@@ -41,7 +41,7 @@ impl Law for Impulses {
                 typical: [0.0, 3000.0],
                 meaning: "time of the knock, in the laboratory",
             },
-        ],
+        ]),
         revealed_by: "residuals that set in at once and ring on",
         mappable: Mappable::No,
     };

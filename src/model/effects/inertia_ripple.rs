@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Point,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, NOT_PERIODIC, Parameter, Parameters, Point,
     Power, Role,
 };
 use crate::lanes::Real;
@@ -14,13 +14,13 @@ use crate::lanes::sine::Fine;
 pub struct InertiaRipple;
 
 impl Law for InertiaRipple {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "inertia_ripple",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Inertia,
         formula: "inertia 1 + e cos(n theta + psi): -e cos(n theta + psi) th'' + e n sin(n theta + psi) v^2/2",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "e",
                 role: Role::Size,
@@ -48,7 +48,7 @@ impl Law for InertiaRipple {
                 typical: [-3.15, 3.15],
                 meaning: "phase at theta = 0",
             },
-        ],
+        ]),
         revealed_by: "slow turns beside fast ones, against a bearing harmonic",
         mappable: Mappable::Yes,
     };

@@ -1,19 +1,19 @@
 //! A pivot that also moves sideways, at the drive's frequency.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct LateralDrive;
 
 impl Law for LateralDrive {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "lateral_drive",
         group: Group::Drive,
         family: Family::Drive,
         action: Action::FurtherDrive,
         formula: "-e p cos(x + phase) cos(theta), x the drive's phase",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "e",
                 role: Role::Size,
@@ -32,7 +32,7 @@ impl Law for LateralDrive {
                 typical: [-3.15, 3.15],
                 meaning: "its phase against the drive",
             },
-        ],
+        ]),
         revealed_by: "forced runs, from rest above all",
         mappable: Mappable::Yes,
     };

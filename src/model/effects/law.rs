@@ -1,10 +1,11 @@
-//! What an effect is: its definition, and the formulas that it may have.
+//! Effects: their definitions, and the formulas that an effect may have.
 
 use std::hint::black_box;
 
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 use crate::model::drive::Motion;
+use crate::model::formula::ParameterSpec;
 
 /// No effect has more parameters.
 pub const MOST_PARAMETERS: usize = 3;
@@ -15,13 +16,13 @@ pub const NOT_PERIODIC: &str = "it does not repeat every turn, and nothing bound
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// It takes energy out of the motion.
+    /// Takes energy out of the motion.
     Damping,
     /// A torque that does not.
     Torque,
-    /// It changes what moves the pivot.
+    /// Changes the drive of the pivot.
     Drive,
-    /// It changes what the sensor reads; the motion is the same.
+    /// Changes the readings of the sensor only.
     Reading,
 }
 
@@ -70,7 +71,7 @@ impl Family {
     }
 }
 
-/// What of the motion an effect's torque depends on: it decides which path of the kernel runs.
+/// The quantities that an effect depends on; they decide which route of the kernel runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// A torque of angle and time.
@@ -88,9 +89,9 @@ pub enum Action {
     /// A force against the motion that jumps with the sign of the velocity and can hold the
     /// pendulum fast, of angle and time only.
     Friction,
-    /// The same, and depending on the velocity besides.
+    /// Dry friction that depends on the velocity too.
     SlidingFriction,
-    /// The same, and on the drive too, so that what it holds changes during a period.
+    /// Dry friction that depends on velocity and drive, so that the load it can hold changes during a period.
     LoadedFriction,
     /// Another amplitude, phase or frequency of the harmonic drive.
     Drive,
@@ -105,11 +106,11 @@ pub enum Action {
 /// Whether a map over initial conditions can have the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mappable {
-    /// It can.
+    /// Maps can have it.
     Yes,
     /// With time in the laboratory held at a stated value.
     Frozen,
-    /// It cannot; [`Law::bars_maps`] says why.
+    /// Maps cannot have it, by the reason of [`Law::bars_maps`].
     No,
 }
 
@@ -131,13 +132,13 @@ impl Mappable {
 pub enum Power {
     /// `w0^k`.
     Of(i32),
-    /// The same where `k` is not whole.
+    /// `w0^k` where `k` is not whole.
     Real(f64),
     /// `w0^(2 - n)` where `n` is the effect's parameter of that place.
     TwoMinus(usize),
 }
 
-/// What a parameter does in its effect. A search asks for it, never for a name.
+/// The role of a parameter in its effect. A search asks for the role, never for a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// How strong the effect is: at 0 there is none.
@@ -197,40 +198,77 @@ impl Role {
 
 /// A parameter of an effect.
 #[derive(Clone, Copy, Debug)]
-pub struct Parameter {
+pub struct Parameter<'a> {
     /// Its name in model files.
-    pub name: &'static str,
-    /// What it does.
+    pub name: &'a str,
+    /// Its role.
     pub role: Role,
     /// Its unit in SI.
-    pub unit: &'static str,
+    pub unit: &'a str,
     /// How it scales with `w0`.
     pub power: Power,
     /// The least and the greatest value that make sense, without dimensions.
     pub range: [f64; 2],
     /// Smallest and largest value of interest: where a search looks.
     pub typical: [f64; 2],
-    /// What it is.
-    pub meaning: &'static str,
+    /// Its meaning, in words.
+    pub meaning: &'a str,
 }
 
-/// All that is said about an effect, besides its formulas.
+/// The parameters of an effect, in order.
 #[derive(Clone, Copy, Debug)]
-pub struct Definition {
+pub enum Parameters<'a> {
+    /// Parameters of an effect of the library.
+    Library(&'static [Parameter<'static>]),
+    /// Parameters of a formula.
+    Formula(&'a [ParameterSpec]),
+}
+
+impl<'a> Parameters<'a> {
+    /// How many there are.
+    #[must_use]
+    pub const fn count(self) -> usize {
+        match self {
+            Self::Library(all) => all.len(),
+            Self::Formula(all) => all.len(),
+        }
+    }
+
+    /// The parameter at a place.
+    ///
+    /// # Panics
+    /// If there is no such place.
+    #[must_use]
+    pub fn at(self, place: usize) -> Parameter<'a> {
+        match self {
+            Self::Library(all) => all[place],
+            Self::Formula(all) => all[place].parameter(),
+        }
+    }
+
+    /// All of them.
+    pub fn iter(self) -> impl Iterator<Item = Parameter<'a>> {
+        (0..self.count()).map(move |place| self.at(place))
+    }
+}
+
+/// The definition of an effect, without its formulas.
+#[derive(Clone, Copy, Debug)]
+pub struct Definition<'a> {
     /// Its name, the field's standard term.
-    pub name: &'static str,
+    pub name: &'a str,
     /// Where it acts.
     pub group: Group,
     /// Its family.
     pub family: Family,
-    /// What it depends on.
+    /// The quantities that it depends on.
     pub action: Action,
     /// The term on the right of `th'' = ...`, per inertia, or the reading, or the drive.
-    pub formula: &'static str,
+    pub formula: &'a str,
     /// Its parameters, in order.
-    pub parameters: &'static [Parameter],
+    pub parameters: Parameters<'a>,
     /// Which data show it.
-    pub revealed_by: &'static str,
+    pub revealed_by: &'a str,
     /// Whether maps can have it.
     pub mappable: Mappable,
 }
@@ -302,8 +340,8 @@ impl<R: Real> Point<R> {
         self.velocity * self.sense
     }
 
-    /// The same, and the compiler cannot tell: it would else compute ahead of a loop over effects
-    /// whatever cosines and logarithms any effect of the library might want.
+    /// Hides the value from the compiler, which otherwise computes, ahead of a loop over effects, all
+    /// cosines and logarithms that any effect of the library needs.
     #[inline(always)]
     #[must_use]
     pub fn hidden(&self) -> Self {
@@ -327,7 +365,7 @@ impl<R: Real> Point<R> {
 /// derivatives, by the state and by the parameters alike, run through the same lines.
 pub trait Law {
     /// Name, formula, parameters and the rest.
-    const DEFINITION: Definition;
+    const DEFINITION: Definition<'static>;
 
     /// The parameters as the formulas below take them: what takes its time, like a reciprocal, is
     /// done once.
@@ -361,9 +399,9 @@ pub trait Law {
         None
     }
 
-    /// What it keeps of the motion, 0 where a motion begins; none where it keeps nothing. The formulas
+    /// The memory of the effect, 0 where a motion begins; none where it has none. The formulas
     /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
-    /// without a motion before, and no map can have it; one effect of a model may keep something. Of
+    /// without a motion before, and no map can have it; one effect of a model may have a memory. Of
     /// [`Action::Play`] it is the reading less the angle.
     #[inline(always)]
     #[must_use]
@@ -392,7 +430,7 @@ pub trait Law {
     #[inline(always)]
     fn drive<R: Real>(_: &[R; MOST_PARAMETERS], _: &mut Motion<R>) {}
 
-    /// What it adds to the inertia, which is 1 without it; of [`Action::Inertia`] only.
+    /// The inertia that it adds, over the inertia without it; of [`Action::Inertia`] only.
     #[inline(always)]
     fn inertia<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         at.constant(0.0)
@@ -401,7 +439,7 @@ pub trait Law {
     /// Whether it multiplies a reading, so that it acts on a velocity or a force as on an angle.
     const SCALES: bool = false;
 
-    /// What a sensor reads at the angle `theta`, passing it at `velocity` at the laboratory's time
+    /// The reading of a sensor at the angle `theta` and velocity `velocity`, at the laboratory's time
     /// `lab`.
     #[inline(always)]
     fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {

@@ -5,20 +5,20 @@
 //! passes zero the friction has a corner: steps end there.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct LoadDependentFriction;
 
 impl Law for LoadDependentFriction {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "load_dependent_friction",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::LoadedFriction,
         formula: "-k (|(1 + a) cos(theta) + v^2/w0^2| - 1) sign(v)",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "k",
             role: Role::Size,
             unit: "rad/s^2",
@@ -26,7 +26,7 @@ impl Law for LoadDependentFriction {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [1e-4, 0.3],
             meaning: "friction of the hanging weight; above theta_r the sum may be negative",
-        }],
+        }]),
         revealed_by: "rotation and large swings",
         mappable: Mappable::Yes,
     };
@@ -42,7 +42,7 @@ impl Law for LoadDependentFriction {
     }
 }
 
-/// What the rod carries over the weight.
+/// The load of the rod over its weight.
 #[inline(always)]
 fn load<R: Real>(at: &Point<R>) -> R {
     at.vertical * at.cosine() + at.velocity * at.velocity

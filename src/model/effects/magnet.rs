@@ -4,20 +4,20 @@
 //! widths that are allowed.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct Magnet;
 
 impl Law for Magnet {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "magnet",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Position,
         formula: "-amplitude (x/width) exp(-x^2/(2 width^2)), x = theta wrapped",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "amplitude",
                 role: Role::Size,
@@ -36,7 +36,7 @@ impl Law for Magnet {
                 typical: [0.05, 0.3],
                 meaning: "angle of the greatest torque",
             },
-        ],
+        ]),
         revealed_by: "passes of the bottom, and where the last swings end",
         mappable: Mappable::Yes,
     };

@@ -7,9 +7,11 @@
 pub mod law;
 
 pub use law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power,
-    Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters,
+    Point, Power, Role,
 };
+
+use std::sync::Arc;
 
 use super::drive::Motion;
 use super::formula::Formula;
@@ -21,14 +23,14 @@ macro_rules! library {
         $(mod $module;)*
 
         /// An effect of the library, or one of a user's own.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Debug, PartialEq, Eq)]
         pub enum Kind {
             $(
                 #[doc = concat!("`", stringify!($module), "`")]
                 $law,
             )*
             /// A formula.
-            Formula(&'static Formula),
+            Formula(Arc<Formula>),
         }
 
         impl Kind {
@@ -37,16 +39,16 @@ macro_rules! library {
 
             /// Name, formula, parameters and the rest.
             #[must_use]
-            pub const fn definition(self) -> &'static Definition {
+            pub fn definition(&self) -> Definition<'_> {
                 match self {
-                    $(Self::$law => &<$module::$law as Law>::DEFINITION,)*
+                    $(Self::$law => <$module::$law as Law>::DEFINITION,)*
                     Self::Formula(formula) => formula.definition(),
                 }
             }
 
             /// [`Law::ready`].
             #[must_use]
-            pub fn ready<R: Real>(self, parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
+            pub fn ready<R: Real>(&self, parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
                 match self {
                     $(Self::$law => $module::$law::ready(parameters),)*
                     Self::Formula(_) => parameters,
@@ -55,7 +57,7 @@ macro_rules! library {
 
             /// [`Law::torque`]; of a formula all of it, friction too, in the sense of `at`.
             #[inline(always)]
-            pub fn torque<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+            pub fn torque<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::torque(parameters, at),)*
                     Self::Formula(formula) => formula.whole(parameters, at),
@@ -64,7 +66,7 @@ macro_rules! library {
 
             /// [`Law::friction`]; none of a formula, which is in its torque.
             #[inline(always)]
-            pub fn friction<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+            pub fn friction<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::friction(parameters, at),)*
                     Self::Formula(_) => at.constant(0.0),
@@ -74,7 +76,7 @@ macro_rules! library {
             /// [`Law::switch`].
             #[inline(always)]
             pub fn switch<R: Real>(
-                self,
+                &self,
                 parameters: &[R; MOST_PARAMETERS],
                 at: &Point<R>,
             ) -> Option<R> {
@@ -87,7 +89,7 @@ macro_rules! library {
             /// [`Law::kept`].
             #[inline(always)]
             pub fn kept<R: Real>(
-                self,
+                &self,
                 parameters: &[R; MOST_PARAMETERS],
                 at: &Point<R>,
             ) -> Option<R> {
@@ -99,7 +101,7 @@ macro_rules! library {
 
             /// [`Law::inertia`].
             #[inline(always)]
-            pub fn inertia<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+            pub fn inertia<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::inertia(parameters, at),)*
                     Self::Formula(_) => at.constant(0.0),
@@ -109,7 +111,7 @@ macro_rules! library {
             /// [`Law::sway`].
             #[inline(always)]
             pub fn sway<R: Real>(
-                self,
+                &self,
                 parameters: &[R; MOST_PARAMETERS],
                 at: &Point<R>,
             ) -> Option<[R; 2]> {
@@ -120,7 +122,7 @@ macro_rules! library {
             }
 
             /// [`Law::aside`].
-            pub fn aside<R: Real>(self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
+            pub fn aside<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
                 match self {
                     $(Self::$law => $module::$law::aside(parameters, at),)*
                     Self::Formula(_) => at.constant(0.0),
@@ -128,7 +130,7 @@ macro_rules! library {
             }
 
             /// [`Law::drive`].
-            pub fn drive<R: Real>(self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
+            pub fn drive<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], motion: &mut Motion<R>) {
                 match self {
                     $(Self::$law => $module::$law::drive(parameters, motion),)*
                     Self::Formula(_) => {}
@@ -137,7 +139,7 @@ macro_rules! library {
 
             /// [`Law::reading`].
             pub fn reading<R: Real>(
-                self,
+                &self,
                 parameters: &[R; MOST_PARAMETERS],
                 theta: R,
                 velocity: R,
@@ -151,7 +153,7 @@ macro_rules! library {
 
             /// [`Law::SCALES`].
             #[must_use]
-            pub const fn scales(self) -> bool {
+            pub const fn scales(&self) -> bool {
                 match self {
                     $(Self::$law => <$module::$law as Law>::SCALES,)*
                     Self::Formula(_) => false,
@@ -160,7 +162,7 @@ macro_rules! library {
 
             /// [`Law::keeps_mirror`].
             #[must_use]
-            pub fn keeps_mirror(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+            pub fn keeps_mirror(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
                 match self {
                     $(Self::$law => $module::$law::keeps_mirror(parameters),)*
                     Self::Formula(formula) => formula.keeps_mirror(parameters),
@@ -169,7 +171,7 @@ macro_rules! library {
 
             /// [`Law::counts_turns`].
             #[must_use]
-            pub fn counts_turns(self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
+            pub fn counts_turns(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
                 match self {
                     $(Self::$law => $module::$law::counts_turns(parameters),)*
                     Self::Formula(formula) => formula.counts_turns(parameters),
@@ -178,7 +180,7 @@ macro_rules! library {
 
             /// [`Law::bars_maps`].
             #[must_use]
-            pub fn bars_maps(self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
+            pub fn bars_maps(&self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
                 match self {
                     $(Self::$law => $module::$law::bars_maps(parameters),)*
                     Self::Formula(formula) => formula.bars_maps(parameters),
@@ -239,25 +241,25 @@ impl Kind {
     pub fn named(name: &str) -> Result<Self, Error> {
         Self::ALL
             .iter()
-            .copied()
             .find(|kind| kind.definition().name == name)
+            .cloned()
             .ok_or_else(|| Error::Effect { name: name.to_owned() })
     }
 }
 
 impl Kind {
-    /// The same; of a formula, its corner stepped over.
+    /// This kind; of a formula, the version that steps over its corner.
     #[must_use]
-    pub fn loosened(self) -> Self {
+    pub fn loosened(&self) -> Self {
         match self {
-            Self::Formula(formula) => Self::Formula(formula.loosened()),
-            other => other,
+            Self::Formula(formula) => Self::Formula(Formula::loosened(formula)),
+            other => other.clone(),
         }
     }
 }
 
 /// An effect with values for its parameters, without dimensions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
     /// Which one.
     pub kind: Kind,
@@ -269,21 +271,22 @@ impl Effect {
     /// Checks number and ranges of the parameters.
     ///
     /// # Errors
-    /// [`Error::Lengths`] for the wrong number of them, [`Error::Range`] for the first one outside
+    /// [`Error::Values`] for the wrong number of them, [`Error::Range`] for the first one outside
     /// its range.
     pub fn new(kind: Kind, values: &[f64]) -> Result<Self, Error> {
-        let wanted = kind.definition().parameters;
-        if values.len() != wanted.len() {
-            let given = (wanted.len(), values.len());
-            return Err(Error::Lengths { given, names: (kind.definition().name, "the call") });
+        let definition = kind.definition();
+        let wanted = definition.parameters;
+        if values.len() != wanted.count() {
+            let given = [wanted.count(), values.len()];
+            return Err(Error::Values { effect: definition.name.to_owned(), given });
         }
         let mut parameters = [0.0; MOST_PARAMETERS];
-        for ((slot, value), parameter) in parameters.iter_mut().zip(values).zip(wanted) {
+        for ((slot, value), parameter) in parameters.iter_mut().zip(values).zip(wanted.iter()) {
             let [low, high] = parameter.range;
             if !(low..=high).contains(value) || !value.is_finite() {
                 return Err(Error::Parameter {
-                    effect: kind.definition().name,
-                    parameter: parameter.name,
+                    effect: definition.name.to_owned(),
+                    parameter: parameter.name.to_owned(),
                     value: *value,
                     allowed: parameter.range,
                 });
@@ -296,7 +299,7 @@ impl Effect {
     /// The values of its parameters.
     #[must_use]
     pub fn values(&self) -> &[f64] {
-        &self.parameters[..self.kind.definition().parameters.len()]
+        &self.parameters[..self.kind.definition().parameters.count()]
     }
 
     /// Its parameters as its formulas take them, in numbers of another kind: `number` makes one of
@@ -334,7 +337,7 @@ impl Effect {
     /// Whether it is the same for the mirrored motion half a period of the drive later, the pivot at rest.
     #[must_use]
     pub fn is_mirror_symmetric_later(&self) -> bool {
-        match self.kind {
+        match &self.kind {
             Kind::Formula(formula) => formula.keeps_mirror_later(&self.parameters),
             kind => kind.keeps_mirror(&self.parameters),
         }

@@ -1,4 +1,4 @@
-//! A pivot that gives way sideways, with a mode of its own.
+//! A pivot that gives way sideways, with its own mode.
 //!
 //! With the pivot's displacement `x` over the pendulum's length, Lagrange's equations are
 //! `th'' + x'' cos th = all else` and `x'' + 2 z wx x' + wx^2 x = -mu (th'' cos th - v^2 sin th)`. With
@@ -12,20 +12,20 @@
 //! pulls at it, and may so release it.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct PivotCompliance;
 
 impl Law for PivotCompliance {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "pivot_compliance",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Inertia,
         formula: "-x'' cos theta, x'' + 2 z wx x' + wx^2 x = -mu (theta'' cos theta - v^2 sin theta)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "mu",
                 role: Role::Size,
@@ -53,7 +53,7 @@ impl Law for PivotCompliance {
                 typical: [0.005, 0.1],
                 meaning: "damping ratio of that mode",
             },
-        ],
+        ]),
         revealed_by: "fast turns beside small swings: a ripple that is strongest near wx",
         mappable: Mappable::No,
     };

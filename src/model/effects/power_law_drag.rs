@@ -2,10 +2,10 @@
 //!
 //! `|v|^n sign v` is `v (v^2 + e^2)^((n - 1)/2)` with `e = 1e-6`, far below what a sensor sees: so
 //! the derivatives by velocity and power are finite at rest too. Powers below 1/2 are refused: they
-//! are dry friction in all but name, too abrupt for steps without events of their own.
+//! are dry friction in all but name, too abrupt for steps without events.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
@@ -15,13 +15,13 @@ const FLOOR: f64 = 1e-12;
 pub struct PowerLawDrag;
 
 impl Law for PowerLawDrag {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "power_law_drag",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Kinked,
         formula: "-q |v|^n sign(v)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "q",
                 role: Role::Size,
@@ -40,7 +40,7 @@ impl Law for PowerLawDrag {
                 typical: [1.1, 3.0],
                 meaning: "power of the velocity",
             },
-        ],
+        ]),
         revealed_by: "large amplitudes and rotation, against small ones",
         mappable: Mappable::Yes,
     };

@@ -1,20 +1,20 @@
 //! Drag in proportion to the square of the velocity: air at high speed.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct QuadraticDrag;
 
 impl Law for QuadraticDrag {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "quadratic_drag",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Kinked,
         formula: "-q v |v|",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "q",
             role: Role::Size,
             unit: "1/rad",
@@ -22,7 +22,7 @@ impl Law for QuadraticDrag {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [1e-4, 0.3],
             meaning: "drag coefficient over the moment of inertia",
-        }],
+        }]),
         revealed_by: "large amplitudes and rotation",
         mappable: Mappable::Yes,
     };

@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -13,13 +13,13 @@ use crate::lanes::sine::Fine;
 pub struct RigTilt;
 
 impl Law for RigTilt {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "rig_tilt",
         group: Group::Torque,
         family: Family::PositionTorque,
         action: Action::Position,
         formula: "-(sin(theta + d) - sin(theta)), in SI times w0^2",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "d",
             role: Role::Size,
             unit: "rad",
@@ -27,7 +27,7 @@ impl Law for RigTilt {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [-0.1, 0.1],
             meaning: "angle by which gravity is turned; it hangs at -d",
-        }],
+        }]),
         revealed_by: "forced runs beside free ones, where an encoder offset differs from it",
         mappable: Mappable::Yes,
     };

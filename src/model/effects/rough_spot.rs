@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_1_PI;
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
@@ -11,13 +11,13 @@ use crate::lanes::sine::Fine;
 pub struct RoughSpot;
 
 impl Law for RoughSpot {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "rough_spot",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::Friction,
         formula: "-f exp(-(1 - cos(theta - th0))/w^2) sign(v)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "f",
                 role: Role::Size,
@@ -45,7 +45,7 @@ impl Law for RoughSpot {
                 typical: [0.1, 0.4],
                 meaning: "width: at w from the middle it is exp(-1/2) of the most",
             },
-        ],
+        ]),
         revealed_by: "swings that end short of it beside wider ones",
         mappable: Mappable::Yes,
     };

@@ -1,21 +1,21 @@
 //! A sensor that is late: a filter of first order, `tau y' = theta - y`, much quicker than the swing.
 //!
-//! What is kept is the first power of `tau`; the next is `tau^2 th''`, smaller by `tau w0`. A free decay
-//! read late is one that began late: only what has a clock of its own, a drive, shows it.
+//! The term of first order in `tau` is kept; the next, `tau^2 th''`, is smaller by `tau w0`. A free decay
+//! that is read late equals one that began late: only a drive, which has its own clock, shows the lag.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 
 pub struct SensorLag;
 
 impl Law for SensorLag {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "sensor_lag",
         group: Group::Reading,
         family: Family::Reading,
         action: Action::Reading,
         formula: "reading theta - tau v",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "tau",
             role: Role::Size,
             unit: "s",
@@ -23,7 +23,7 @@ impl Law for SensorLag {
             range: [f64::NEG_INFINITY, f64::INFINITY],
             typical: [1e-4, 0.1],
             meaning: "time by which the reading is late; negative where the drive's clock is",
-        }],
+        }]),
         revealed_by: "forced runs at several frequencies, against a drive phase",
         mappable: Mappable::Yes,
     };

@@ -3,20 +3,20 @@
 //! The Gaussian form of Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30, 1083.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct StribeckFriction;
 
 impl Law for StribeckFriction {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "stribeck_friction",
         group: Group::Damping,
         family: Family::DryFriction,
         action: Action::SlidingFriction,
         formula: "-a exp(-(v/vs)^2) sign(v)",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "a",
                 role: Role::Size,
@@ -35,7 +35,7 @@ impl Law for StribeckFriction {
                 typical: [0.02, 1.0],
                 meaning: "velocity over which it falls off",
             },
-        ],
+        ]),
         revealed_by: "the last swings of a decay, against Coulomb friction in the earlier ones",
         mappable: Mappable::Yes,
     };

@@ -3,20 +3,20 @@
 //! Its seconds are what all rates are counted in, `w0` and damping too: only the drive, which has a clock
 //! of its own, has another frequency in them. That is an error of the drive's frequency, exactly.
 
-use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Power, Role};
+use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 pub struct Timebase;
 
 impl Law for Timebase {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "timebase",
         group: Group::Drive,
         family: Family::Reading,
         action: Action::Drive,
         formula: "omega/(1 + e), the record's time being (1 + e) t",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "e",
             role: Role::Size,
             unit: "1",
@@ -24,7 +24,7 @@ impl Law for Timebase {
             range: [-0.9, 10.0],
             typical: [-0.01, 0.01],
             meaning: "seconds that the record's clock gains in one",
-        }],
+        }]),
         revealed_by: "forced runs; a better clock tells it from a drive frequency",
         mappable: Mappable::Yes,
     };

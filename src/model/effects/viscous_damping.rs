@@ -1,20 +1,20 @@
 //! Damping in proportion to the velocity, the paper's `gamma`.
 
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct ViscousDamping;
 
 impl Law for ViscousDamping {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "viscous_damping",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Velocity,
         formula: "-gamma v",
-        parameters: &[Parameter {
+        parameters: Parameters::Library(&[Parameter {
             name: "gamma",
             role: Role::Size,
             unit: "1/s",
@@ -22,7 +22,7 @@ impl Law for ViscousDamping {
             range: [0.0, f64::INFINITY],
             typical: [1e-3, 1.0],
             meaning: "c/(m w0), twice the damping ratio; in SI c/m",
-        }],
+        }]),
         revealed_by: "any decay",
         mappable: Mappable::Yes,
     };

@@ -2,20 +2,20 @@
 
 use super::coulomb_warm_up::{TIME_CONSTANT, cooled};
 use super::law::{
-    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,
 };
 use crate::lanes::Real;
 
 pub struct ViscousWarmUp;
 
 impl Law for ViscousWarmUp {
-    const DEFINITION: Definition = Definition {
+    const DEFINITION: Definition<'static> = Definition {
         name: "viscous_warm_up",
         group: Group::Damping,
         family: Family::Damping,
         action: Action::Velocity,
         formula: "+b (1 - exp(-t/tau)) v, t time in the laboratory",
-        parameters: &[
+        parameters: Parameters::Library(&[
             Parameter {
                 name: "b",
                 role: Role::Size,
@@ -26,7 +26,7 @@ impl Law for ViscousWarmUp {
                 meaning: "what gamma falls by in the end; below 0 it rises",
             },
             TIME_CONSTANT,
-        ],
+        ]),
         revealed_by: "the same run before, while and after the rig warms up",
         mappable: Mappable::Frozen,
     };

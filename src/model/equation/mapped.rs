@@ -1,10 +1,18 @@
-//! The equation with plain numbers, over numbers of another kind.
+//! The equation over plain numbers: acceleration, and conversion to other numbers.
 
 use super::Equation;
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 impl Equation<f64> {
+    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
+    #[must_use]
+    pub fn acceleration_at(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
+        let forcing = self.forcing(tau);
+        let at = self.point(&forcing, theta, velocity, 1_f64.copysign(velocity));
+        self.acceleration(&forcing, &at)
+    }
+
     /// The equation over numbers in the shape of `number`.
     #[inline(always)]
     #[must_use]
@@ -32,27 +40,34 @@ impl Equation<f64> {
             inertias: Vec::new(),
             frictions: Vec::new(),
             formulas: Vec::new(),
-            keepers: [None; 2],
+            keepers: [None, None],
             mode: None,
             corner: self
                 .corner
+                .clone()
                 .map(|(kind, [a, b, c])| (kind, [number.like(a), number.like(b), number.like(c)])),
             sideways: self.sideways,
             plain: self.plain,
             holds: self.holds,
         };
         for (kind, [a, b, c]) in &self.torques {
-            equation.torques.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .torques
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (kind, [a, b, c]) in &self.inertias {
-            equation.inertias.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .inertias
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (kind, [a, b, c]) in &self.frictions {
-            equation.frictions.push((*kind, [number.like(*a), number.like(*b), number.like(*c)]));
+            equation
+                .frictions
+                .push((kind.clone(), [number.like(*a), number.like(*b), number.like(*c)]));
         }
         for (formula, [a, b, c]) in &self.formulas {
             let parameters = [number.like(*a), number.like(*b), number.like(*c)];
-            equation.formulas.push((formula, parameters));
+            equation.formulas.push((formula.clone(), parameters));
         }
         equation
     }

@@ -16,15 +16,16 @@ mod probe;
 mod program;
 mod tree;
 
-use std::collections::BTreeMap;
+use std::collections::VecDeque;
 use std::f64::consts::PI;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use self::program::{Kinks, Program, SLOTS};
 use self::tree::{Function, Tree, Variable};
 use super::effects::law::NOT_PERIODIC;
 use super::effects::{
-    Action, Definition, Family, Group, MOST_PARAMETERS, Mappable, Parameter, Point, Power, Role,
+    Action, Definition, Family, Group, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point,
+    Power, Role,
 };
 use crate::error::Error;
 use crate::lanes::Real;
@@ -34,7 +35,7 @@ const NOT_IN_STEP: &str =
     "it does not repeat every period of the drive, and a map takes whole periods";
 
 /// A formula as its user gives it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Spec {
     /// Its name.
     pub name: String,
@@ -47,7 +48,7 @@ pub struct Spec {
 }
 
 /// A parameter of a formula as its user gives it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSpec {
     /// Its name.
     pub name: String,
@@ -61,35 +62,42 @@ pub struct ParameterSpec {
     pub range: [f64; 2],
     /// The smallest and the largest value of interest, without dimensions.
     pub typical: [f64; 2],
-    /// What it is.
+    /// Its meaning, in words.
     pub meaning: String,
-    /// What it does; as the term shows it where nothing is said.
+    /// Its role; by default the one that the term shows.
     pub role: Option<Role>,
 }
 
 /// A formula that is ready to run.
 #[derive(Debug)]
 pub struct Formula {
-    definition: Definition,
+    /// The text of the user, with the role of every parameter.
+    spec: Spec,
+    group: Group,
+    action: Action,
+    mappable: Mappable,
     tree: Tree,
     program: Program,
     switch: Option<Program>,
-    /// The same, its corner stepped over: for a model in which another effect has one.
-    loose: Option<&'static Self>,
+    /// The version that steps over its corner, for a model in which another effect has one.
+    loose: Option<Arc<Self>>,
     timed: bool,
     driven: bool,
 }
 
+/// How many formulas are remembered.
+const MOST_RECENT: usize = 64;
+
+/// The formulas read last: a model that comes again is not checked again.
+static RECENT: Mutex<VecDeque<(Spec, Arc<Formula>)>> = Mutex::new(VecDeque::new());
+
 impl PartialEq for Formula {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self, other)
+        self.spec == other.spec && self.switch.is_some() == other.switch.is_some()
     }
 }
 
 impl Eq for Formula {}
-
-/// All formulas so far. They last as long as the library: each text is kept once.
-static KNOWN: Mutex<BTreeMap<String, &'static Formula>> = Mutex::new(BTreeMap::new());
 
 impl Formula {
     /// Reads and checks a formula.
@@ -97,29 +105,30 @@ impl Formula {
     /// # Errors
     /// [`Error::Formula`] for a name that is taken, a term that cannot be read, units that do not
     /// balance, a jump elsewhere than where the velocity passes zero, or a value that is no number.
-    pub fn new(spec: &Spec) -> Result<&'static Self, Error> {
-        let key = format!("{spec:?}");
-        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(formula) = known.get(&key) {
-            return Ok(formula);
+    pub fn new(spec: &Spec) -> Result<Arc<Self>, Error> {
+        let mut recent = RECENT.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, formula)) = recent.iter().find(|(known, _)| known == spec) {
+            return Ok(formula.clone());
         }
         let formula =
             Self::made(spec).map_err(|why| Error::Formula { name: spec.name.clone(), why })?;
-        known.insert(key, formula);
+        recent.truncate(MOST_RECENT - 1);
+        recent.push_front((spec.clone(), formula.clone()));
         Ok(formula)
     }
 
-    fn made(spec: &Spec) -> Result<&'static Self, String> {
+    fn made(spec: &Spec) -> Result<Arc<Self>, String> {
         check::names(spec)?;
         let names: Vec<String> = spec.parameters.iter().map(|p| p.name.clone()).collect();
         let tree = parse::parse(&spec.term, &names)?;
         let mut parameters: Vec<Parameter> =
-            spec.parameters.iter().map(ParameterSpec::kept).collect();
+            spec.parameters.iter().map(ParameterSpec::parameter).collect();
         check::term(&tree, &parameters)?;
         for (place, said) in spec.parameters.iter().enumerate() {
             parameters[place].role =
                 said.role.unwrap_or_else(|| probe::role(&tree, &parameters, place));
         }
+        let roles: Vec<Role> = parameters.iter().map(|parameter| parameter.role).collect();
         let jumps = probe::jumps(&tree, &parameters);
         let steep_sign = !jumps && tree.has_steep_speed();
         let kinks = tree.kinks();
@@ -130,6 +139,7 @@ impl Formula {
         };
         let program = compiled(&tree, corner)?;
         let switch = corner.map(|argument| compiled(argument, None)).transpose()?;
+        let loose = corner.map(|_| compiled(&tree, None)).transpose()?;
         let only_rubs = jumps && is_odd(&program, &parameters);
         let timed = tree.names(|v| v == Variable::Phase);
         let driven = timed || tree.names(|v| v == Variable::Pivot);
@@ -148,49 +158,51 @@ impl Formula {
             Action::Position => Group::Torque,
             _ => Group::Damping,
         };
-        let definition = Definition {
-            name: kept(&spec.name),
+        let mut spec = spec.clone();
+        for (own, known) in roles.into_iter().zip(&mut spec.parameters) {
+            known.role = Some(own);
+        }
+        let whole = Self {
+            spec,
             group,
-            family: Family::Own,
             action,
-            formula: kept(&spec.term),
-            parameters: Box::leak(parameters.into_boxed_slice()),
-            revealed_by: if spec.revealed_by.is_empty() {
-                revealed_by(group, action)
-            } else {
-                kept(&spec.revealed_by)
-            },
             mappable,
+            tree,
+            program,
+            switch,
+            loose: None,
+            timed,
+            driven,
         };
-        let loose = if switch.is_some() {
-            let program = compiled(&tree, None)?;
-            Some(Self {
-                definition,
-                tree: tree.clone(),
-                program,
-                switch: None,
-                loose: None,
-                timed,
-                driven,
-            })
-        } else {
-            None
-        };
-        let loose = loose.map(|formula| &*Box::leak(Box::new(formula)));
-        let whole = Self { definition, tree, program, switch, loose, timed, driven };
-        Ok(Box::leak(Box::new(whole)))
+        let Some(program) = loose else { return Ok(Arc::new(whole)) };
+        let (spec, tree) = (whole.spec.clone(), whole.tree.clone());
+        let loose = Self { spec, tree, program, switch: None, loose: None, ..whole };
+        Ok(Arc::new(Self { loose: Some(Arc::new(loose)), ..whole }))
     }
 
-    /// What is said about it.
+    /// Its definition as an effect.
     #[must_use]
-    pub const fn definition(&'static self) -> &'static Definition {
-        &self.definition
+    pub fn definition(&self) -> Definition<'_> {
+        let Self { spec, group, action, mappable, .. } = self;
+        let said = spec.revealed_by.as_str();
+        Definition {
+            name: &spec.name,
+            group: *group,
+            family: Family::Own,
+            action: *action,
+            formula: &spec.term,
+            parameters: Parameters::Formula(&spec.parameters),
+            revealed_by: if said.is_empty() { revealed_by(*group, *action) } else { said },
+            mappable: *mappable,
+        }
     }
 
     /// Whether it is proportional to its first parameter, as a candidate must be.
     #[must_use]
     pub fn is_proportional(&self) -> bool {
-        probe::is_proportional(&self.tree, self.definition.parameters)
+        let parameters: Vec<Parameter> =
+            self.spec.parameters.iter().map(ParameterSpec::parameter).collect();
+        probe::is_proportional(&self.tree, &parameters)
     }
 
     /// Whether it changes with the phase of the drive, also where the pivot rests.
@@ -205,10 +217,10 @@ impl Formula {
         self.driven
     }
 
-    /// The same without a corner of its own.
+    /// The version that steps over its corner.
     #[must_use]
-    pub fn loosened(&'static self) -> &'static Self {
-        self.loose.unwrap_or(self)
+    pub fn loosened(self: &Arc<Self>) -> Arc<Self> {
+        self.loose.as_ref().unwrap_or(self).clone()
     }
 
     /// All of it, in the sense of the motion that is held.
@@ -229,7 +241,7 @@ impl Formula {
 
     fn rubs(&self) -> bool {
         let frictions = [Action::Friction, Action::SlidingFriction, Action::LoadedFriction];
-        frictions.contains(&self.definition.action)
+        frictions.contains(&self.action)
     }
 
     /// The argument of its absolute value.
@@ -247,7 +259,7 @@ impl Formula {
         probe::mirrors(&self.tree, parameters, 0.0)
     }
 
-    /// The same half a period of the drive later.
+    /// Whether mirror images half a period of the drive later stay mirror images.
     #[must_use]
     pub fn keeps_mirror_later(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
         probe::mirrors(&self.tree, parameters, PI)
@@ -267,12 +279,14 @@ impl Formula {
 }
 
 impl ParameterSpec {
-    fn kept(&self) -> Parameter {
+    /// The parameter of the effect.
+    #[must_use]
+    pub fn parameter(&self) -> Parameter<'_> {
         let whole = self.power.fract() == 0.0 && self.power.abs() < 64.0;
         Parameter {
-            name: kept(&self.name),
+            name: &self.name,
             role: self.role.unwrap_or(Role::Size),
-            unit: kept(&self.unit),
+            unit: &self.unit,
             power: match self.less {
                 Some(place) => Power::TwoMinus(place),
                 None if whole => Power::Of(self.power as i32),
@@ -280,13 +294,9 @@ impl ParameterSpec {
             },
             range: self.range,
             typical: self.typical,
-            meaning: kept(&self.meaning),
+            meaning: &self.meaning,
         }
     }
-}
-
-fn kept(text: &str) -> &'static str {
-    String::leak(text.to_owned())
 }
 
 /// Whether all of it changes its sign with the sense of the motion.
@@ -314,7 +324,7 @@ fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
     })
 }
 
-/// Which path of the kernel runs.
+/// Which route of the kernel runs.
 fn action(tree: &Tree, jumps: bool, only_rubs: bool, loaded: bool) -> Action {
     let mut speeds = false;
     let mut beside = false;

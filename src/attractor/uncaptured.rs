@@ -1,0 +1,111 @@
+//! Trajectories that no trap has captured: chaotic, or not yet settled.
+
+use std::sync::atomic::AtomicBool;
+
+use super::capture::{self, Fate, Outcome};
+use super::chaos::{self, ChaoticSet, spread};
+use super::find::{Catalogue, Ending};
+use super::kind::Kind;
+use crate::integrate::{State, Strobe};
+
+/// Power of e by which damping must shrink a free motion before uncaptured trajectories can count as
+/// chaotic.
+const LEAST_DECAY: f64 = 20.0;
+
+/// Periods for which chaos is watched where another attractor could end it.
+const LONG: u32 = 5000;
+
+impl Catalogue {
+    /// Decides which uncaptured trajectories are chaotic.
+    ///
+    /// Watched trajectories are left where watching ends.
+    pub(super) fn watch(
+        &mut self,
+        strobe: &Strobe,
+        endings: &mut [Ending],
+        bound: u32,
+        cancel: &AtomicBool,
+    ) {
+        let open: Vec<(usize, State)> = endings
+            .iter()
+            .enumerate()
+            .filter_map(|(k, end)| if let Ending::Open(s) = end { Some((k, *s)) } else { None })
+            .collect();
+        let stride = open.len().div_ceil(self.effort.watched).max(1);
+        let (places, sample): (Vec<usize>, Vec<State>) = open.into_iter().step_by(stride).unzip();
+        let length = self.effort.watch * bound;
+        // Nearly conservative motion takes longer than this to show where it ends.
+        let watched = strobe.pendulum.period() * f64::from(bound + length);
+        if sample.is_empty() || strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
+            return;
+        }
+        let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
+            return;
+        };
+        for (place, outcome) in places.into_iter().zip(&outcomes) {
+            endings[place] = self.ending(outcome);
+        }
+        if outcomes.iter().all(|o| o.fate != Fate::Open) {
+            return;
+        }
+        let captured: Vec<Option<u32>> = outcomes.iter().map(Outcome::end).collect();
+        let new: Vec<ChaoticSet> =
+            chaos::sets(strobe, &self.traps, &sample, &captured, length, &self.effort, cancel)
+                .into_iter()
+                .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
+                .collect();
+        if new.is_empty() {
+            return;
+        }
+        let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
+        if self.find_short_cycles(strobe, &points, cancel) {
+            // A trajectory taken for chaotic may end there.
+            return self.watch(strobe, endings, bound, cancel);
+        }
+        let symmetric = strobe.pendulum.is_mirror_symmetric();
+        for set in new {
+            if self.sets.iter().any(|old| old.same_as(&set))
+                || !self.stays(strobe, &set, length, cancel)
+            {
+                continue;
+            }
+            let image = set.mirrored();
+            if symmetric && !set.same_as(&image) {
+                self.sets.push(image);
+            }
+            self.sets.push(set);
+        }
+        self.rebuild(&strobe.pendulum);
+    }
+
+    /// Whether what was taken for chaos beside another attractor is no way to it.
+    ///
+    /// Such transients are long: the set is watched for [`LONG`] periods from some of its points, or until one
+    /// run ends.
+    fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
+        if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
+            return true;
+        }
+        let mut points = spread(&set.points, self.effort.proved);
+        let (mut over, mut part) = (0, length.min(LONG));
+        while over < LONG {
+            let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);
+            let Some(outcomes) = found.filter(|all| all.iter().all(|o| o.fate == Fate::Open))
+            else {
+                return false;
+            };
+            points = outcomes.iter().map(|o| o.state).collect();
+            over += part;
+            part = over.min(LONG - over);
+        }
+        true
+    }
+}
+
+impl ChaoticSet {
+    fn same_as(&self, other: &Self) -> bool {
+        self.kind == other.kind
+            && self.sense == other.sense
+            && (self.kind == Kind::QuasiperiodicRotation || self.region.meets(&other.region))
+    }
+}

@@ -1,0 +1,83 @@
+//! Long calls: without the interpreter lock, with Ctrl-C and progress.
+
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use pendmap::error::Error;
+use pendmap::maps::control::{Control, pool};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use super::raise;
+
+/// How often signals and progress are looked at.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Runs `work` on another thread and waits for it, detached from the interpreter; at every
+/// pause it checks for signals and calls `progress(done, total)`.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let report = |py: Python<'_>, control: &Control| match progress {
+        Some(progress) => progress.call1(py, control.progress()).map(|_| ()),
+        None => Ok(()),
+    };
+    let (result, stop) = stopped(py, report, work)?;
+    stop.map_or_else(|| result.map_err(raise), Err)
+}
+
+/// Like [`watched`], in a pool of this call's own: threads that outlived a call would be missing in a
+/// forked child, and whoever gave them work there would wait for ever.
+pub fn pooled<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    watched(py, progress, |control| pool(threads)?.install(|| work(control)))
+}
+
+/// Like [`watched`] with anything done at every pause; what `work` came to, and what stopped it, a
+/// signal or an error of `report`.
+pub fn stopped<T: Send>(
+    py: Python<'_>,
+    mut report: impl FnMut(Python<'_>, &Control) -> PyResult<()> + Send,
+    work: impl FnOnce(&Control) -> Result<T, Error> + Send,
+) -> PyResult<(Result<T, Error>, Option<PyErr>)> {
+    let control = Control::default();
+    py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let shared = &control;
+            let task = move || {
+                // The receiver waits until this arrives, so it is still there.
+                let _ = sender.send(work(shared));
+            };
+            let begun = thread::Builder::new().spawn_scoped(scope, task);
+            begun.map_err(|why| raise(Error::Threads(why.to_string())))?;
+            let mut stop: Option<PyErr> = None;
+            loop {
+                match receiver.recv_timeout(PAUSE) {
+                    Ok(result) => return Ok((result, stop)),
+                    Err(RecvTimeoutError::Timeout) if stop.is_none() => {
+                        let look = Python::attach(|py| {
+                            py.check_signals()?;
+                            report(py, shared)
+                        });
+                        if let Err(error) = look {
+                            shared.cancel();
+                            stop = Some(error);
+                        }
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => {
+                        return Err(PyRuntimeError::new_err("a worker thread ended unexpectedly"));
+                    }
+                }
+            }
+        })
+    })
+}
