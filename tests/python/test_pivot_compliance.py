@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import InputError
+from pendmap.virtual_rig import EFFECTS
 from pendmap.virtual_rig.effects.base import Drive
-from pendmap.virtual_rig.effects.stand import PivotCompliance
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
 
@@ -51,7 +51,7 @@ class Case:
     def rig(self, until: float) -> Path:
         """The virtual rig's motion."""
         arrays = (np.array([x]) for x in (*self.drive, 0.0))
-        effect = PivotCompliance(mu=self.mu, wx=self.wx, z=self.z)
+        effect = EFFECTS["pivot_compliance"](mu=self.mu, wx=self.wx, z=self.z)
         parameters = Parameters(W0, self.c, self.friction)
         equation = Equation(parameters, Drive.harmonic(*arrays), np.zeros(1), [effect])
         begin, theta = np.zeros(1), np.array([self.theta])
