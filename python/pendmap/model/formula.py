@@ -108,7 +108,9 @@ class Formula:
             )
         names = list(self.parameters)
         try:
-            parts = tuple(_parameter(n, self.parameters[n], names) for n in names)
+            parts, tables = zip(
+                *(_parameter(n, self.parameters[n], names) for n in names), strict=True
+            )
         except InputError as error:
             raise InputError(f"formula '{self.name}': {error}") from None
         if self.name in _TAKEN:
@@ -119,7 +121,7 @@ class Formula:
         key = FormulaKey(self.name, self.term, self.revealed_by, parts)
         with core_errors():
             entry, proportional = _core.formula(key)
-        kept = {part.name: _said(part, names) for part in parts}
+        kept = dict(zip(names, tables, strict=True))
         found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
         for what, value in found.items():
             object.__setattr__(self, what, value)
@@ -244,7 +246,10 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
         raise InputError(f"{shown}: {error}") from None
 
 
-def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
+def _parameter(
+    name: object, given: object, names: list[Any]
+) -> tuple[ParameterKey, dict[str, Any]]:
+    """Return a parameter as the core takes it, and as a table without defaults."""
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
@@ -257,12 +262,24 @@ def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
     power, less = _power(name, said["power"], names)
-    unit = _text(name, "unit", said.get("unit", _unit(power, less, names)))
-    meaning = _text(name, "meaning", said.get("meaning", ""))
-    typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
-    allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
-    role = None if "role" not in said else _role(name, said["role"], first=name == names[0])
-    return ParameterKey(name, power, less, unit, allowed, typical, meaning, role)
+    unit = f"s^{-power:g}" if power != 0 else "1"
+    defaults = {
+        "typical": _TYPICAL,
+        "range": (-math.inf, math.inf),
+        "unit": unit if less is None else f"s^({names[less]}-2)",
+        "meaning": "",
+        "role": None,
+    }
+    found: dict[str, Any] = dict(defaults)
+    for what in ("unit", "meaning", "typical", "range", "role"):
+        if what in said:
+            found[what] = _checked(
+                f"parameter '{name}': {what}", what, said[what], first=name == names[0]
+            )
+    kept = {key: value for key, value in found.items() if value != defaults[key]}
+    table = {key: list(v) if isinstance(v, tuple) else v for key, v in kept.items()}
+    key = ParameterKey(name=name, power=power, less=less, **found)
+    return key, {"power": power if less is None else f"2 - {names[less]}"} | table
 
 
 def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:
@@ -279,55 +296,25 @@ def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | Non
     return 2.0, names.index(match[1])
 
 
-def _text(name: str, what: str, value: object) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"parameter '{name}': {what} must be a text, got {short_repr(value)}")
-    return value
-
-
-def _role(name: str, value: object, *, first: bool) -> str:
-    """Return a role that is known; the first parameter, and no other, is the size."""
-    from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
-
-    known = [role for role in _core.roles() if (role == "size") == first]
-    if value not in known:
-        raise InputError(
-            f"parameter '{name}': role must be one of {', '.join(known)}, got {short_repr(value)}"
+def _checked(where: str, what: str, value: object, *, first: bool) -> object:
+    """Return a detail of a parameter, checked; the first parameter, and no other, is the size."""
+    if what in {"typical", "range"}:
+        if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
+            raise InputError(f"{where} must be [low, high], got {short_repr(value)}")
+        unbounded = what == "range"
+        return tuple(
+            end
+            if unbounded and isinstance(end, float) and math.isinf(end)
+            else check_number(where, end)
+            for end in value
         )
-    return str(value)
+    if what == "role":
+        from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
 
-
-def _unit(power: float, less: int | None, names: list[Any]) -> str:
-    if less is not None:
-        return f"s^({names[less]}-2)"
-    return f"s^{-power:g}" if power != 0 else "1"
-
-
-def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        shown = short_repr(value)
-        raise InputError(f"parameter '{name}': {what} must be [low, high], got {shown}")
-    low, high = (
-        end
-        if what == "range" and isinstance(end, float) and math.isinf(end)
-        else check_number(f"parameter '{name}': {what}", end)
-        for end in value
-    )
-    return low, high
-
-
-def _said(part: ParameterKey, names: list[str]) -> dict[str, Any]:
-    """Return a parameter as a table, without defaults."""
-    _, power, less, unit, allowed, typical, meaning, role = part
-    said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}
-    if typical != _TYPICAL:
-        said["typical"] = list(typical)
-    if allowed != (-math.inf, math.inf):
-        said["range"] = list(allowed)
-    if unit != _unit(power, less, names):
-        said["unit"] = unit
-    if meaning:
-        said["meaning"] = meaning
-    if role:
-        said["role"] = role
-    return said
+        known = [role for role in _core.roles() if (role == "size") == first]
+        if value not in known:
+            wanted = ", ".join(known)
+            raise InputError(f"{where} must be one of {wanted}, got {short_repr(value)}")
+    elif not isinstance(value, str):
+        raise InputError(f"{where} must be a text, got {short_repr(value)}")
+    return value

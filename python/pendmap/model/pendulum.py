@@ -12,7 +12,7 @@ from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS
-from pendmap.model.tables import in_file, read_arguments
+from pendmap.model.tables import read_model
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -162,14 +162,7 @@ class Pendulum:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
         """Read a model file without dimensions, by :func:`pendmap.load_model`; refuse one in SI."""
-        si, arguments = read_arguments(path)
-        if si:
-            raise InputError(
-                f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
-                "dimensions"
-            )
-        with in_file(path):
-            return cls(**arguments)
+        return read_model(path, bare=cls)
 
 
 def checked_effects(

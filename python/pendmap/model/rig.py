@@ -13,7 +13,7 @@ from pendmap.model.effects import definition, library
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.model.tables import SI_KEYS, in_file, read_arguments
+from pendmap.model.tables import SI_KEYS, read_model
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -240,14 +240,7 @@ class Rig:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a model file in SI, by :func:`pendmap.load_model`; refuse one without dimensions."""
-        si, arguments = read_arguments(path)
-        if not si:
-            raise InputError(
-                f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
-                "puts it in SI with its w0"
-            )
-        with in_file(path):
-            return cls.of(**arguments)
+        return read_model(path, si=cls.of)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:

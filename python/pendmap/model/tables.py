@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from pendmap.errors import InputError, check_number, check_whole, short_repr
 from pendmap.files import read_toml
@@ -19,7 +19,7 @@ from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 FORMAT: Final = 1
 """Version of the layout of model files, in their key ``format_version``."""
@@ -31,10 +31,16 @@ SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *qu
 BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
 _ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
 _ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
+_IN_SI: Final = "is in SI: Rig.from_toml reads it, and its property pendulum has no dimensions"
+_BARE: Final = (
+    "has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum puts it in SI with its "
+    "w0"
+)
+_Model = TypeVar("_Model")
 
 
 @contextlib.contextmanager
-def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+def _in_file(path: str | os.PathLike[str]) -> Iterator[None]:
     """Put the name of a file before the message of an error in it."""
     try:
         yield
@@ -42,23 +48,30 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
         raise InputError(f"{os.fspath(path)}: {error}") from None
 
 
-def read_arguments(
-    path: str | os.PathLike[str], typed: Mapping[str, float] | None = None
-) -> tuple[bool, dict[str, Any]]:
-    """Return whether a model file is in SI, and the arguments of ``Rig.of`` or ``Pendulum``."""
+def read_model(
+    path: str | os.PathLike[str],
+    typed: Mapping[str, float] | None = None,
+    *,
+    bare: Callable[..., _Model] | None = None,
+    si: Callable[..., _Model] | None = None,
+) -> _Model:
+    """Return the model that ``bare`` or ``si`` makes of a file; without its maker refuse it."""
     content = read_toml(path)
     typed = dict(typed or {})
-    with in_file(path):
+    with _in_file(path):
         _check_top(content)
         table = content.get("pendulum")
         if not isinstance(table, dict):
             raise InputError("has no table [pendulum]")
         effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
         notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
-        si = _is_si(table)
-        numbers = _typed_over(table, typed) if si else _bare_numbers(table, typed, effects)
-        exact = [_own_name(name) for name in typed] if si else typed
-        return si, {**numbers, "effects": effects, "notes": without(notes, exact)}
+        in_si = _is_si(table)
+        numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
+        exact = [_own_name(name) for name in typed] if in_si else typed
+        make = si if in_si else bare
+        if make is None:
+            raise InputError(_IN_SI if in_si else _BARE)
+        return make(**numbers, effects=effects, notes=without(notes, exact))
 
 
 def _check_top(content: dict[str, Any]) -> None:
