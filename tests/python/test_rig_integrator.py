@@ -1,4 +1,4 @@
-"""The virtual rig's integrator against numbers and integrators of others."""
+"""The virtual rig's integrator against reference values, scipy and conserved energies."""
 
 from __future__ import annotations
 

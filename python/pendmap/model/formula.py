@@ -31,7 +31,7 @@ _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
 @dataclasses.dataclass(frozen=True)
 class Formula:
-    """An effect of your own, written as a formula.
+    """An effect that you write as a formula.
 
     Models, trajectories, maps, fits and a diagnosis take it like an effect of the library. Called
     with values for its parameters it returns an :class:`~pendmap.Effect`.
@@ -148,7 +148,7 @@ class Formula:
             ``function(theta, v, t, phase, parameters)`` of arrays and a mapping of numbers; it
             returns the torque per moment of inertia, by arithmetic and functions of numpy.
         parameters : mapping
-            As of :class:`Formula`.
+            Those of :class:`Formula`.
         name : str, optional
             By default the function's.
 
@@ -156,7 +156,7 @@ class Formula:
         ------
         InputError
             If the function branches on values, looks up a table, or does something else that no
-            formula has; or as :class:`Formula`.
+            formula has; or the formula is one that :class:`Formula` refuses.
 
         Examples
         --------

@@ -28,7 +28,7 @@ class Pendulum:
     ``tau = w0 t``, ``w0 = sqrt(g / l)``; ``th = 0`` hangs down. At rest it stays there while the
     load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
 
-    ``effects`` of the library, and of your own (:class:`pendmap.Formula`), add further terms.
+    ``effects`` of the library, and formulas (:class:`pendmap.Formula`), add further terms.
     A parameter may be any real number; a float is kept.
 
     Parameters
@@ -57,7 +57,7 @@ class Pendulum:
     ------
     InputError
         If a value is not finite or outside its range, an effect is there twice, or one is given
-        that has a parameter of its own here: ``viscous_damping`` beside ``gamma``,
+        that is a parameter here: ``viscous_damping`` beside ``gamma``,
         ``coulomb_friction`` beside ``theta_r``, ``bias_torque`` beside ``torque``.
 
     References

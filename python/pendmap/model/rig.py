@@ -1,4 +1,4 @@
-"""The rig: the same pendulum in SI, and the conversion between the two."""
+"""The pendulum in SI, and its conversion to one without dimensions."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ class Rig:
     effects : sequence of Effect
         Further terms, parameters in SI; kept as a tuple.
     notes : mapping
-        As of :class:`Pendulum`.
+        Those of :class:`Pendulum`.
 
     Raises
     ------
     InputError
         If a value is not finite or outside its range, ``p`` has no frequency, an effect is there
-        twice, or one is given that has a parameter of its own here.
+        twice, or one is given that is a parameter here.
 
     References
     ----------

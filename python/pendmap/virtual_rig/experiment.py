@@ -294,7 +294,7 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
 
 
 def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
-    """Return runs with another length, and the same pauses between them."""
+    """Return runs with another length, and equal pauses between them."""
     result, lab = [], 0.0
     for k, plan in enumerate(plans):
         result.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))

@@ -81,7 +81,7 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
 
 
 class Reading(NamedTuple):
-    """What a sensor reads of a path at N times, in order."""
+    """A sensor's reading of a path at N times, in order."""
 
     time: Floats  # since the run began, s, shape (N,)
     angle: Floats  # the reading, rad, shape (N,)
