@@ -32,6 +32,20 @@ def how_to(title: str) -> str:
     return text.split(f"## {title}\n")[1].split("\n## ")[0]
 
 
+@pytest.mark.parametrize(
+    ("title", "example"),
+    [
+        ("Add an effect", "cubic_damping"),
+        ("Add an analysis", "lyapunov"),
+        ("Add a chart", "basins"),
+    ],
+)
+def test_the_files_that_a_how_to_names_exist(title: str, example: str) -> None:
+    for path in re.findall(r"`((?:src|python|tests)/\S+)`", how_to(title)):
+        name = "exponents" if path == "tests/python/test_NAME.py" else example
+        assert (ROOT / path.replace("NAME", name)).exists(), path
+
+
 # An effect. The core is not built again here: the effects that there are show which files name one.
 
 OWN_TERM = "a parameter of every pendulum is this term"

@@ -14,7 +14,7 @@ from pendmap.files import read_toml
 from pendmap.model.effects import Effect, FormulaKey, ParameterKey
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 
 _DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
@@ -24,6 +24,8 @@ _TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_D
 
 FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
+_EXAMPLES: Final = {"name": '"cubic"', "term": '"-k*v^3"', "parameters": "{ k = -1 }"}
+"""Keys that a formula needs, with examples for messages."""
 _TYPICAL: Final = (1e-4, 0.3)
 """Default values of interest: those of the library's sizes."""
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
@@ -183,22 +185,35 @@ class Formula:
         return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
 
 
+def shown_key(key: str) -> str:
+    """Return a key of a file as messages name it."""
+    return key if key.isidentifier() else short_repr(key)
+
+
+def each_table(
+    name: str, tables: object, keys: tuple[str, ...], examples: Mapping[str, str]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the tables ``[[name]]`` of a file with their places, keys checked."""
+    if not isinstance(tables, list):
+        raise InputError(f"{name} must be [[{name}]], one table each, got {short_repr(tables)}")
+    for count, table in enumerate(tables, 1):
+        where = f"[[{name}]] {count}"
+        if not isinstance(table, dict):
+            raise InputError(f"{where}: must be a table, got {short_repr(table)}")
+        unknown = [shown_key(key) for key in table if key not in keys]
+        if unknown:
+            known = ", ".join(keys)
+            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
+        for key, example in examples.items():
+            if key not in table:
+                raise InputError(f"{where}: {key} must be given, like {key} = {example}")
+        yield where, table
+
+
 def formulas_of(tables: object) -> dict[str, Formula]:
     """Return the formulas of a file's tables ``[[formula]]`` by name, each name once."""
-    if not isinstance(tables, list):
-        raise InputError(f"formula must be [[formula]], one table each, got {short_repr(tables)}")
     found: dict[str, Formula] = {}
-    for count, table in enumerate(tables, 1):
-        where = f"[[formula]] {count}"
-        if not isinstance(table, dict):
-            raise InputError(f"{where} must be a table, got {short_repr(table)}")
-        unknown = [key for key in table if key not in FORMULA]
-        if unknown:
-            known = ", ".join(FORMULA)
-            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
-        missing = [key for key in FORMULA[:3] if key not in table]
-        if missing:
-            raise InputError(f"{where}: {missing[0]} is missing: a formula needs it")
+    for where, table in each_table("formula", tables, FORMULA, _EXAMPLES):
         formula = Formula(**table)
         if formula.name in found:
             raise InputError(

@@ -13,7 +13,7 @@ from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, formulas_of
+from pendmap.model.formula import Formula, each_table, formulas_of, shown_key
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
@@ -26,6 +26,8 @@ FORMAT: Final = 1
 TOP: Final = ("pendulum", "formula", "effect", "covariance", "provenance", "format_version")
 NOTES: Final = ("covariance", "provenance")
 EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")
+_EXAMPLES: Final = {"name": '"quadratic_drag"', "parameters": "{ q = 0.01 }"}
+"""Keys that an effect needs, with examples for messages."""
 
 SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
 BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
@@ -102,7 +104,7 @@ def _is_si(table: dict[str, Any]) -> bool:
     """Return whether a table is in SI; check all its keys."""
     for key in table:
         if key not in SI_KEYS and key not in BARE_KEYS:
-            raise InputError(f"{_shown(key)} is not known{_instead(key)}")
+            raise InputError(f"{shown_key(key)} is not known{_instead(key)}")
     si = [key for key in table if key in _ONLY_SI]
     bare = [key for key in table if key in _ONLY_BARE]
     if si and bare:
@@ -111,10 +113,6 @@ def _is_si(table: dict[str, Any]) -> bool:
             f"{bare[0]} is {COUNTERPARTS[bare[0]][0]} in SI"
         )
     return bool(si)
-
-
-def _shown(key: str) -> str:
-    return key if key.isidentifier() else short_repr(key)
 
 
 def _instead(key: str) -> str:
@@ -175,34 +173,14 @@ def _bare_numbers(
 
 
 def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
-    if not isinstance(tables, list):
-        raise InputError(f"effect must be [[effect]], one table each, got {short_repr(tables)}")
     effects = []
-    for count, table in enumerate(tables, 1):
+    for where, table in each_table("effect", tables, EFFECT, _EXAMPLES):
+        name = table["name"]
+        formula = formulas.get(name) if isinstance(name, str) else None
         try:
-            effects.append(_effect(table, formulas))
+            effects.append(Effect(**table, formula=formula))
         except InputError as error:
-            raise InputError(f"[[effect]] {count}: {error}") from None
+            unknown = formula is None and formulas and str(error).startswith("name must be")
+            own = f", and this file's [[formula]] are {', '.join(formulas)}" if unknown else ""
+            raise InputError(f"{where}: {error}{own}") from None
     return tuple(effects)
-
-
-def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
-    if not isinstance(table, dict):
-        raise InputError(f"must be a table, got {short_repr(table)}")
-    unknown = [key for key in table if key not in EFFECT]
-    if unknown:
-        raise InputError(
-            f"{_shown(unknown[0])} is not known: it must be one of {', '.join(EFFECT)}"
-        )
-    for key, example in (("name", '"quadratic_drag"'), ("parameters", "{ q = 0.01 }")):
-        if key not in table:
-            raise InputError(f"{key} must be given, like {key} = {example}")
-    name = table["name"]
-    formula = formulas.get(name) if isinstance(name, str) else None
-    try:
-        return Effect(**table, formula=formula)
-    except InputError as error:
-        own = ", ".join(formulas)
-        if formula is None and formulas and str(error).startswith("name must be"):
-            raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
-        raise
