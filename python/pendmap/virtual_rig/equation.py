@@ -5,12 +5,11 @@ from __future__ import annotations
 import copy
 import dataclasses
 import itertools
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 from pendmap.virtual_rig.effects.base import Floats, Motion
 
 if TYPE_CHECKING:
@@ -35,8 +34,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
-            if not math.isfinite(value):
-                raise InputError(f"{name} must be a finite number, got {value}")
+            check_number(name, value)
             if value < 0 or (name == "w0" and value == 0):
                 wanted = "a number above 0" if name == "w0" else "0 or more"
                 raise InputError(f"{name} must be {wanted}, got {value:g}")

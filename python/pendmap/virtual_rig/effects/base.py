@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, dataclass_tr
 import numpy as np
 from numpy.typing import NDArray
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,18 +120,15 @@ class Effect:
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value = float(getattr(self, field.name))
-            what = f"effect {self.full_name()}: {field.name} must be"
-            if not math.isfinite(value):
-                raise InputError(f"{what} a finite number, got {value:g}")
-            about = field.metadata
+            about, what = field.metadata, f"effect {self.full_name()}: {field.name}"
+            value = check_number(what, getattr(self, field.name))
             least = about.get("least", -about["most"] if self.signed else 0.0)
             if not least <= value <= about["most"]:
                 raise InputError(
-                    f"{what} a number from {least:g} to {about['most']:g}, got {value:g}"
+                    f"{what} must be a number from {least:g} to {about['most']:g}, got {value:g}"
                 )
             if about.get("whole") and value != round(value):
-                raise InputError(f"{what} a whole number, got {value:g}")
+                raise InputError(f"{what} must be a whole number, got {value:g}")
             object.__setattr__(self, field.name, value)
 
     @classmethod
