@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,13 +11,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import InputError
-from pendmap.virtual_rig import EFFECTS
-from pendmap.virtual_rig.effects.base import Drive
-from pendmap.virtual_rig.equation import Equation, Parameters
-from pendmap.virtual_rig.integrator import Starts, integrate
-
-if TYPE_CHECKING:
-    from pendmap.virtual_rig.path import Path
+from pendmap.virtual_rig import Request, Run, RunPlan, make
 
 W0 = 6.2
 
@@ -48,16 +41,18 @@ class Case:
         )
         return pendmap.simulate(model, self.theta, self.velocity / W0, until * W0, tol=1e-12)
 
-    def rig(self, until: float) -> Path:
-        """The virtual rig's motion."""
-        arrays = (np.array([x]) for x in (*self.drive, 0.0))
-        effect = EFFECTS["pivot_compliance"](mu=self.mu, wx=self.wx, z=self.z)
-        parameters = Parameters(W0, self.c, self.friction)
-        equation = Equation(parameters, Drive.harmonic(*arrays), np.zeros(1), [effect])
-        begin, theta = np.zeros(1), np.array([self.theta])
-        starts = Starts(np.array([0]), begin, begin + until, theta, np.array([self.velocity]))
-        (path,) = integrate(equation, starts)
-        return path
+    def rig(self, until: float) -> Run:
+        """The virtual rig's run."""
+        plan = RunPlan("forced", self.theta, self.velocity, until, *self.drive)
+        request = Request(
+            "hidden",
+            effects=(f"pivot_compliance,mu={self.mu},wx={self.wx},z={self.z}",),
+            w0=W0,
+            c_over_m=self.c,
+            friction=self.friction,
+            plans=(plan,),
+        )
+        return make(request).runs[0]
 
 
 CASES = {
@@ -80,7 +75,7 @@ CASES = {
 def test_a_compliant_pivot_agrees_with_the_virtual_rig(name: str) -> None:
     case, events = CASES[name]
     until = 10.0
-    found, path = case.simulated(until), case.rig(until)
+    found, path = case.simulated(until), case.rig(until).path
     assert {event.what for event in path.events} >= events
     time = found.time.values / W0
     assert found.theta.values == pytest.approx(path.angle(time), abs=1e-8)
