@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import itertools
 from typing import TYPE_CHECKING
@@ -121,14 +120,6 @@ class Equation:
         """Return the effects' own variables where a motion begins, shape (L, K, states)."""
         parts = [effect.begin(m) for effect in self.effects if effect.states]
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
-
-    def margins(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
-        """Return how far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K)."""
-        load = self.smooth(m, own)
-        up, down = copy.copy(m), copy.copy(m)
-        up.direction = np.ones_like(m.direction)
-        down.direction = -up.direction
-        return self.friction(up) - load, load + self.friction(down)
 
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
         """Return times since the run began, s, and jumps of the velocity there, rad/s."""

@@ -102,8 +102,11 @@ class Lanes:
         still = np.zeros((1, after.size))
         time, theta = self.time[lane] + after[np.newaxis], self.theta[lane] + still
         motion = self.motion(np.array([lane]), time, theta, still)
-        up, down = self.equation.margins(motion, own[np.newaxis])
-        return up[0], down[0]
+        load = self.equation.smooth(motion, own[np.newaxis])
+        motion.direction = np.ones((1, 1))
+        up = self.equation.friction(motion) - load
+        motion.direction = -motion.direction
+        return up[0], (load + self.equation.friction(motion))[0]
 
     def happen(self, lane: int, what: str) -> None:
         """Let an event happen to a lane: ``rest``, ``up``, ``down`` (released so) or ``unload``."""
