@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
@@ -185,6 +186,15 @@ class Formula:
         return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
 
 
+@contextlib.contextmanager
+def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the name of a file before the message of an error in it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{os.fspath(path)}: {error}") from None
+
+
 def shown_key(key: str) -> str:
     """Return a key of a file as messages name it."""
     return key if key.isidentifier() else short_repr(key)
@@ -247,18 +257,14 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
     >>> [formula.name for formula in pendmap.load_formulas("own.toml")]
     ['lean']
     """
-    shown = os.fspath(path)
     content = read_toml(path)
-    if "pendulum" not in content:
-        unknown = [key for key in content if key not in ("formula", "format_version")]
-        if unknown:
-            raise InputError(f"{shown}: {unknown[0]} is not known: all must be tables [[formula]]")
-    if not content.get("formula"):
-        raise InputError(f"{shown}: has no table [[formula]]")
-    try:
+    unknown = [key for key in content if key not in ("formula", "format_version")]
+    with in_file(path):
+        if unknown and "pendulum" not in content:
+            raise InputError(f"{unknown[0]} is not known: all must be tables [[formula]]")
+        if not content.get("formula"):
+            raise InputError("has no table [[formula]]")
         return list(formulas_of(content["formula"]).values())
-    except InputError as error:
-        raise InputError(f"{shown}: {error}") from None
 
 
 def _parameter(

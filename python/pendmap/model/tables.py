@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -13,13 +11,14 @@ from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, each_table, formulas_of, shown_key
+from pendmap.model.formula import Formula, each_table, formulas_of, in_file, shown_key
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    import os
+    from collections.abc import Callable
 
 FORMAT: Final = 1
 """Version of the layout of model files, in their key ``format_version``."""
@@ -41,15 +40,6 @@ _BARE: Final = (
 _Model = TypeVar("_Model")
 
 
-@contextlib.contextmanager
-def _in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the name of a file before the message of an error in it."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{os.fspath(path)}: {error}") from None
-
-
 def read_model(
     path: str | os.PathLike[str],
     typed: Mapping[str, float] | None = None,
@@ -60,7 +50,7 @@ def read_model(
     """Return the model that ``bare`` or ``si`` makes of a file; without its maker refuse it."""
     content = read_toml(path)
     typed = dict(typed or {})
-    with _in_file(path):
+    with in_file(path):
         _check_top(content)
         table = content.get("pendulum")
         if not isinstance(table, dict):
