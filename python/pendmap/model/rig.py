@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
-from pendmap.model.covariance import said_of
 from pendmap.model.effects import definition, library
 from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
+from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.model.tables import SI_KEYS, read_model
 from pendmap.units import Units
@@ -218,11 +217,7 @@ class Rig:
         ``gamma``, ``omega``, ``phase`` and ``theta_r`` are among them, and ``misses_record``,
         residual over noise, of a model that misses the record it was fitted to.
         """
-        numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
-        pendulum = self.pendulum
-        bare = {n: getattr(pendulum, n) for n in ("gamma", "omega", "phase", "theta_r")}
-        effects = {"effects": effects_json(self.effects)} | pendulum.angle_attributes
-        return {"units": self.units.name} | numbers | bare | effects | said_of(self.notes)
+        return attributes_of(self, self.pendulum, ("gamma", "omega", "phase", "theta_r"))
 
     @property
     def title(self) -> str:
