@@ -37,17 +37,17 @@ LENGTHS = (10.0, 140.0)
 SAMPLES = (100.0, 100.0, 100.0, 200.0, 500.0)
 COUNTS = (1024, 2048, 4096, 8192)
 BASE = ("viscous_damping", "coulomb_friction")
-"""What the baseline has: not hidden."""
+"""Effects of the baseline, which are not hidden."""
 
 AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
-"""What changes from run to run."""
+"""Effects that change from run to run."""
 
 FOREIGN = {"added_mass:late", "impulses:train"}
 """Variants that are no form of the library's effect of their name, but another effect: a mass put
 on between two runs does nothing that one does which is there all along, one knock is not ten."""
 
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
-"""What records are spoilt with, one thing in each experiment that is."""
+"""Faults of records and their sizes; a faulty experiment has one of them."""
 
 SOUND = dict.fromkeys((*SPOILT, "mess"), 0.0)
 
@@ -60,7 +60,7 @@ MAIN = 0.75
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """What is asked of the rig, and what is withheld from the search."""
+    """A request to the rig, and the effects that are withheld from the search."""
 
     what: str
     kind: str

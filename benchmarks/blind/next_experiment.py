@@ -1,4 +1,4 @@
-"""What the next experiment decides, against what ``pendmap diagnose`` predicts of it.
+"""Decisions by the next experiment, against the predictions of ``pendmap diagnose``.
 
     python -m benchmarks.blind.next_experiment --cases 60 --seed 1 --out next.jsonl
 
@@ -52,7 +52,7 @@ EFFECTS = {
     "asymmetric_viscous": (0.1, 1.0),
     "load_dependent_friction": (0.05, 0.5),
 }
-"""What is hidden, with the range of its size over the usual one: weak enough to be confused."""
+"""Hidden effects, and ranges of their sizes over the usual ones: weak enough to be confused."""
 
 DOUBTFUL = (6.0, 40.0)
 """Predicted s G of a proposal that leaves some doubt."""

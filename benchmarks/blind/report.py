@@ -1,4 +1,4 @@
-"""What the blind benchmark found: figures, confusion matrix, and how true probabilities are.
+"""Tables of the blind benchmark: rates, confusion matrix, calibration of probabilities.
 
 Intervals are those of Wilson (1927), J. Am. Stat. Assoc. 22, 209, 95 %.
 """

@@ -46,9 +46,9 @@ FURTHER = ("form", "nuisance", "mess", "layout")
 
 
 def drawn(count: int, seed: int, **further: int) -> list[Case]:
-    """Draw the cases, so many of each kind in ``FURTHER`` among them.
+    """Draw the cases, among them the given number of each kind in ``FURTHER``.
 
-    Each has a seed of its own: more of them change none.
+    Each has its own seed: a further case changes no other.
     """
     kinds = [KINDS[k % len(KINDS)] for k in range(count)]
     cases = []

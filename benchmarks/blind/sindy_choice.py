@@ -140,7 +140,7 @@ def _path(x: Floats, y: Floats, optimizer: str) -> Iterator[tuple[int, ...]]:
 
 
 def _forward(x: Floats, y: Floats) -> Iterator[tuple[int, ...]]:
-    """Yield the supports of forward regression, fewer where what is left depends on the chosen."""
+    """Yield supports of forward regression, fewer where other columns depend on the chosen ones."""
     for count in range(2 * MOST, 0, -1):
         found = pysindy.FROLS(max_iter=count, alpha=1e-6)
         try:

@@ -23,8 +23,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.model import Rig
 from pendmap.virtual_rig import EFFECTS
-from pendmap.virtual_rig.effects.base import Drive
-from pendmap.virtual_rig.effects.readings import ReadingEffect
+from pendmap.virtual_rig.effects.base import Drive, Reading
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.path import Path
 
@@ -166,7 +165,7 @@ def columns(states: States, rig: Parameters, pool: list[tuple[Candidate, Feature
     plain = _rates(states, rig, [], states.theta)
     found = np.empty((plain.size, len(pool)))
     for k, (candidate, feature) in enumerate(pool):
-        if issubclass(EFFECTS[candidate.name], ReadingEffect):
+        if EFFECTS[candidate.name].group == "reading":
             found[:, k] = _reading(states, rig, plain, feature)
         else:
             effect = _made(feature, FAINT)
@@ -226,7 +225,9 @@ def _reading(states: States, rig: Parameters, plain: Floats, feature: Feature) -
     path.lab = states.run.lab_time_s
 
     def moved(angle: Floats, late: float = 0.0) -> Floats:
-        return np.asarray((effect.distort(time + late, angle, path) - angle) / size, np.float64)
+        return np.asarray(
+            (effect.distort(Reading(time + late, angle, path)) - angle) / size, np.float64
+        )
 
     less, here, more = (moved(theta + d) for d in (-STEP, 0.0, STEP))
     drift = (moved(theta, STEP) - moved(theta, -STEP)) / (2 * STEP)

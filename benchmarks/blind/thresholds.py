@@ -128,7 +128,7 @@ def memory() -> Iterator[None]:
 
 
 def run(case: Case) -> dict[str, Any]:
-    """Return what is said of an experiment, as usual and with each threshold changed."""
+    """Return the verdicts on an experiment, with the usual thresholds and with each one changed."""
     own = [effect.split(":")[0] for effect in case.effects] if case.what == "withheld" else []
     without = [name for name in own if name in library()]
     experiment = record(case).experiment

@@ -1,4 +1,4 @@
-"""What the benchmarks share: the methods that are compared, and how they are measured.
+"""The methods that benchmarks compare, and their measurement.
 
 Each method is a class with ``label``, ``setting`` and ``advance``; see `peers.common.Method`.
 """

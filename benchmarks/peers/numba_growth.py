@@ -93,7 +93,7 @@ def grow(  # noqa: PLR0913, PLR0917 (compiled: arrays and numbers alone)
 
 
 def use_threads(count: int) -> None:
-    """Let all parallel loops of numba take so many threads."""
+    """Set the number of threads of numba's parallel loops."""
     numba.set_num_threads(count)
 
 

@@ -2,7 +2,7 @@
 
 Its manual calls `ContinuousDynamicalSystem.lyapunov` in a loop of Python, which runs on one thread;
 here the compiled function behind it is called from a parallel loop, which is quicker by more than
-the threads. It scales the tangent after every step. Its tangent begins in a direction of its own.
+the threads. It scales the tangent after every step; its tangent begins in another direction.
 """
 
 from __future__ import annotations

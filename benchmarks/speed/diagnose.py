@@ -2,7 +2,7 @@
 
 Nine runs, five free and four forced, made by the virtual rig with nothing hidden, one effect, a
 pair, and one withheld, at the rate at which they have 2,500 samples each on average. Each is
-diagnosed in a process of its own, once on one thread, whose CPU time says what the work is, and
+diagnosed in its own process, once on one thread, whose CPU time says what the work is, and
 once on all.
 """
 
@@ -74,7 +74,7 @@ def one(case: str, seed: int) -> Timed:
 
 
 def apart(case: str, seed: int, threads: int) -> Timed:
-    """Do the same in a process with so many threads."""
+    """Do the same in a process with this number of threads."""
     own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": str(threads)}
     command = [
         sys.executable,

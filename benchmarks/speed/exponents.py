@@ -40,7 +40,7 @@ class Growing(Protocol):
 
     @property
     def setting(self) -> str:
-        """What it is set to."""
+        """The setting of the method."""
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return angle and velocity."""

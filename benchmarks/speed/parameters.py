@@ -146,7 +146,7 @@ def main() -> None:
     parser.add_argument("--error", type=float, default=1e-6, help="the error of all, as measured")
     parser.add_argument("--values", type=int, default=2000, help="values of the diagram")
     parser.add_argument("--side", type=int, default=100, help="cells along a side of the map")
-    parser.add_argument("--part", type=int, default=100, help="pynamicalsys does one in so many")
+    parser.add_argument("--part", type=int, default=100, help="pynamicalsys does one cell in PART")
     parser.add_argument("--rounds", type=int, default=3, help="rounds, methods alternating")
     parser.add_argument("--threads", type=int, default=2)
     opts = parser.parse_args()

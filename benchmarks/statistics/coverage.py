@@ -56,7 +56,7 @@ def drawn(seed: int, index: int) -> Case:
 def decays(truths: Array) -> Array:
     """Return the readings without noise, a row for each row of truths.
 
-    The classic Runge-Kutta method in steps of 2.5 ms, each row at a time of its own: it is set to
+    The classic Runge-Kutta method in steps of 2.5 ms, each row at its own time: it is set to
     the turn wherever its velocity passes zero, and stays where friction holds it. Errors are about
     1e-9.
     """

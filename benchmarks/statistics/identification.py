@@ -291,7 +291,7 @@ def spoilers(path: Motion, count: int) -> None:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=20, help="records with noise of their own")
+    parser.add_argument("--count", type=int, default=20, help="records, each with its own noise")
     parser.add_argument("--seed", type=int, default=0, help="of the record of the first table")
     options = parser.parse_args()
     say("Identification of damping")

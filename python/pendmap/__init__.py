@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from pendmap.model import load_formulas as load_formulas
     from pendmap.model import load_model as load_model
     from pendmap.model import save_model as save_model
-    from pendmap.model.library import EffectDefinition as EffectDefinition
-    from pendmap.model.library import EffectParameter as EffectParameter
-    from pendmap.model.library import effects as effects
+    from pendmap.model.effects import EffectDefinition as EffectDefinition
+    from pendmap.model.effects import EffectParameter as EffectParameter
+    from pendmap.model.effects import effects as effects
     from pendmap.records import Experiment as Experiment
     from pendmap.records import Finding as Finding
     from pendmap.records import NoiseFloor as NoiseFloor
@@ -121,7 +121,7 @@ _OTHERS = {
         "load_model",
         "save_model",
     ],
-    "model.library": ["EffectDefinition", "EffectParameter", "effects"],
+    "model.effects": ["EffectDefinition", "EffectParameter", "effects"],
     "records": [
         "Experiment",
         "Finding",

@@ -27,7 +27,7 @@ OWN = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque":
 
 
 def middle(name: str) -> pendmap.Effect:
-    """The effect with values from the middle of what is typical."""
+    """The effect with values from the middle of the typical ranges."""
     (effect,) = (e for e in pendmap.effects() if e.name == name)
     values = {p.name: sum(p.typical) / 2 for p in effect.parameters}
     values |= {p.name: 3.0 for p in effect.parameters if p.role == "order"}
@@ -57,7 +57,7 @@ def test_the_library_is_that_of_the_kernel() -> None:
             assert parameter.meaning
 
 
-def test_json_has_all_of_it(pendmap_command: Run) -> None:
+def test_json_holds_the_whole_library(pendmap_command: Run) -> None:
     run = pendmap_command("effects", "--json")
     assert run.returncode == 0, run.stderr
     effects = json.loads(run.stdout, parse_constant=pytest.fail)["effects"]
@@ -70,7 +70,7 @@ def test_json_has_all_of_it(pendmap_command: Run) -> None:
     assert drag["parameters"][1]["range"] == [0.5, 4.0]
 
 
-def test_what_is_written_names_every_effect_and_parameter(pendmap_command: Run) -> None:
+def test_the_text_names_every_effect_and_parameter(pendmap_command: Run) -> None:
     said = pendmap_command("effects").stdout
     for effect in pendmap.effects():
         assert f"{effect.name:<24} {effect.formula}\n" in said
@@ -79,7 +79,7 @@ def test_what_is_written_names_every_effect_and_parameter(pendmap_command: Run) 
     assert [e["name"] for e in json.loads(one.stdout)["effects"]] == ["magnet"]
 
 
-def test_what_is_named_is_shown_as_it_stands_in_a_model_file(
+def test_a_named_effect_is_shown_as_a_table_of_a_model_file(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
     names = ("power_law_drag", "magnet", "encoder_gain")
@@ -92,7 +92,7 @@ def test_what_is_named_is_shown_as_it_stands_in_a_model_file(
     assert model.effects[1].parameters == {"amplitude": 0.005, "width": 0.1}
 
 
-def test_on_a_terminal_it_is_a_table() -> None:
+def test_a_terminal_shows_a_table() -> None:
     ours, theirs = pty.openpty()
     try:
         subprocess.run(
@@ -130,7 +130,7 @@ def test_maps_and_trajectories_agree(name: str) -> None:
     assert float(run.velocity[-1]) == pytest.approx(velocity[0], abs=tolerance)
 
 
-def test_what_does_not_repeat_every_turn_is_simulated_and_not_mapped() -> None:
+def test_torques_that_do_not_repeat_are_simulated_and_not_mapped() -> None:
     uneven = pendmap.Effect("bearing_harmonic", {"amplitude": 0.1, "n": 2.5, "psi": 0.0})
     model = pendmap.Pendulum(p=0.6, effects=(uneven,))
     assert pendmap.simulate(model, 1.0, 0.0, 10.0).theta.size > 1

@@ -1,4 +1,4 @@
-"""Effects of the library against formulas, integrators and experiments that are not its own."""
+"""Effects of the library against independent formulas, scipy and the virtual rig."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import Candidate, add_candidates
 from pendmap.diagnosis.fitted_model import fit_model
-from pendmap.model.effects import definition, is_shape
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ EFFECTS = {
 
 
 def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> float:  # noqa: C901 (a case an effect)
-    """Written down again from the formulas of textbooks, w0 = 1."""
+    """Textbook formula of the acceleration, w0 = 1."""
     values = EFFECTS[name]
     phase, tilt, carried, inertia, own = OMEGA * tau, 0.0, 0.0, 1.0, 0.0
     friction = THETA_R
@@ -78,7 +77,7 @@ def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> 
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_trajectories_are_those_of_scipy(name: str) -> None:
+def test_trajectories_agree_with_scipy(name: str) -> None:
     model = pendmap.Pendulum(
         gamma=GAMMA,
         theta_r=THETA_R,
@@ -110,7 +109,7 @@ def test_trajectories_are_those_of_scipy(name: str) -> None:
 
 
 @pytest.mark.parametrize(("p", "theta_r", "turns", "rests"), [(0.0, 0.0, 30, 0), (1.5, 0.2, 9, 4)])
-def test_a_contact_that_yields_is_that_of_scipy(
+def test_a_contact_that_yields_agrees_with_scipy(
     p: float, theta_r: float, turns: int, rests: int
 ) -> None:
     f, zc, omega, until = 0.05, 0.1, 0.87, 100.0
@@ -205,8 +204,9 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     base, _ = fit_baseline(data)
     size, *_ = truth
     w0 = base.fit.model.w0
-    entries = [e for e in definition(name)["parameters"] if is_shape(e)]
-    shape = {e["name"]: truth[e["name"]] / w0 ** e["power_of_w0"] for e in entries}
+    (effect,) = (effect for effect in pendmap.effects() if effect.name == name)
+    shapes = [p for p in effect.parameters if p.role not in {"size", "phase"}]
+    shape = {p.name: truth[p.name] / w0**p.power_of_w0 for p in shapes}
     unit = Candidate(name, shape)
     start = base.start | {f"{name}.{size}": 0.5 * truth[size]}
     if unit.phase is not None:

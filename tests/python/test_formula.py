@@ -1,4 +1,4 @@
-"""Effects of a user's own: formulas, and Python functions that are read as formulas."""
+"""Effects that a user defines by formulas and by Python functions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def test_a_formula_gives_the_map_of_the_library_s_effect() -> None:
 
 
 @pytest.mark.parametrize(("formula", "values"), [(ROOT, {"k": 0.3}), (POWER, {"q": 0.1, "n": 1.7})])
-def test_si_and_no_dimensions_mean_the_same(formula: Formula, values: dict[str, float]) -> None:
+def test_a_formula_converts_between_si_and_no_dimensions(
+    formula: Formula, values: dict[str, float]
+) -> None:
     rig = Rig(w0=6.2, c_over_m=0.1, effects=(formula(**values),))
     slow = pendmap.simulate(rig, 1.5, 0.0, until=4.0)
     bare = pendmap.simulate(rig.pendulum, 1.5, 0.0, until=4.0 * 6.2)
@@ -77,7 +79,7 @@ def test_a_model_file_carries_its_formulas(tmp_path: Path) -> None:
     assert save_model(again, tmp_path / "again.toml").read_bytes() == path.read_bytes()
 
 
-def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
+def test_a_formula_is_found_by_its_name_alone(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     text = '[pendulum]\ngamma = 0.1\n[[effect]]\nname = "root_drag"\nparameters = { k = 1.0 }\n'
     path.write_text(text, encoding="utf-8")
@@ -125,13 +127,13 @@ def test_a_formula_s_name_does_not_do_for_another(tmp_path: Path) -> None:
         (("x", "k/theta", {"k": 2}), "is no finite number at theta = 0.000"),
     ],
 )
-def test_what_is_wrong_is_said_on_one_line(given: tuple[Any, ...], said: str) -> None:
+def test_errors_are_reported_on_one_line(given: tuple[Any, ...], said: str) -> None:
     with pytest.raises(InputError, match=said) as caught:
         Formula(*given)
     assert str(caught.value).count("\n") == 0
 
 
-def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
+def test_formulas_are_read_from_a_file(tmp_path: Path, pendmap_command: Run) -> None:
     path = tmp_path / "own.toml"
     path.write_text(FILE, encoding="utf-8")
     run = pendmap_command("effects", "--effects", str(path), "--json")
@@ -151,7 +153,7 @@ def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
     assert json.loads(run.stdout)["attractors"]
     for text, said in (
         ("", "has no table [[formula]]"),
-        ("[[formula]]\nname = 'x'", "term is missing"),
+        ("[[formula]]\nname = 'x'", "term must be given, like term = "),
         (FILE + FILE, "each name must be there once, bump is there twice"),
         ("[[formular]]\nname = 'x'", "formular is not known"),
         (FILE.replace("wrap(", "wrp("), "unknown function 'wrp' at 14"),
@@ -163,7 +165,7 @@ def test_files_of_formulas(tmp_path: Path, pendmap_command: Run) -> None:
         assert run.stderr.count("\n") == 1
 
 
-def test_maps_refuse_what_does_not_repeat() -> None:
+def test_maps_refuse_torques_that_do_not_repeat() -> None:
     uneven = Formula("uneven", "-k*sin(theta/2)", {"k": 2})
     with pytest.raises(InputError, match="uneven can be in one trajectory, not in maps"):
         pendmap.basins(Pendulum(effects=(uneven(k=0.1),)), pendmap.Grid.square(10))
@@ -183,7 +185,9 @@ def _mixed(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # n
 
 
 @pytest.mark.parametrize(("function", "power"), [(_drag, 1.5), (_mixed, 2.0)])
-def test_a_function_is_read_as_what_it_computes(function: Callable[..., Any], power: float) -> None:
+def test_a_function_is_read_as_the_formula_it_computes(
+    function: Callable[..., Any], power: float
+) -> None:
     formula = Formula.of(function, {"k": power}, name="mine")
     pendulum = Pendulum(gamma=0.0, p=0.0, omega=1.7, effects=(formula(k=0.1),))
     rng = np.random.default_rng(5)
@@ -207,7 +211,7 @@ def test_a_function_is_read_as_what_it_computes(function: Callable[..., Any], po
         (lambda th, v, t, ph, p: None, "the value None"),
     ],
 )
-def test_what_cannot_be_read_is_said(function: Callable[..., Any], said: str) -> None:
+def test_functions_that_are_no_formula_are_refused(function: Callable[..., Any], said: str) -> None:
     with pytest.raises(InputError, match=said) as caught:
         Formula.of(function, {"k": 2}, name="mine")
     assert str(caught.value).count("\n") == 0

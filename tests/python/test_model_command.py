@@ -70,7 +70,7 @@ def test_maps_from_the_command_are_in_rad_per_second(tmp_path: Path, pendmap_com
         (("--stroke-mm", 10, "--frequency-hz", 2), {"p": 0.01 * (4 * math.pi) ** 2 / 9.81}),
     ],
 )
-def test_what_is_typed_counts_instead_of_the_file(
+def test_typed_parameters_replace_those_of_the_file(
     tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], numbers: dict[str, float]
 ) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))

@@ -1,4 +1,4 @@
-"""Model files: they read back as what was written, and say on one line what is wrong with them."""
+"""Model files: round trips, keys, errors that are reported on one line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_everything_in_a_file_in_si(tmp_path: Path) -> None:
     assert Rig.from_toml(tmp_path / "model.toml") == rig
 
 
-def test_what_was_fitted_is_written_back_unchanged(tmp_path: Path) -> None:
+def test_notes_of_a_fit_are_written_unchanged(tmp_path: Path) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))
     path = save_model(rig, tmp_path / "again.toml")
     assert load_model(path) == rig
@@ -46,7 +46,7 @@ def test_what_was_fitted_is_written_back_unchanged(tmp_path: Path) -> None:
     assert after["provenance"]["made"] == dt.datetime(2024, 5, 1, 12, tzinfo=dt.UTC)
     assert after["effect"][0] == before["effect"][0]
     assert after["format_version"] == 1
-    # Once more gives the same bytes.
+    # Writing it again gives identical bytes.
     assert save_model(load_model(path), tmp_path / "third.toml").read_bytes() == path.read_bytes()
 
 
@@ -116,7 +116,7 @@ def test_a_rig_without_drive_reads_back(tmp_path: Path) -> None:
     assert load_model(save_model(Rig(w0=6.2), tmp_path / "model.toml")) == Rig(w0=6.2)
 
 
-def test_a_file_in_si_and_one_without_dimensions_mean_the_same(tmp_path: Path) -> None:
+def test_a_file_in_si_and_one_without_dimensions_are_equivalent(tmp_path: Path) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))
     assert isinstance(rig, Rig)
     bare = load_model(save_model(rig.pendulum, tmp_path / "bare.toml"))
@@ -142,7 +142,7 @@ def test_without_dimensions_zeta_is_half_of_gamma(tmp_path: Path, text: str, gam
     ],
     ids=["with a mark", "of Windows", "inline", "empty table"],
 )
-def test_odd_files_that_are_right(tmp_path: Path, text: bytes) -> None:
+def test_unusual_valid_files_are_read(tmp_path: Path, text: bytes) -> None:
     assert load_model(written(tmp_path, text)) == Pendulum(gamma=0.2, p=0, omega=1)
 
 
@@ -274,9 +274,7 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         ),
     ],
 )
-def test_what_is_wrong_is_said_on_one_line(
-    tmp_path: Path, text: str | bytes, complaint: str
-) -> None:
+def test_errors_are_reported_on_one_line(tmp_path: Path, text: str | bytes, complaint: str) -> None:
     path = written(tmp_path, text)
     with pytest.raises(InputError) as error:
         load_model(path)
@@ -286,7 +284,7 @@ def test_what_is_wrong_is_said_on_one_line(
     assert len(str(error.value)) < 400
 
 
-def test_each_kind_reads_its_own(tmp_path: Path) -> None:
+def test_a_class_refuses_files_of_the_other(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"is in SI: Rig\.from_toml reads it"):
         Pendulum.from_toml(written(tmp_path, EXAMPLE))
     with pytest.raises(InputError, match=r"has no dimensions: Pendulum\.from_toml reads it"):
@@ -307,7 +305,7 @@ def test_each_kind_reads_its_own(tmp_path: Path) -> None:
         ([1], r"notes must be a mapping, got \[1\]"),
     ],
 )
-def test_notes_that_are_no_tables_are_not_written(
+def test_notes_that_are_no_tables_are_refused(
     tmp_path: Path,
     notes: Any,  # noqa: ANN401
     complaint: str,
@@ -328,7 +326,7 @@ def test_only_models_are_written_and_only_as_toml(tmp_path: Path) -> None:
         save_model(Pendulum(), tmp_path / "no" / "model.toml")
 
 
-def test_the_schema_for_editors_is_that_of_the_tables_that_check_files(tmp_path: Path) -> None:
+def test_the_json_schema_has_the_keys_that_the_reader_takes(tmp_path: Path) -> None:
     call = [sys.executable, "-m", "pendmap.model.schema"]
     printed = subprocess.run(call, capture_output=True, check=True).stdout
     assert json.loads(printed) == json.loads(json.dumps(schema()))

@@ -1,4 +1,4 @@
-"""Experiments of the virtual rig: motion, sensor, effects, what they share with model files."""
+"""Experiments of the virtual rig: motion, sensor, effects, names of parameters."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_size_scales_and_parameters_are_taken() -> None:
     assert short(w0=5.0, c_over_m=0.0, friction=0.0).parameters.w0 == 5.0
 
 
-def test_noise_does_not_change_what_happens() -> None:
+def test_noise_does_not_change_the_motion() -> None:
     quiet, loud = short(noise=0.0), short(noise=0.5)
     for a, b in zip(quiet.runs, loud.runs, strict=True):
         assert a.plan == b.plan
@@ -136,7 +136,7 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
     assert run.returncode == 0, run.stderr
 
 
-def test_requests_are_checked_in_python_too() -> None:
+def test_requests_are_checked() -> None:
     with pytest.raises(InputError, match=r"size must be .*, got nan"):
         Request("hidden", size=math.nan)
     with pytest.raises(InputError, match=r"noise must be .*, got inf"):

@@ -1,4 +1,4 @@
-"""`pendmap rig`: what it writes, what it refuses, what it leaves behind."""
+"""`pendmap rig`: files, refusals, interrupts."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_an_experiment_is_a_folder_with_its_truth_beside(
     assert {"w0", "c_over_m", "Tr"} <= set(truth["pendulum"])
 
 
-def test_what_is_hidden_is_not_said(rig: Run, tmp_path: Path) -> None:
+def test_the_description_does_not_reveal_the_effect(rig: Run, tmp_path: Path) -> None:
     run = rig("hidden", "--seed", 4, "--out", "lab")
     (effect,) = read_toml(tmp_path / "lab.truth.toml")["effect"]
     assert effect["name"] not in run.stdout + run.stderr
@@ -167,7 +167,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_there_is_replaced_only_if_asked(rig: Run, tmp_path: Path) -> None:
+def test_an_experiment_is_replaced_only_on_request(rig: Run, tmp_path: Path) -> None:
     words = ("hidden", "--duration", 1, "--out", "lab")
     (tmp_path / "lab").mkdir()
     assert rig(*words).returncode == 0  # an empty folder is free
@@ -190,7 +190,7 @@ def test_what_is_there_is_replaced_only_if_asked(rig: Run, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("moment", ["computing", "writing"])
-def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path, moment: str) -> None:
+def test_an_interrupt_leaves_no_partial_file(tmp_path: Path, moment: str) -> None:
     runs = ["--free", "60", "--duration", "200"] if moment == "computing" else ["--rate", "2000"]
     words = [str(COMMAND), "rig", "hidden", *runs, "--out", "lab"]
     with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:

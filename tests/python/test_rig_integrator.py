@@ -1,4 +1,4 @@
-"""The virtual rig's integrator against numbers and integrators of others."""
+"""The virtual rig's integrator against reference values, scipy and conserved energies."""
 
 from __future__ import annotations
 
@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendmap.virtual_rig.effects.base import Drive
-from pendmap.virtual_rig.effects.damping import (
-    DahlFriction,
-    LoadDependentFriction,
-    SharpStribeckFriction,
-)
-from pendmap.virtual_rig.effects.readings import SensorLag
-from pendmap.virtual_rig.effects.stand import Impulses, ImpulseTrain, PivotCompliance
-from pendmap.virtual_rig.effects.torques import InertiaRipple, Magnet
+from pendmap.virtual_rig import EFFECTS
+from pendmap.virtual_rig.effects.base import Drive, Reading
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import Starts, integrate
 
@@ -188,14 +181,14 @@ def test_a_pivot_that_gives_way_against_its_lagrangian() -> None:
 
     aside = mu * math.sin(0.5) * (w0**2 * math.cos(0.5) + 11.0**2) / wx**2
     other = solve_ivp(rate, (0, 4), [0.5, 11.0, aside, 0], **LOW)
-    effect = PivotCompliance(mu=mu, wx=wx, z=z)
+    effect = EFFECTS["pivot_compliance"](mu=mu, wx=wx, z=z)
     path = run(Parameters(w0, c, 0), (0, 1, 0), 0.5, 11.0, 4, [effect])
     assert path.angle(np.array([4.0])) == pytest.approx(other.y[0, -1], abs=1e-9)
 
 
 def test_an_inertia_that_varies_keeps_its_energy() -> None:
     # (1 + e cos(n th + psi)) v^2 / 2 - w0^2 cos th is what a Lagrangian with that inertia keeps.
-    effect = InertiaRipple(e=0.3, n=2, psi=0.7)
+    effect = EFFECTS["inertia_ripple"](e=0.3, n=2, psi=0.7)
     path = run(Parameters(6.2, 0, 0), (0, 1, 0), 2.0, 0, 20, [effect])
     time = np.linspace(0, 20, 300)
     theta, velocity = path.angle(time), path.velocity(time)
@@ -206,9 +199,9 @@ def test_an_inertia_that_varies_keeps_its_energy() -> None:
 def test_corners_and_cusps_against_scipy_in_pieces() -> None:
     # All signs written out: scipy crosses them with steps that it has to shorten.
     w0, friction = 6.2, 0.3
-    load = LoadDependentFriction(k=0.1)
-    sharp = SharpStribeckFriction(a=0.1, vs=0.5)
-    magnet = Magnet(amplitude=0.5, width=0.1)
+    load = EFFECTS["load_dependent_friction"](k=0.1)
+    sharp = EFFECTS["stribeck_friction:sharp"](a=0.1, vs=0.5)
+    magnet = EFFECTS["magnet"](amplitude=0.5, width=0.1)
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         th, v = y
@@ -227,7 +220,7 @@ def test_corners_and_cusps_against_scipy_in_pieces() -> None:
 
 def test_dahl_friction_yields_before_it_slips() -> None:
     # Well inside the yield, the contact is a spring f/zc: the small swing is that much quicker.
-    effect = DahlFriction(f=0.5, zc=0.05)
+    effect = EFFECTS["dahl_friction"](f=0.5, zc=0.05)
     path = run(Parameters(6.2, 0, 0), (0, 1, 0), 1e-5, 0, 3, [effect])
     turns = [event.time for event in path.events if event.what == "turn"]
     period = 2 * float(np.mean(np.diff(turns)))
@@ -235,9 +228,9 @@ def test_dahl_friction_yields_before_it_slips() -> None:
 
 
 def test_impulses_are_jumps_of_the_velocity() -> None:
-    train = ImpulseTrain(J=0.05, every=2.0, pattern=7)
+    train = EFFECTS["impulses:train"](J=0.05, every=2.0, pattern=7)
     assert len(train.kicks(0, 10)) >= 3
-    for effect in (train, Impulses(J=0.05, t0=4.3)):
+    for effect in (train, EFFECTS["impulses"](J=0.05, t0=4.3)):
         path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 1.0, 0, 10, [effect])
         for time, jump in effect.kicks(0, 10):
             before, after = path.velocity(np.array([time - 1e-9, time + 1e-9]))
@@ -246,13 +239,14 @@ def test_impulses_are_jumps_of_the_velocity() -> None:
 
 def test_a_lag_against_its_differential_equation() -> None:
     path = run(Parameters(6.2, 0.1, 0.1), (0, 1, 0), 2.5, 0, 3)
-    lag = SensorLag(tau=0.02)
+    lag = EFFECTS["sensor_lag"](tau=0.02)
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         return [(float(path.angle(np.array([t]))[0]) - float(y[0])) / 0.02]
 
     time = np.sort(np.random.default_rng(1).uniform(0, 3, 40))
-    start = lag.distort(np.array([0.0, 1.0]), np.zeros(2), path)[0]
+    start = lag.distort(Reading(np.array([0.0, 1.0]), np.zeros(2), path))[0]
     other = solve_ivp(rate, (0, 3), [start], t_eval=time, rtol=1e-9, atol=1e-10, max_step=0.05)
     span = np.concatenate([[0.0], time, [3.0]])
-    assert lag.distort(span, np.zeros(span.size), path)[1:-1] == pytest.approx(other.y[0], abs=2e-8)
+    read = lag.distort(Reading(span, np.zeros(span.size), path))[1:-1]
+    assert read == pytest.approx(other.y[0], abs=2e-8)

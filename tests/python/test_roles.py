@@ -1,4 +1,4 @@
-"""What a parameter of an effect does is said by its definition, never guessed from its name."""
+"""Roles of the parameters of effects: definitions state them, searches use them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def predict_limits(name: str) -> list[Any]:
-    """What a search makes of an effect, its parameters by their places."""
+    """A search's candidates for an effect, its parameters by their places."""
     names = [p["name"] for p in effects.definition(name)["parameters"]]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
 
@@ -98,7 +98,7 @@ def predict_limits(name: str) -> list[Any]:
     return [[of(one) for one in shaped], blank.values, [place[n] for n in blank.sizes]]
 
 
-def test_other_names_of_parameters_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_does_not_depend_on_names_of_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     library = effects.library()
     names = [name for name in library if search.own_name(name) is None]
     expected = {name: predict_limits(name) for name in names}
@@ -124,7 +124,7 @@ def test_other_names_of_parameters_change_nothing(monkeypatch: pytest.MonkeyPatc
         ),
     ],
 )
-def test_roles_in_a_formula_are_declared_or_seen(
+def test_roles_in_a_formula_are_declared_or_inferred(
     term: str, parameters: dict[str, Any], roles: list[str]
 ) -> None:
     formula = pendmap.Formula("own_effect", term, parameters)
@@ -141,7 +141,7 @@ shapes = st.sampled_from(["width", "place", "power", "order", "time constant"])
 
 
 @given(first=ranges, second=ranges, roles=st.tuples(shapes, shapes))
-def test_a_search_looks_where_is_typical(
+def test_a_search_scans_typical_values(
     first: tuple[float, float], second: tuple[float, float], roles: tuple[str, str]
 ) -> None:
     said = dict(zip("bc", zip((first, second), roles, strict=True), strict=True))

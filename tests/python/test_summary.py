@@ -1,4 +1,4 @@
-"""What summaries say about a model: effects on the reading alone, rotations without a limit."""
+"""Summaries of a model: effects on the reading alone, rotations without a limit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_motion_is_told_from_its_reading() -> None:
         ),
     ],
 )
-def test_why_nothing_limits_a_rotation_is_said(model: Pendulum, says: str) -> None:
+def test_a_summary_explains_an_unlimited_rotation(model: Pendulum, says: str) -> None:
     summary = pendmap.basins(model, Grid.square(5), max_periods=20).attrs["summary"]
     assert says in summary
     assert ("nothing limits a rotation" in summary) == bool(says)

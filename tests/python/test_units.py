@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, InputError, Pendulum, Rig
-from pendmap.model.effects import library
 from pendmap.units import Units
 
 sizes = st.floats(1e-3, 1e3)
@@ -48,16 +47,14 @@ def test_times_torques_and_effects_have_their_powers_of_w0() -> None:
     assert drag.parameters == DRAG.parameters
 
 
-@pytest.mark.parametrize("name", sorted(library()))
-def test_every_effect_of_the_library_converts_by_what_the_library_says(name: str) -> None:
-    entries = library()[name]["parameters"]
-    values = {e["name"]: float(np.mean(np.clip(e["typical"], *e["range"]))) for e in entries}
-    bare = Effect(name, values)
+@pytest.mark.parametrize("effect", pendmap.effects(), ids=lambda effect: effect.name)
+def test_every_effect_converts_by_its_powers_of_w0(effect: pendmap.EffectDefinition) -> None:
+    values = {p.name: float(np.mean(np.clip(p.typical, *p.range))) for p in effect.parameters}
+    bare = Effect(effect.name, values)
     in_si = bare.given(Units(3.0, si=True))
-    for entry in entries:
-        less = entry["power_of_w0_less"]
-        power = entry["power_of_w0"] - (values[less] if less else 0)
-        assert in_si.parameters[entry["name"]] == values[entry["name"]] * 3.0**power
+    for p in effect.parameters:
+        power = p.power_of_w0 - (values[p.power_of_w0_less] if p.power_of_w0_less else 0)
+        assert in_si.parameters[p.name] == values[p.name] * 3.0**power
     back = in_si.bare(Units(3.0, si=True))
     assert list(back.parameters.values()) == pytest.approx(list(values.values()), rel=1e-14)
 
@@ -74,7 +71,9 @@ def test_every_effect_of_the_library_converts_by_what_the_library_says(name: str
     q=signed,
 )
 @settings(max_examples=60)
-def test_there_and_back_is_the_same(w0: float, q: float, **numbers: float) -> None:
+def test_conversion_and_its_inverse_give_the_number_back(
+    w0: float, q: float, **numbers: float
+) -> None:
     effect = Effect("quadratic_drag", {"q": q}, ci95={"q": (q - 1, q + 1)})
     pendulum = Pendulum(**numbers, effects=(effect,))
     rig = Rig.from_pendulum(pendulum, w0)
@@ -144,7 +143,7 @@ def test_zeta_is_half_of_gamma() -> None:
         ({"w0": 6.2, "gamma": 0.1}, "gamma is not known: it must be one of w0, length_m"),
     ],
 )
-def test_what_contradicts_or_is_none_is_refused_with_its_numbers(
+def test_contradictions_are_refused_with_their_numbers(
     given: dict[str, Any], complaint: str
 ) -> None:
     with pytest.raises(InputError) as error:
@@ -198,7 +197,7 @@ def test_effects_are_checked_against_the_library(words: dict[str, Any], complain
         ("bias_torque", {"torque": 0.1}, "torque", "torque"),
     ],
 )
-def test_one_thing_is_written_one_way(
+def test_two_names_of_one_term_are_refused(
     name: str, values: dict[str, float], field: str, si: str
 ) -> None:
     effect = Effect(name, values)

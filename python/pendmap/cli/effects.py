@@ -14,7 +14,7 @@ from pendmap.cli.options import json_option
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
-    from pendmap.model.library import EffectDefinition, EffectParameter
+    from pendmap.model.effects import EffectDefinition, EffectParameter
 
 
 @click.command("effects")
@@ -37,13 +37,12 @@ def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None
     """
     from pendmap.cli.show import write_json
     from pendmap.model import load_formulas
-    from pendmap.model.effects import definition
-    from pendmap.model.library import effects, of_formulas
+    from pendmap.model.effects import definition, described, effects
 
     own = [] if path is None else load_formulas(path)
     known = {formula.name: formula for formula in own}
     wanted = {name if name in known else definition(name)["name"] for name in names}
-    listed = effects() if path is None else of_formulas(own)
+    listed = effects() if path is None else [described(formula.entry) for formula in own]
     shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
         write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})

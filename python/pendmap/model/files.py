@@ -10,10 +10,10 @@ from pendmap.errors import InputError, check_type
 from pendmap.files import toml_text, whole_file
 from pendmap.model.pendulum import Pendulum
 from pendmap.model.rig import Rig
-from pendmap.model.tables import EFFECT, FORMAT, check_notes, in_file, read_arguments
+from pendmap.model.tables import EFFECT, FORMAT, check_notes, read_model
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from pendmap.model.effects import Effect
 
@@ -60,9 +60,8 @@ def load_model(
     >>> pendmap.load_model(path).w0
     6.2
     """
-    si, arguments = read_arguments(path, typed)
-    with in_file(path):
-        return Rig.of(**arguments) if si else Pendulum(**arguments)
+    makers: dict[str, Callable[..., Pendulum | Rig]] = {"bare": Pendulum, "si": Rig.of}
+    return read_model(path, typed, **makers)
 
 
 def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:

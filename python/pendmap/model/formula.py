@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
@@ -14,7 +15,7 @@ from pendmap.files import read_toml
 from pendmap.model.effects import Effect, FormulaKey, ParameterKey
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 
 _DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
@@ -24,6 +25,8 @@ _TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_D
 
 FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
+_EXAMPLES: Final = {"name": '"cubic"', "term": '"-k*v^3"', "parameters": "{ k = -1 }"}
+"""Keys that a formula needs, with examples for messages."""
 _TYPICAL: Final = (1e-4, 0.3)
 """Default values of interest: those of the library's sizes."""
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
@@ -31,7 +34,7 @@ _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
 @dataclasses.dataclass(frozen=True)
 class Formula:
-    """An effect of your own, written as a formula.
+    """An effect that you write as a formula.
 
     Models, trajectories, maps, fits and a diagnosis take it like an effect of the library. Called
     with values for its parameters it returns an :class:`~pendmap.Effect`.
@@ -108,7 +111,9 @@ class Formula:
             )
         names = list(self.parameters)
         try:
-            parts = tuple(_parameter(n, self.parameters[n], names) for n in names)
+            parts, tables = zip(
+                *(_parameter(n, self.parameters[n], names) for n in names), strict=True
+            )
         except InputError as error:
             raise InputError(f"formula '{self.name}': {error}") from None
         if self.name in _TAKEN:
@@ -119,7 +124,7 @@ class Formula:
         key = FormulaKey(self.name, self.term, self.revealed_by, parts)
         with core_errors():
             entry, proportional = _core.formula(key)
-        kept = {part.name: _said(part, names) for part in parts}
+        kept = dict(zip(names, tables, strict=True))
         found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
         for what, value in found.items():
             object.__setattr__(self, what, value)
@@ -146,7 +151,7 @@ class Formula:
             ``function(theta, v, t, phase, parameters)`` of arrays and a mapping of numbers; it
             returns the torque per moment of inertia, by arithmetic and functions of numpy.
         parameters : mapping
-            As of :class:`Formula`.
+            Those of :class:`Formula`.
         name : str, optional
             By default the function's.
 
@@ -154,7 +159,7 @@ class Formula:
         ------
         InputError
             If the function branches on values, looks up a table, or does something else that no
-            formula has; or as :class:`Formula`.
+            formula has; or the formula is one that :class:`Formula` refuses.
 
         Examples
         --------
@@ -181,22 +186,44 @@ class Formula:
         return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
 
 
+@contextlib.contextmanager
+def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the name of a file before the message of an error in it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{os.fspath(path)}: {error}") from None
+
+
+def shown_key(key: str) -> str:
+    """Return a key of a file as messages name it."""
+    return key if key.isidentifier() else short_repr(key)
+
+
+def each_table(
+    name: str, tables: object, keys: tuple[str, ...], examples: Mapping[str, str]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the tables ``[[name]]`` of a file with their places, keys checked."""
+    if not isinstance(tables, list):
+        raise InputError(f"{name} must be [[{name}]], one table each, got {short_repr(tables)}")
+    for count, table in enumerate(tables, 1):
+        where = f"[[{name}]] {count}"
+        if not isinstance(table, dict):
+            raise InputError(f"{where}: must be a table, got {short_repr(table)}")
+        unknown = [shown_key(key) for key in table if key not in keys]
+        if unknown:
+            known = ", ".join(keys)
+            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
+        for key, example in examples.items():
+            if key not in table:
+                raise InputError(f"{where}: {key} must be given, like {key} = {example}")
+        yield where, table
+
+
 def formulas_of(tables: object) -> dict[str, Formula]:
     """Return the formulas of a file's tables ``[[formula]]`` by name, each name once."""
-    if not isinstance(tables, list):
-        raise InputError(f"formula must be [[formula]], one table each, got {short_repr(tables)}")
     found: dict[str, Formula] = {}
-    for count, table in enumerate(tables, 1):
-        where = f"[[formula]] {count}"
-        if not isinstance(table, dict):
-            raise InputError(f"{where} must be a table, got {short_repr(table)}")
-        unknown = [key for key in table if key not in FORMULA]
-        if unknown:
-            known = ", ".join(FORMULA)
-            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
-        missing = [key for key in FORMULA[:3] if key not in table]
-        if missing:
-            raise InputError(f"{where}: {missing[0]} is missing: a formula needs it")
+    for where, table in each_table("formula", tables, FORMULA, _EXAMPLES):
         formula = Formula(**table)
         if formula.name in found:
             raise InputError(
@@ -230,21 +257,20 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
     >>> [formula.name for formula in pendmap.load_formulas("own.toml")]
     ['lean']
     """
-    shown = os.fspath(path)
     content = read_toml(path)
-    if "pendulum" not in content:
-        unknown = [key for key in content if key not in ("formula", "format_version")]
-        if unknown:
-            raise InputError(f"{shown}: {unknown[0]} is not known: all must be tables [[formula]]")
-    if not content.get("formula"):
-        raise InputError(f"{shown}: has no table [[formula]]")
-    try:
+    unknown = [key for key in content if key not in ("formula", "format_version")]
+    with in_file(path):
+        if unknown and "pendulum" not in content:
+            raise InputError(f"{unknown[0]} is not known: all must be tables [[formula]]")
+        if not content.get("formula"):
+            raise InputError("has no table [[formula]]")
         return list(formulas_of(content["formula"]).values())
-    except InputError as error:
-        raise InputError(f"{shown}: {error}") from None
 
 
-def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
+def _parameter(
+    name: object, given: object, names: list[Any]
+) -> tuple[ParameterKey, dict[str, Any]]:
+    """Return a parameter as the core takes it, and as a table without defaults."""
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
@@ -257,12 +283,24 @@ def _parameter(name: object, given: object, names: list[Any]) -> ParameterKey:
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
     power, less = _power(name, said["power"], names)
-    unit = _text(name, "unit", said.get("unit", _unit(power, less, names)))
-    meaning = _text(name, "meaning", said.get("meaning", ""))
-    typical = _bounds(name, "typical", said.get("typical", _TYPICAL))
-    allowed = _bounds(name, "range", said.get("range", (-math.inf, math.inf)))
-    role = None if "role" not in said else _role(name, said["role"], first=name == names[0])
-    return ParameterKey(name, power, less, unit, allowed, typical, meaning, role)
+    unit = f"s^{-power:g}" if power != 0 else "1"
+    defaults = {
+        "typical": _TYPICAL,
+        "range": (-math.inf, math.inf),
+        "unit": unit if less is None else f"s^({names[less]}-2)",
+        "meaning": "",
+        "role": None,
+    }
+    found: dict[str, Any] = dict(defaults)
+    for what in ("unit", "meaning", "typical", "range", "role"):
+        if what in said:
+            found[what] = _checked(
+                f"parameter '{name}': {what}", what, said[what], first=name == names[0]
+            )
+    kept = {key: value for key, value in found.items() if value != defaults[key]}
+    table = {key: list(v) if isinstance(v, tuple) else v for key, v in kept.items()}
+    key = ParameterKey(name=name, power=power, less=less, **found)
+    return key, {"power": power if less is None else f"2 - {names[less]}"} | table
 
 
 def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | None]:
@@ -279,55 +317,25 @@ def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | Non
     return 2.0, names.index(match[1])
 
 
-def _text(name: str, what: str, value: object) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"parameter '{name}': {what} must be a text, got {short_repr(value)}")
-    return value
-
-
-def _role(name: str, value: object, *, first: bool) -> str:
-    """Return a role that is known; the first parameter, and no other, is the size."""
-    from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
-
-    known = [role for role in _core.roles() if (role == "size") == first]
-    if value not in known:
-        raise InputError(
-            f"parameter '{name}': role must be one of {', '.join(known)}, got {short_repr(value)}"
+def _checked(where: str, what: str, value: object, *, first: bool) -> object:
+    """Return a detail of a parameter, checked; the first parameter, and no other, is the size."""
+    if what in {"typical", "range"}:
+        if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
+            raise InputError(f"{where} must be [low, high], got {short_repr(value)}")
+        unbounded = what == "range"
+        return tuple(
+            end
+            if unbounded and isinstance(end, float) and math.isinf(end)
+            else check_number(where, end)
+            for end in value
         )
-    return str(value)
+    if what == "role":
+        from pendmap import _core  # noqa: PLC0415 (only models with formulas need it)
 
-
-def _unit(power: float, less: int | None, names: list[Any]) -> str:
-    if less is not None:
-        return f"s^({names[less]}-2)"
-    return f"s^{-power:g}" if power != 0 else "1"
-
-
-def _bounds(name: str, what: str, value: object) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        shown = short_repr(value)
-        raise InputError(f"parameter '{name}': {what} must be [low, high], got {shown}")
-    low, high = (
-        end
-        if what == "range" and isinstance(end, float) and math.isinf(end)
-        else check_number(f"parameter '{name}': {what}", end)
-        for end in value
-    )
-    return low, high
-
-
-def _said(part: ParameterKey, names: list[str]) -> dict[str, Any]:
-    """Return a parameter as a table, without defaults."""
-    _, power, less, unit, allowed, typical, meaning, role = part
-    said: dict[str, Any] = {"power": power if less is None else f"2 - {names[less]}"}
-    if typical != _TYPICAL:
-        said["typical"] = list(typical)
-    if allowed != (-math.inf, math.inf):
-        said["range"] = list(allowed)
-    if unit != _unit(power, less, names):
-        said["unit"] = unit
-    if meaning:
-        said["meaning"] = meaning
-    if role:
-        said["role"] = role
-    return said
+        known = [role for role in _core.roles() if (role == "size") == first]
+        if value not in known:
+            wanted = ", ".join(known)
+            raise InputError(f"{where} must be one of {wanted}, got {short_repr(value)}")
+    elif not isinstance(value, str):
+        raise InputError(f"{where} must be a text, got {short_repr(value)}")
+    return value

@@ -12,7 +12,7 @@ from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS
-from pendmap.model.tables import in_file, read_arguments
+from pendmap.model.tables import read_model
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Pendulum:
     ``tau = w0 t``, ``w0 = sqrt(g / l)``; ``th = 0`` hangs down. At rest it stays there while the
     load, ``torque`` less the term with ``sin th``, is no greater than ``theta_r``.
 
-    ``effects`` of the library, and of your own (:class:`pendmap.Formula`), add further terms.
+    ``effects`` of the library, and formulas (:class:`pendmap.Formula`), add further terms.
     A parameter may be any real number; a float is kept.
 
     Parameters
@@ -57,7 +57,7 @@ class Pendulum:
     ------
     InputError
         If a value is not finite or outside its range, an effect is there twice, or one is given
-        that has a parameter of its own here: ``viscous_damping`` beside ``gamma``,
+        that is a parameter here: ``viscous_damping`` beside ``gamma``,
         ``coulomb_friction`` beside ``theta_r``, ``bias_torque`` beside ``torque``.
 
     References
@@ -124,11 +124,6 @@ class Pendulum:
             return _core.period(self)
 
     @property
-    def angle_attributes(self) -> dict[str, float | str]:
-        """The attribute ``angle = "line"`` where an effect counts turns."""
-        return {"angle": "line"} if self.counts_turns else {}
-
-    @property
     def counts_turns(self) -> bool:
         """Whether the torque differs after a turn, so that angles are not wrapped."""
         if not self.effects:
@@ -140,10 +135,7 @@ class Pendulum:
     @property
     def attributes(self) -> dict[str, float | str]:
         """The parameters as a dataset's attributes, like those of a :class:`pendmap.Rig`."""
-        numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
-        effects = {"effects": effects_json(self.effects)}
-        own = effects | self.angle_attributes | said_of(self.notes)
-        return {"units": self.units.name} | numbers | own
+        return attributes_of(self, self)
 
     @property
     def title(self) -> str:
@@ -162,27 +154,18 @@ class Pendulum:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
         """Read a model file without dimensions, by :func:`pendmap.load_model`; refuse one in SI."""
-        si, arguments = read_arguments(path)
-        if si:
-            raise InputError(
-                f"{path}: is in SI: Rig.from_toml reads it, and its property pendulum has no "
-                "dimensions"
-            )
-        with in_file(path):
-            return cls(**arguments)
+        return read_model(path, bare=cls)
 
 
-def checked_effects(
-    effects: object, own: Mapping[str, tuple[str, float]], what: str = "effects"
-) -> tuple[Effect, ...]:
+def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tuple[Effect, ...]:
     """Return effects as a tuple; refuse one that repeats a parameter of a model.
 
     ``own`` has the model's name and value of each parameter of a :class:`Pendulum`.
     """
     if not isinstance(effects, list | tuple):
-        raise InputError(f"{what} must be a tuple of Effect, got {short_repr(effects)}")
+        raise InputError(f"effects must be a tuple of Effect, got {short_repr(effects)}")
     for effect in effects:
-        check_type(what, effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
+        check_type("effects", effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
         if effect.formula is not None:
             continue
         # The library gives the only parameter of such an effect the paper's name.
@@ -197,15 +180,26 @@ def checked_effects(
     return tuple(effects)
 
 
-def effects_json(effects: tuple[Effect, ...]) -> str:
-    """Return effects as a list of names and parameters, in JSON; formulas with their terms."""
-    return json.dumps(
-        [
-            {"name": e.name, "parameters": dict(e.parameters)}
-            | ({} if e.formula is None else {"formula": e.formula.table})
-            for e in effects
-        ]
-    )
+def attributes_of(
+    model: Any,  # noqa: ANN401 (a Pendulum or a Rig)
+    pendulum: Pendulum,
+    further: tuple[str, ...] = (),
+) -> dict[str, float | str]:
+    """Return a model's attributes, with ``further`` ones of the pendulum without dimensions.
+
+    Effects are a list of names and parameters in JSON, formulas with their terms; ``angle`` is
+    ``line`` where an effect counts turns.
+    """
+    numbers = {name: getattr(model, name) for name in model.numbers()}
+    bare = {name: getattr(pendulum, name) for name in further}
+    effects = [
+        {"name": e.name, "parameters": dict(e.parameters)}
+        | ({} if e.formula is None else {"formula": e.formula.table})
+        for e in model.effects
+    ]
+    angle = {"angle": "line"} if pendulum.counts_turns else {}
+    found = {"units": model.units.name} | numbers | bare | {"effects": json.dumps(effects)} | angle
+    return found | said_of(model.notes)
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:

@@ -70,37 +70,29 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
     """
     checked = {name: check(name, value) for name, value in given.items()}
     w0 = check("w0", natural_frequency(checked))
-    result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
-
-    def settle(name: str, others: dict[str, float]) -> None:
-        own = {name: checked[name]} if name in checked else {}
-        if own or others:
-            result[name] = one(name, own | others)
-
-    ways = {}
+    gravity = checked.get("gravity", GRAVITY)
+    ways: dict[str, dict[str, float]] = {
+        name: {name: checked[name]} if name in checked else {}
+        for name in ("c_over_m", "Omega", "p")
+    }
     if "zeta" in checked:
-        ways[f"2 zeta w0 of zeta = {checked['zeta']:g}"] = 2 * checked["zeta"] * w0
-    settle("c_over_m", ways)
-
-    ways = {}
+        zeta = checked["zeta"]
+        ways["c_over_m"][f"2 zeta w0 of zeta = {zeta:g}"] = 2 * zeta * w0
     if "frequency_hz" in checked:
         hertz = checked["frequency_hz"]
-        ways[f"2 pi f of frequency_hz = {hertz:g}"] = math.tau * hertz
-    settle("Omega", ways)
-
-    ways = {}
-    gravity = checked.get("gravity", GRAVITY)
+        ways["Omega"][f"2 pi f of frequency_hz = {hertz:g}"] = math.tau * hertz
     for name, metre in (("Y", 1.0), ("stroke_mm", 1e-3)):
         if name not in checked:
             continue
-        if "Omega" not in result:
+        if not ways["Omega"]:
             raise InputError(
                 f"{name} has no frequency: it must have Omega or frequency_hz beside it"
             )
-        said = f"{name} = {checked[name]:g}, Omega = {result['Omega']:g} and gravity = {gravity:g}"
-        ways[f"Y Omega^2/g of {said}"] = checked[name] * metre * result["Omega"] ** 2 / gravity
-    settle("p", ways)
-    return result
+        omega = one("Omega", ways["Omega"])
+        said = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
+        ways["p"][f"Y Omega^2/g of {said}"] = checked[name] * metre * omega**2 / gravity
+    result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
+    return result | {name: one(name, known) for name, known in ways.items() if known}
 
 
 def one(name: str, ways: Mapping[str, float]) -> float:

@@ -1,4 +1,4 @@
-"""The rig: the same pendulum in SI, and the conversion between the two."""
+"""The pendulum in SI, and its conversion to one without dimensions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
-from pendmap.model.covariance import said_of
 from pendmap.model.effects import definition, library
 from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.pendulum import Pendulum, checked_effects, effects_json
+from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.model.tables import SI_KEYS, in_file, read_arguments
+from pendmap.model.tables import SI_KEYS, read_model
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -65,13 +64,13 @@ class Rig:
     effects : sequence of Effect
         Further terms, parameters in SI; kept as a tuple.
     notes : mapping
-        As of :class:`Pendulum`.
+        Those of :class:`Pendulum`.
 
     Raises
     ------
     InputError
         If a value is not finite or outside its range, ``p`` has no frequency, an effect is there
-        twice, or one is given that has a parameter of its own here.
+        twice, or one is given that is a parameter here.
 
     References
     ----------
@@ -218,11 +217,7 @@ class Rig:
         ``gamma``, ``omega``, ``phase`` and ``theta_r`` are among them, and ``misses_record``,
         residual over noise, of a model that misses the record it was fitted to.
         """
-        numbers: dict[str, float | str] = {name: getattr(self, name) for name in self.numbers()}
-        pendulum = self.pendulum
-        bare = {n: getattr(pendulum, n) for n in ("gamma", "omega", "phase", "theta_r")}
-        effects = {"effects": effects_json(self.effects)} | pendulum.angle_attributes
-        return {"units": self.units.name} | numbers | bare | effects | said_of(self.notes)
+        return attributes_of(self, self.pendulum, ("gamma", "omega", "phase", "theta_r"))
 
     @property
     def title(self) -> str:
@@ -240,14 +235,7 @@ class Rig:
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a model file in SI, by :func:`pendmap.load_model`; refuse one without dimensions."""
-        si, arguments = read_arguments(path)
-        if not si:
-            raise InputError(
-                f"{path}: has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum "
-                "puts it in SI with its w0"
-            )
-        with in_file(path):
-            return cls.of(**arguments)
+        return read_model(path, si=cls.of)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:

@@ -2,50 +2,52 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from pendmap.errors import InputError, check_number, check_whole, short_repr
 from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, formulas_of
+from pendmap.model.formula import Formula, each_table, formulas_of, in_file, shown_key
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    import os
+    from collections.abc import Callable
 
 FORMAT: Final = 1
 """Version of the layout of model files, in their key ``format_version``."""
 TOP: Final = ("pendulum", "formula", "effect", "covariance", "provenance", "format_version")
 NOTES: Final = ("covariance", "provenance")
 EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")
+_EXAMPLES: Final = {"name": '"quadratic_drag"', "parameters": "{ q = 0.01 }"}
+"""Keys that an effect needs, with examples for messages."""
 
 SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
 BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
 _ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
 _ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
+_IN_SI: Final = "is in SI: Rig.from_toml reads it, and its property pendulum has no dimensions"
+_BARE: Final = (
+    "has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum puts it in SI with its "
+    "w0"
+)
+_Model = TypeVar("_Model")
 
 
-@contextlib.contextmanager
-def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the name of a file before the message of an error in it."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{os.fspath(path)}: {error}") from None
-
-
-def read_arguments(
-    path: str | os.PathLike[str], typed: Mapping[str, float] | None = None
-) -> tuple[bool, dict[str, Any]]:
-    """Return whether a model file is in SI, and the arguments of ``Rig.of`` or ``Pendulum``."""
+def read_model(
+    path: str | os.PathLike[str],
+    typed: Mapping[str, float] | None = None,
+    *,
+    bare: Callable[..., _Model] | None = None,
+    si: Callable[..., _Model] | None = None,
+) -> _Model:
+    """Return the model that ``bare`` or ``si`` makes of a file; without its maker refuse it."""
     content = read_toml(path)
     typed = dict(typed or {})
     with in_file(path):
@@ -55,10 +57,13 @@ def read_arguments(
             raise InputError("has no table [pendulum]")
         effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
         notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
-        si = _is_si(table)
-        numbers = _typed_over(table, typed) if si else _bare_numbers(table, typed, effects)
-        exact = [_own_name(name) for name in typed] if si else typed
-        return si, {**numbers, "effects": effects, "notes": without(notes, exact)}
+        in_si = _is_si(table)
+        numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
+        exact = [_own_name(name) for name in typed] if in_si else typed
+        make = si if in_si else bare
+        if make is None:
+            raise InputError(_IN_SI if in_si else _BARE)
+        return make(**numbers, effects=effects, notes=without(notes, exact))
 
 
 def _check_top(content: dict[str, Any]) -> None:
@@ -89,7 +94,7 @@ def _is_si(table: dict[str, Any]) -> bool:
     """Return whether a table is in SI; check all its keys."""
     for key in table:
         if key not in SI_KEYS and key not in BARE_KEYS:
-            raise InputError(f"{_shown(key)} is not known{_instead(key)}")
+            raise InputError(f"{shown_key(key)} is not known{_instead(key)}")
     si = [key for key in table if key in _ONLY_SI]
     bare = [key for key in table if key in _ONLY_BARE]
     if si and bare:
@@ -98,10 +103,6 @@ def _is_si(table: dict[str, Any]) -> bool:
             f"{bare[0]} is {COUNTERPARTS[bare[0]][0]} in SI"
         )
     return bool(si)
-
-
-def _shown(key: str) -> str:
-    return key if key.isidentifier() else short_repr(key)
 
 
 def _instead(key: str) -> str:
@@ -162,34 +163,14 @@ def _bare_numbers(
 
 
 def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
-    if not isinstance(tables, list):
-        raise InputError(f"effect must be [[effect]], one table each, got {short_repr(tables)}")
     effects = []
-    for count, table in enumerate(tables, 1):
+    for where, table in each_table("effect", tables, EFFECT, _EXAMPLES):
+        name = table["name"]
+        formula = formulas.get(name) if isinstance(name, str) else None
         try:
-            effects.append(_effect(table, formulas))
+            effects.append(Effect(**table, formula=formula))
         except InputError as error:
-            raise InputError(f"[[effect]] {count}: {error}") from None
+            unknown = formula is None and formulas and str(error).startswith("name must be")
+            own = f", and this file's [[formula]] are {', '.join(formulas)}" if unknown else ""
+            raise InputError(f"{where}: {error}{own}") from None
     return tuple(effects)
-
-
-def _effect(table: object, formulas: Mapping[str, Formula]) -> Effect:
-    if not isinstance(table, dict):
-        raise InputError(f"must be a table, got {short_repr(table)}")
-    unknown = [key for key in table if key not in EFFECT]
-    if unknown:
-        raise InputError(
-            f"{_shown(unknown[0])} is not known: it must be one of {', '.join(EFFECT)}"
-        )
-    for key, example in (("name", '"quadratic_drag"'), ("parameters", "{ q = 0.01 }")):
-        if key not in table:
-            raise InputError(f"{key} must be given, like {key} = {example}")
-    name = table["name"]
-    formula = formulas.get(name) if isinstance(name, str) else None
-    try:
-        return Effect(**table, formula=formula)
-    except InputError as error:
-        own = ", ".join(formulas)
-        if formula is None and formulas and str(error).startswith("name must be"):
-            raise InputError(f"{error}, and this file's [[formula]] are {own}") from None
-        raise

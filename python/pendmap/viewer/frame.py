@@ -37,19 +37,8 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     """Return an empty recording, identified by the dataset's content."""
     attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
-    telling = next(
-        name
-        for name in (
-            "label",
-            "regime",
-            "entry_theta",
-            "theta",
-            "theta_point",
-            "p",
-            "p_melnikov",
-        )
-        if name in dataset
-    )
+    known = ("label", "regime", "entry_theta", "theta", "theta_point", "p", "p_melnikov")
+    telling = next(name for name in (*known, *dataset.data_vars) if name in dataset)
     content.update(np.ascontiguousarray(dataset[telling].values).data)
     for name in sorted(map(str, dataset.indexes)):  # which part of a result it is
         content.update(repr((name, dataset[name].values.tolist())).encode())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
@@ -73,7 +74,12 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
         elif name in EFFECTS:
             kind = EFFECTS[name]
         else:
-            raise InputError(f"effect {name!r} is not known: {_near(name)}")
+            close = difflib.get_close_matches(name, EFFECTS, n=3)
+            near = f"did you mean {', '.join(close)}? " if close else ""
+            raise InputError(
+                f"effect {name!r} is not known: {near}it must be any, none or one that pendmap rig "
+                "--list shows"
+            )
         if kind.name in used:
             raise InputError(f"effect {name!r}: {kind.name} is asked for twice")
         if kind.needs not in {"", *kinds}:
@@ -105,12 +111,3 @@ def _parse(text: str) -> tuple[str, dict[str, float]]:
     if name == ANY and given:
         raise InputError(f"effect {text!r}: any takes no parameters")
     return name.strip(), given
-
-
-def _near(name: str) -> str:
-    """Return the end of a message that a name is not known."""
-    import difflib  # noqa: PLC0415 (for a message only)
-
-    close = difflib.get_close_matches(name, EFFECTS, n=3)
-    known = f"did you mean {', '.join(close)}? " if close else ""
-    return f"{known}it must be any, none or one that pendmap rig --list shows"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 from pendmap.virtual_rig.effects.base import Floats, Motion
 
 if TYPE_CHECKING:
@@ -34,8 +33,7 @@ class Parameters:
 
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
-            if not math.isfinite(value):
-                raise InputError(f"{name} must be a finite number, got {value}")
+            check_number(name, value)
             if value < 0 or (name == "w0" and value == 0):
                 wanted = "a number above 0" if name == "w0" else "0 or more"
                 raise InputError(f"{name} must be {wanted}, got {value:g}")
@@ -51,24 +49,18 @@ class Equation:
         self.effects = list(effects)
         self.lab = lab
         for effect in effects:
-            drive = effect.alter(drive, lab)
+            drive = effect.alter(drive)
         self.drive = drive
         self.states = sum(effect.states for effect in effects)
         ends = np.cumsum([0, *(effect.states for effect in effects)])
         self._own = [slice(a, b) for a, b in itertools.pairwise(ends)]
         self.watches_load = any(effect.group == "load" for effect in effects)
-        self._refuse_negative()
-
-    def _refuse_negative(self) -> None:
-        least = {
-            "Tr": self.parameters.friction + sum(e.least_friction() for e in self.effects),
-            "c/m": self.parameters.c_over_m + sum(e.least_damping() for e in self.effects),
-        }
-        for name, value in least.items():
-            if value < 0:
-                names = ", ".join(effect.full_name() for effect in self.effects)
+        for name, value in (("Tr", parameters.friction), ("c/m", parameters.c_over_m)):
+            least = value - sum(effect.strength for effect in effects if effect.lowers == name)
+            if least < 0:
+                names = ", ".join(effect.full_name() for effect in effects)
                 raise InputError(
-                    f"{names}: effects must leave {name} 0 or more, it would fall to {value:.3g}"
+                    f"{names}: effects must leave {name} 0 or more, it would fall to {least:.3g}"
                 )
 
     def motion(  # noqa: PLR0913, PLR0917 (the parts of a lane's state)
@@ -97,19 +89,20 @@ class Equation:
         if not isinstance(m.lateral, float):
             total -= p.w0**2 * m.lateral * m.cos
         for effect, part in zip(self.effects, self._own, strict=True):
-            total = total + effect.acceleration(m, own[..., part])
+            acts = effect.reaction(m, own[..., part]) if effect.states else effect.acceleration(m)
+            total = total + acts
         return total
 
-    def friction(self, m: Motion, direction: Floats) -> Floats | float:
-        """Return the dry friction in a direction, rad/s^2, shape (L, K)."""
+    def friction(self, m: Motion) -> Floats | float:
+        """Return the dry friction, rad/s^2, shape (L, K)."""
         level: Floats | float = self.parameters.friction
         for effect in self.effects:
-            level = level + effect.friction(m, direction)
+            level = level + effect.friction(m)
         return level
 
     def rates(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
         """Return accelerations, 0 of lanes that stick, and rates of the effects' own variables."""
-        force = self.smooth(m, own) - m.direction * self.friction(m, m.direction)
+        force = self.smooth(m, own) - m.direction * self.friction(m)
         inertia: Floats | float = 1.0
         for effect in self.effects:
             inertia = inertia + effect.inertia(m)
@@ -127,12 +120,6 @@ class Equation:
         """Return the effects' own variables where a motion begins, shape (L, K, states)."""
         parts = [effect.begin(m) for effect in self.effects if effect.states]
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
-
-    def margins(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
-        """Return how far a pendulum at rest is from slipping up and down, rad/s^2, shape (L, K)."""
-        load = self.smooth(m, own)
-        one = np.ones_like(m.direction)
-        return self.friction(m, one) - load, load + self.friction(m, -one)
 
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
         """Return times since the run began, s, and jumps of the velocity there, rad/s."""

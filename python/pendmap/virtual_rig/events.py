@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.virtual_rig.lanes import Indices, Lanes
-    from pendmap.virtual_rig.step import Step
+    from pendmap.virtual_rig.lanes import Indices, Lanes, Step
 
 _TINY: Final = 1e-4
 """Where a velocity that starts at zero is evaluated first, as a share of a sixteenth step."""

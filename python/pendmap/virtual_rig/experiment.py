@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.virtual_rig.catalogue import draw, draws_size
 from pendmap.virtual_rig.effects.base import Drive
-from pendmap.virtual_rig.effects.readings import ReadingEffect, read
+from pendmap.virtual_rig.effects.readings import read
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
 from pendmap.virtual_rig.lanes import Starts
@@ -237,8 +237,8 @@ def make(request: Request) -> Experiment:
     kinds = {plan.kind for plan in plans}
     asked = list(request.effects or preset.effects)
     effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
-    readings = [effect for effect in effects if isinstance(effect, ReadingEffect)]
-    others = [effect for effect in effects if not isinstance(effect, ReadingEffect)]
+    readings = [effect for effect in effects if effect.group == "reading"]
+    others = [effect for effect in effects if effect.group != "reading"]
     mess = None
     if request.mess != 0:
         spread = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))
@@ -294,7 +294,7 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
 
 
 def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
-    """Return runs with another length, and the same pauses between them."""
+    """Return runs with another length, and equal pauses between them."""
     result, lab = [], 0.0
     for k, plan in enumerate(plans):
         result.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))
@@ -304,9 +304,7 @@ def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
     return result
 
 
-def _integrate(
-    equation: Equation, plans: list[RunPlan], readings: list[ReadingEffect]
-) -> list[Path]:
+def _integrate(equation: Equation, plans: list[RunPlan], readings: list[Effect]) -> list[Path]:
     ends = [max(_true(np.array([plan.duration]), readings)[0], 0.0) for plan in plans]
     starts = Starts(
         run=np.arange(len(plans)),
@@ -321,7 +319,7 @@ def _integrate(
     return paths
 
 
-def _true(time: Floats, readings: list[ReadingEffect]) -> Floats:
+def _true(time: Floats, readings: list[Effect]) -> Floats:
     """Return the true times of what is recorded at ``time``."""
     for effect in readings:
         time = effect.clock(time)

@@ -1,6 +1,6 @@
 """The virtual rig's integrator: many runs side by side, dry friction exactly.
 
-Each round makes one step for every run, each with a length of its own. The signs of the velocity
+Each round makes one step for every run, each with its own length. The signs of the velocity
 and of the load on the bearing are held through a step, so that the equation is smooth there; where
 one changes, the step ends. A pendulum whose velocity is zero sticks exactly while the sum of all
 torques is within the dry friction.
@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendmap.virtual_rig.events import first_switches
-from pendmap.virtual_rig.lanes import Lanes, Starts
+from pendmap.virtual_rig.lanes import Lanes, Starts, solve
 from pendmap.virtual_rig.path import NODES, basis
-from pendmap.virtual_rig.step import solve
 
 if TYPE_CHECKING:
     from pendmap.virtual_rig.equation import Equation
+    from pendmap.virtual_rig.lanes import Step
     from pendmap.virtual_rig.path import Path
-    from pendmap.virtual_rig.step import Step
 
 
 def integrate(equation: Equation, starts: Starts) -> list[Path]:

@@ -64,11 +64,11 @@ class Texture(Effect):
         orders, weights, phases = self.series[which]
         return np.asarray(np.sin(theta[..., None] * orders + phases) @ weights, np.float64)
 
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+    def acceleration(self, motion: Motion) -> Floats:
         """Return the torque of the texture."""
         return self.torque * self._series(0, motion.theta)
 
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
+    def friction(self, motion: Motion) -> Floats:
         """Return the friction of the texture."""
         return self.friction_size * self._series(1, motion.theta) ** 2
 

@@ -168,7 +168,7 @@ def _truth(experiment: Experiment) -> dict[str, Any]:
             "jitter_s": sensor.jitter,
         },
         **({} if experiment.mess is None else {"mess": experiment.mess.describe()}),
-        # Without adapting any parameter, set back on the true motion every 3 s.
+        # Without adapting any parameter, set back on the true motion every second.
         "gap_rms_rad": experiment.gap,
         "run": [_run(k, run) for k, run in enumerate(experiment.runs)],
     }

@@ -11,16 +11,21 @@ friction. The pendulum sticks while ``th' = 0`` and the sum of all others is at 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Final, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.random import Generator
+
+    from pendmap.virtual_rig.path import Path
 
 Floats = NDArray[np.float64]
 
@@ -75,6 +80,14 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     return dataclasses.field(metadata=metadata | {"least": least, "most": most})
 
 
+class Reading(NamedTuple):
+    """A sensor's reading of a path at N times, in order."""
+
+    time: Floats  # since the run began, s, shape (N,)
+    angle: Floats  # the reading, rad, shape (N,)
+    path: Path  # the true motion
+
+
 @dataclass_transform(frozen_default=True)
 @dataclasses.dataclass(frozen=True)
 class Effect:
@@ -82,6 +95,7 @@ class Effect:
 
     A subclass names it, gives its formula in SI, lists its parameters as fields made by
     :func:`size` and :func:`shape`, and overrides what it changes; it becomes a frozen dataclass.
+    Where it changes one thing by a formula, :func:`effect` makes it of a function.
     """
 
     name: ClassVar[str]
@@ -91,29 +105,30 @@ class Effect:
     signed: ClassVar[bool] = False
     """Whether the size may have either sign."""
     states: ClassVar[int] = 0
-    """Number of variables of its own that the effect integrates."""
+    """Number of variables that the effect integrates."""
     drawn: ClassVar[bool] = True
     """Whether a draw may choose it."""
     needs: ClassVar[str] = ""
     """The kind of run that shows it, ``free`` or ``forced``; empty if any does."""
+    lowers: ClassVar[str] = ""
+    """The number of the rig, ``Tr`` or ``c/m``, that it lowers by up to its size, if any."""
+    order: ClassVar[int] = 0
+    """Place of an effect of the reading in the chain: the lowest acts first."""
 
     def __init_subclass__(cls) -> None:
         dataclasses.dataclass(frozen=True)(cls)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value = float(getattr(self, field.name))
-            what = f"effect {self.full_name()}: {field.name} must be"
-            if not math.isfinite(value):
-                raise InputError(f"{what} a finite number, got {value:g}")
-            about = field.metadata
+            about, what = field.metadata, f"effect {self.full_name()}: {field.name}"
+            value = check_number(what, getattr(self, field.name))
             least = about.get("least", -about["most"] if self.signed else 0.0)
             if not least <= value <= about["most"]:
                 raise InputError(
-                    f"{what} a number from {least:g} to {about['most']:g}, got {value:g}"
+                    f"{what} must be a number from {least:g} to {about['most']:g}, got {value:g}"
                 )
             if about.get("whole") and value != round(value):
-                raise InputError(f"{what} a whole number, got {value:g}")
+                raise InputError(f"{what} must be a whole number, got {value:g}")
             object.__setattr__(self, field.name, value)
 
     @classmethod
@@ -143,20 +158,18 @@ class Effect:
             return float(rng.integers(int(low), int(high), endpoint=True))
         return float(rng.uniform(low, high))
 
-    def least_friction(self) -> float:
-        """Return the least that the effect adds to the dry friction, rad/s^2."""
-        return 0.0
+    @property
+    def strength(self) -> float:
+        """The absolute value of the size, which is the first parameter."""
+        size: float = next(iter(vars(self).values()))
+        return abs(size)
 
-    def least_damping(self) -> float:
-        """Return the least that the effect adds to c/m, 1/s."""
-        return 0.0
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats | float:
+    def acceleration(self, motion: Motion) -> Floats | float:
         """Return the acceleration by the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
-    def friction(self, motion: Motion, direction: Floats) -> Floats | float:
-        """Return the dry friction by the effect in a direction, rad/s^2, shape (L, K)."""
+    def friction(self, motion: Motion) -> Floats | float:
+        """Return the dry friction by the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
     def inertia(self, motion: Motion) -> Floats | float:
@@ -164,20 +177,67 @@ class Effect:
         return 0.0
 
     def begin(self, motion: Motion) -> Floats:
-        """Return the effect's own variables where a motion begins, shape (L, K, states)."""
+        """Return the variables of the effect where a motion begins, shape (L, K, states)."""
         return np.zeros((*motion.theta.shape, self.states))
 
-    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        """Return the time derivatives of the effect's own variables, shape (L, K, states)."""
-        return own[..., :0]
+    def reaction(self, motion: Motion, own: Floats) -> Floats:
+        """Return the acceleration, rad/s^2, by an effect with variables, in place of the other."""
+        raise NotImplementedError
 
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        """Return the drive that acts, given the one that was meant and when the runs began."""
+    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
+        """Return the time derivatives of the variables, shape (L, K, states)."""
+        raise NotImplementedError
+
+    def alter(self, drive: Drive) -> Drive:
+        """Return the drive that acts, given the one that was meant."""
         return drive
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Return the lab times, s, and sizes, rad/s, of jumps of the velocity between two times."""
         return []
+
+    def clock(self, time: Floats) -> Floats:
+        """Return the true times, s, of what the record says was read at ``time``."""
+        return time
+
+    def distort(self, seen: Reading) -> Floats:
+        """Return what is read, rad, of what the sensor sees, shape (N,)."""
+        return seen.angle
+
+
+def effect(
+    method: str,
+    group: str,
+    formula: str,
+    **said: Any,  # noqa: ANN401 (parameters and class variables)
+) -> Callable[[Callable[..., Any]], type[Effect]]:
+    """Make an effect of the function that is its one ``method``, under the function's name.
+
+    The function takes what the method takes, then the effect's parameters. ``said`` holds these,
+    made by :func:`size` and :func:`shape`, and class variables.
+    """
+    parameters = [name for name, value in said.items() if isinstance(value, dataclasses.Field)]
+
+    def make(function: Callable[..., Any]) -> type[Effect]:
+        def term(self: Effect, *given: Any) -> Any:  # noqa: ANN401 (those of the method)
+            return function(*given, **vars(self))
+
+        body = {
+            "__doc__": function.__doc__,
+            "__module__": function.__module__,
+            "__annotations__": dict.fromkeys(parameters, float),
+            "name": function.__name__,
+            "group": group,
+            "formula": formula,
+            method: term,
+        }
+        return type(function.__name__, (Effect,), body | said)
+
+    return make
+
+
+acceleration: Final = functools.partial(effect, "acceleration")
+friction: Final = functools.partial(effect, "friction")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,172 +2,116 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, Floats, Motion, shape, size
+from pendmap.virtual_rig.effects.base import (
+    Effect,
+    Floats,
+    Motion,
+    acceleration,
+    friction,
+    shape,
+    size,
+)
 
 
-class ViscousDamping(Effect):
+@acceleration("damping", "-gamma v", drawn=False, gamma=size(0.0025, 0.01, "1/s"))
+def viscous_damping(m: Motion, gamma: float) -> Floats:
     """Viscous damping beside that of the rig."""
-
-    name = "viscous_damping"
-    group = "damping"
-    formula = "-gamma v"
-    drawn = False
-
-    gamma: float = size(0.0025, 0.01, "1/s")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.gamma * motion.velocity
+    return -gamma * m.velocity
 
 
-class CoulombFriction(Effect):
+@friction("friction", "-theta_r sign v", drawn=False, theta_r=size(0.013, 0.053, "rad/s^2"))
+def coulomb_friction(_: Motion, theta_r: float) -> float:
     """Coulomb friction beside that of the rig."""
-
-    name = "coulomb_friction"
-    group = "friction"
-    formula = "-theta_r sign v"
-    drawn = False
-
-    theta_r: float = size(0.013, 0.053, "rad/s^2")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats | float:
-        return self.theta_r
+    return theta_r
 
 
-class QuadraticDrag(Effect):
+@acceleration("damping", "-q v abs(v)", q=size(0.0002, 0.0008, "1/rad"))
+def quadratic_drag(m: Motion, q: float) -> Floats:
     """Drag of the air at high Reynolds numbers."""
-
-    name = "quadratic_drag"
-    group = "damping"
-    formula = "-q v abs(v)"
-
-    q: float = size(0.0002, 0.0008, "1/rad")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.q * motion.velocity * motion.speed
+    return -q * m.velocity * m.speed
 
 
-class CubicDamping(Effect):
+@acceleration("damping", "-k3 v^3", k3=size(2e-05, 8e-05, "s/rad^2"))
+def cubic_damping(m: Motion, k3: float) -> Floats:
     """Damping by the next odd power of the velocity."""
-
-    name = "cubic_damping"
-    group = "damping"
-    formula = "-k3 v^3"
-
-    k3: float = size(2e-05, 8e-05, "s/rad^2")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.k3 * motion.velocity**3
+    return -k3 * m.velocity**3
 
 
-class PowerLawDrag(Effect):
+@acceleration(
+    "damping",
+    "-q abs(v)^n sign v",
+    q=size(0.0009, 0.0035, "rad^(1-n) s^(n-2)"),
+    n=shape(1.3, 1.7, "", least=0.0, most=5.0),
+)
+def power_law_drag(m: Motion, q: float, n: float) -> Floats:
     """Drag between laminar and turbulent flow."""
-
-    name = "power_law_drag"
-    group = "damping"
-    formula = "-q abs(v)^n sign v"
-
-    q: float = size(0.0009, 0.0035, "rad^(1-n) s^(n-2)")
-    n: float = shape(1.3, 1.7, "", least=0.0, most=5.0)
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        # The side beyond a turn is only looked at to find the turn.
-        return -self.q * motion.direction * np.maximum(motion.speed, 0.0) ** self.n
+    # The side beyond a turn is only looked at to find the turn.
+    return -q * m.direction * np.maximum(m.speed, 0.0) ** n
 
 
-class EddyBrake(Effect):
+@acceleration(
+    "damping",
+    "-b v/(1 + (v/vc)^2)",
+    b=size(0.008, 0.032, "1/s"),
+    vc=shape(2.0, 8.0, "rad/s", least=1e-3),
+)
+def eddy_brake(m: Motion, b: float, vc: float) -> Floats:
     """Eddy currents in a plate that passes a magnet: strongest at one velocity.
 
     Smythe (1942), Trans. AIEE 61, 681: ``2/(x + 1/x)`` of the greatest torque at ``x = v/vc``.
     """
-
-    name = "eddy_brake"
-    group = "damping"
-    formula = "-b v/(1 + (v/vc)^2)"
-
-    b: float = size(0.008, 0.032, "1/s")
-    vc: float = shape(2.0, 8.0, "rad/s", least=1e-3)
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * self.vc**2 * motion.velocity / (self.vc**2 + motion.velocity**2)
+    return -b * vc**2 * m.velocity / (vc**2 + m.velocity**2)
 
 
-class StribeckFriction(Effect):
+@friction(
+    "friction",
+    "-a exp(-(v/vs)^2) sign v",
+    a=size(0.05, 0.2, "rad/s^2"),
+    vs=shape(0.1, 0.6, "rad/s", least=1e-3),
+)
+def stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
     """Dry friction that is larger when the motion is slow."""
-
-    name = "stribeck_friction"
-    group = "friction"
-    formula = "-a exp(-(v/vs)^2) sign v"
-    delta: ClassVar[float] = 2.0
-
-    a: float = size(0.05, 0.2, "rad/s^2")
-    vs: float = shape(0.1, 0.6, "rad/s", least=1e-3)
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        # The smooth continuation beyond a turn must not grow without bound.
-        slow = np.maximum(motion.speed / self.vs, -1.0)
-        return self.a * np.exp(-(slow**self.delta))
+    # The smooth continuation beyond a turn must not grow without bound.
+    slow = np.maximum(m.speed / vs, -1.0)
+    return np.asarray(a * np.exp(-(slow**2.0)))
 
 
-class SharpStribeckFriction(StribeckFriction):
+@friction(
+    "friction",
+    "-a exp(-abs(v/vs)) sign v",
+    name="stribeck_friction",
+    variant="sharp",
+    a=size(0.05, 0.2, "rad/s^2"),
+    vs=shape(0.1, 0.6, "rad/s", least=1e-3),
+)
+def sharp_stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
     """Stribeck friction with a cusp at rest (Tustin's form) instead of a round top."""
-
-    variant = "sharp"
-    formula = "-a exp(-abs(v/vs)) sign v"
-    delta: ClassVar[float] = 1.0
+    return np.asarray(a * np.exp(-np.maximum(m.speed / vs, -1.0)))
 
 
-class LoadDependentFriction(Effect):
+@friction(
+    "load",
+    "-k (abs((1 + a(t)) cos th + v^2/w0^2) - 1) sign v",
+    lowers="Tr",
+    k=size(0.003, 0.012, "rad/s^2"),
+)
+def load_dependent_friction(m: Motion, k: float) -> Floats:
     """Dry friction in proportion to the load on the bearing; at rest it is what Tr says."""
-
-    name = "load_dependent_friction"
-    group = "load"
-    formula = "-k (abs((1 + a(t)) cos th + v^2/w0^2) - 1) sign v"
-
-    k: float = size(0.003, 0.012, "rad/s^2")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.k * (motion.side * motion.load - 1)
-
-    def least_friction(self) -> float:
-        return -self.k
+    return k * (m.side * m.load - 1)
 
 
-class AsymmetricViscous(Effect):
+@acceleration("damping", "-b abs(v)", signed=True, lowers="c/m", b=size(0.0005, 0.002, "1/s"))
+def asymmetric_viscous(m: Motion, b: float) -> Floats:
     """Damping that differs between the two directions."""
-
-    name = "asymmetric_viscous"
-    group = "damping"
-    formula = "-b abs(v)"
-    signed = True
-
-    b: float = size(0.0005, 0.002, "1/s")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * motion.speed
-
-    def least_damping(self) -> float:
-        return -abs(self.b)
+    return -b * m.speed
 
 
-class AsymmetricCoulomb(Effect):
+@friction("friction", "-d abs(sign v)", signed=True, lowers="Tr", d=size(0.0035, 0.014, "rad/s^2"))
+def asymmetric_coulomb(m: Motion, d: float) -> Floats:
     """Dry friction that differs between the two directions."""
-
-    name = "asymmetric_coulomb"
-    group = "friction"
-    formula = "-d abs(sign v)"
-    signed = True
-
-    d: float = size(0.0035, 0.014, "rad/s^2")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.d * direction
-
-    def least_friction(self) -> float:
-        return -abs(self.d)
+    return d * m.direction
 
 
 class DahlFriction(Effect):
@@ -184,7 +128,7 @@ class DahlFriction(Effect):
     f: float = size(0.012, 0.05, "rad/s^2")
     zc: float = shape(0.02, 0.1, "rad", least=1e-3)
 
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+    def reaction(self, motion: Motion, own: Floats) -> Floats:
         return -self.f / self.zc * own[..., 0]
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
@@ -192,110 +136,84 @@ class DahlFriction(Effect):
         return slip[..., np.newaxis]
 
 
-class RoughSpot(Effect):
+@friction(
+    "friction",
+    "-f exp(-(1 - cos(th - th0))/w^2) sign v",
+    f=size(0.04, 0.16, "rad/s^2"),
+    th0=shape(-1.0, 1.0, "rad"),
+    w=shape(0.1, 0.4, "rad", least=1e-3),
+)
+def rough_spot(m: Motion, f: float, th0: float, w: float) -> Floats:
     """Dry friction at one angle: dirt in the bearing."""
-
-    name = "rough_spot"
-    group = "friction"
-    formula = "-f exp(-(1 - cos(th - th0))/w^2) sign v"
-
-    f: float = size(0.04, 0.16, "rad/s^2")
-    th0: float = shape(-1.0, 1.0, "rad")
-    w: float = shape(0.1, 0.4, "rad", least=1e-3)
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.f * np.exp((np.cos(motion.theta - self.th0) - 1) / self.w**2)
+    return np.asarray(f * np.exp((np.cos(m.theta - th0) - 1) / w**2))
 
 
-class CoulombDrift(Effect):
+@friction("friction", "-r t sign v, t lab time", r=size(2.5e-05, 0.0001, "rad/s^3"))
+def coulomb_drift(m: Motion, r: float) -> Floats:
     """Wear: dry friction grows with lab time."""
-
-    name = "coulomb_drift"
-    group = "friction"
-    formula = "-r t sign v, t lab time"
-
-    r: float = size(2.5e-05, 0.0001, "rad/s^3")
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.r * motion.lab
+    return r * m.lab
 
 
-class WarmingCoulomb(Effect):
+@friction(
+    "friction",
+    "+f (1 - exp(-t/tau)) sign v, t lab time",
+    lowers="Tr",
+    f=size(0.01, 0.04, "rad/s^2"),
+    tau=shape(60.0, 240.0, "s", least=1e-3),
+)
+def coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
     """A bearing that warms up: dry friction falls to a new level."""
-
-    name = "coulomb_warm_up"
-    group = "friction"
-    formula = "+f (1 - exp(-t/tau)) sign v, t lab time"
-
-    f: float = size(0.01, 0.04, "rad/s^2")
-    tau: float = shape(60.0, 240.0, "s", least=1e-3)
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return self.f * np.expm1(-motion.lab / self.tau)
-
-    def least_friction(self) -> float:
-        return -self.f
+    return np.asarray(f * np.expm1(-m.lab / tau))
 
 
-class SlowlyWarmingCoulomb(WarmingCoulomb):
+@friction(
+    "friction",
+    "+f t/(t + tau) sign v, t lab time",
+    name="coulomb_warm_up",
+    variant="hyperbolic",
+    lowers="Tr",
+    f=size(0.01, 0.04, "rad/s^2"),
+    tau=shape(60.0, 240.0, "s", least=1e-3),
+)
+def slow_coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
     """Friction that falls along a hyperbola: the last part takes far longer."""
-
-    variant = "hyperbolic"
-    formula = "+f t/(t + tau) sign v, t lab time"
-
-    def friction(self, motion: Motion, direction: Floats) -> Floats:
-        return -self.f * motion.lab / (motion.lab + self.tau)
+    return -f * m.lab / (m.lab + tau)
 
 
-class ViscousDrift(Effect):
+@acceleration("damping", "-r t v, t lab time", r=size(5e-06, 2e-05, "1/s^2"))
+def viscous_drift(m: Motion, r: float) -> Floats:
     """Grease that thickens: viscous damping grows with lab time."""
-
-    name = "viscous_drift"
-    group = "damping"
-    formula = "-r t v, t lab time"
-
-    r: float = size(5e-06, 2e-05, "1/s^2")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.r * motion.lab * motion.velocity
+    return -r * m.lab * m.velocity
 
 
-class WarmingViscous(Effect):
+@acceleration(
+    "damping",
+    "+b (1 - exp(-t/tau)) v, t lab time",
+    lowers="c/m",
+    b=size(0.0012, 0.005, "1/s"),
+    tau=shape(60.0, 240.0, "s", least=1e-3),
+)
+def viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
     """Grease that warms up: viscous damping falls to a new level."""
-
-    name = "viscous_warm_up"
-    group = "damping"
-    formula = "+b (1 - exp(-t/tau)) v, t lab time"
-
-    b: float = size(0.0012, 0.005, "1/s")
-    tau: float = shape(60.0, 240.0, "s", least=1e-3)
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return -self.b * np.expm1(-motion.lab / self.tau) * motion.velocity
-
-    def least_damping(self) -> float:
-        return -self.b
+    return np.asarray(-b * np.expm1(-m.lab / tau) * m.velocity)
 
 
-class SlowlyWarmingViscous(WarmingViscous):
+@acceleration(
+    "damping",
+    "+b t/(t + tau) v, t lab time",
+    name="viscous_warm_up",
+    variant="hyperbolic",
+    lowers="c/m",
+    b=size(0.0012, 0.005, "1/s"),
+    tau=shape(60.0, 240.0, "s", least=1e-3),
+)
+def slow_viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
     """Damping that falls along a hyperbola: the last part takes far longer."""
-
-    variant = "hyperbolic"
-    formula = "+b t/(t + tau) v, t lab time"
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        return self.b * motion.lab / (motion.lab + self.tau) * motion.velocity
+    return b * m.lab / (m.lab + tau) * m.velocity
 
 
-class NaturalFrequencyDrift(Effect):
+@acceleration("inertia", "-r t w0^2 (1 + a(t)) sin th, t lab time", r=size(1e-06, 4e-06, "1/s"))
+def natural_frequency_drift(m: Motion, r: float) -> Floats:
     """A rod that shortens as it cools."""
-
-    name = "natural_frequency_drift"
-    group = "inertia"
-    formula = "-r t w0^2 (1 + a(t)) sin th, t lab time"
-
-    r: float = size(1e-06, 4e-06, "1/s")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        pull = motion.w0**2 * (1 + motion.vertical) * motion.sin
-        return np.asarray(-self.r * motion.lab * pull)
+    pull = m.w0**2 * (1 + m.vertical) * m.sin
+    return np.asarray(-r * m.lab * pull)

@@ -2,51 +2,38 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Effect, Floats, shape, size
+from pendmap.virtual_rig.effects.base import Effect, Floats, Reading, effect, shape, size
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.virtual_rig.path import Path
 
+_reading: Final = functools.partial(effect, "distort", "reading")
+
 _FINE: Final = 1e-3
 """Step of the lag's exact response to a cubic between two points, s."""
 
 
-class ReadingEffect(Effect):
-    """An effect that leaves the motion alone."""
-
-    group = "reading"
-    order = 0
-    """Place in the chain: the lowest acts first."""
-
-    def clock(self, time: Floats) -> Floats:
-        """Return the true times, s, of what the record says was read at ``time``."""
-        return time
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        """Return what is read, rad, for true angles in order of time; shapes (N,)."""
-        return angle
-
-
-def read(path: Path, time: Floats, effects: list[ReadingEffect]) -> Floats:
+def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
     """Return what a sensor without noise reads of a path at true, increasing times, rad."""
     # Turning points between the samples matter to backlash.
     turns = np.array([event.time for event in path.events if event.what == "turn"])
     turns = turns[(turns > time[0]) & (turns < time[-1])]
     everything = np.concatenate([time, turns])
     order = np.argsort(everything, kind="stable")
-    angle = path.angle(everything[order])
-    for effect in sorted(effects, key=lambda effect: effect.order):
-        angle = effect.distort(everything[order], angle, path)
-    result = np.empty_like(angle)
-    result[order] = angle
+    seen = Reading(everything[order], path.angle(everything[order]), path)
+    for acting in sorted(effects, key=lambda each: each.order):
+        seen = seen._replace(angle=acting.distort(seen))
+    result = np.empty_like(seen.angle)
+    result[order] = seen.angle
     return result[: time.size]
 
 
@@ -55,91 +42,66 @@ def fading(values: Floats, factor: float) -> Floats:
     return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
 
-class EncoderOffset(ReadingEffect):
+@_reading("reading th + d", signed=True, order=4, d=size(0.0004, 0.0015, "rad"))
+def encoder_offset(seen: Reading, d: float) -> Floats:
     """The zero of the sensor is not at the lowest point."""
-
-    name = "encoder_offset"
-    formula = "reading th + d"
-    signed = True
-    order = 4
-
-    d: float = size(0.0004, 0.0015, "rad")
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        return angle + self.d
+    return seen.angle + d
 
 
-class EncoderDrift(ReadingEffect):
+@_reading("reading th + r t, t lab time", signed=True, order=4, r=size(4e-06, 1.5e-05, "rad/s"))
+def encoder_drift(seen: Reading, r: float) -> Floats:
     """The zero of the sensor wanders off, by as much in every second."""
-
-    name = "encoder_drift"
-    formula = "reading th + r t, t lab time"
-    signed = True
-    order = 4
-
-    r: float = size(4e-06, 1.5e-05, "rad/s")
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        return angle + self.r * (path.lab + time)
+    return seen.angle + r * (seen.path.lab + seen.time)
 
 
-class EncoderGain(ReadingEffect):
+@_reading("reading (1 + e) th", signed=True, order=3, e=size(1.7e-05, 7e-05, "", most=0.9))
+def encoder_gain(seen: Reading, e: float) -> Floats:
     """The sensor's scale is wrong."""
-
-    name = "encoder_gain"
-    formula = "reading (1 + e) th"
-    signed = True
-    order = 3
-
-    e: float = size(1.7e-05, 7e-05, "", most=0.9)
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        return (1 + self.e) * angle
+    return (1 + e) * seen.angle
 
 
-class EncoderEccentricity(ReadingEffect):
+@_reading(
+    "reading th + e sin(th + psi)",
+    order=2,
+    e=size(0.0005, 0.002, "rad", most=0.9),
+    psi=shape(-math.pi, math.pi, "rad"),
+)
+def encoder_eccentricity(seen: Reading, e: float, psi: float) -> Floats:
     """The disc of the encoder is not centred on its shaft."""
-
-    name = "encoder_eccentricity"
-    formula = "reading th + e sin(th + psi)"
-    order = 2
-
-    e: float = size(0.0005, 0.002, "rad", most=0.9)
-    psi: float = shape(-math.pi, math.pi, "rad")
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        return angle + self.e * np.sin(angle + self.psi)
+    return seen.angle + e * np.sin(seen.angle + psi)
 
 
-class EncoderBacklash(ReadingEffect):
+class EncoderBacklash(Effect):
     """Play between shaft and sensor, centred at the start: the reading lags on either side."""
 
     name = "encoder_backlash"
+    group = "reading"
     formula = "reading y with abs(th - y) <= b/2, y moves only when pushed"
     order = 1
 
     b: float = size(0.0014, 0.006, "rad")
 
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
+    def distort(self, seen: Reading) -> Floats:
         half = self.b / 2
         result = []
-        y = float(angle[0])
-        for theta in angle.tolist():
+        y = float(seen.angle[0])
+        for theta in seen.angle.tolist():
             y = min(max(y, theta - half), theta + half)
             result.append(y)
         return np.array(result)
 
 
-class SensorLag(ReadingEffect):
+class SensorLag(Effect):
     """A filter of first order in the sensor, settled when the run begins."""
 
     name = "sensor_lag"
+    group = "reading"
     formula = "reading y, y' = (th - y)/tau"
-    order = 0
 
     tau: float = size(0.00016, 0.0006, "s", most=10.0)
 
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
+    def distort(self, seen: Reading) -> Floats:
+        time, angle, path = seen
         if self.tau == 0:
             return angle
         grid = np.linspace(time[0], time[-1], max(math.ceil((time[-1] - time[0]) / _FINE), 1) + 1)
@@ -169,17 +131,13 @@ class SensorLag(ReadingEffect):
         return np.asarray(settled(k, t) + departure[k] * np.exp(-t / self.tau))
 
 
-class Timebase(ReadingEffect):
+@effect(
+    "clock",
+    "reading",
+    "recorded time (1 + e) t",
+    signed=True,
+    e=size(1.3e-05, 5e-05, "", most=0.9),
+)
+def timebase(time: Floats, e: float) -> Floats:
     """The clock of the record runs fast or slow."""
-
-    name = "timebase"
-    formula = "recorded time (1 + e) t"
-    signed = True
-
-    e: float = size(1.3e-05, 5e-05, "", most=0.9)
-
-    def clock(self, time: Floats) -> Floats:
-        return time / (1 + self.e)
-
-    def distort(self, time: Floats, angle: Floats, path: Path) -> Floats:
-        return angle
+    return time / (1 + e)

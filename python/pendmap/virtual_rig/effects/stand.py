@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from typing import Final
 
 import numpy as np
 
-from pendmap.virtual_rig.effects.base import Drive, Effect, Floats, Motion, shape, size
+from pendmap.virtual_rig.effects.base import (
+    Drive,
+    Effect,
+    Floats,
+    Motion,
+    acceleration,
+    effect,
+    shape,
+    size,
+)
+
+_drive: Final = functools.partial(effect, "alter", "drive", needs="forced")
 
 
 def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Floats:
@@ -18,7 +31,7 @@ def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Fl
 
 
 class PivotCompliance(Effect):
-    """A pivot that gives way sideways, with a mode of its own, driven by the pendulum's pull."""
+    """A pivot that gives way sideways, with its own mode, driven by the pendulum's pull."""
 
     name = "pivot_compliance"
     group = "stand"
@@ -40,7 +53,7 @@ class PivotCompliance(Effect):
             own[..., 2 * k] = mu * pull / wx**2
         return own
 
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
+    def reaction(self, motion: Motion, own: Floats) -> Floats:
         total = np.zeros_like(motion.theta)
         for k, mode in enumerate(self._modes()):
             total -= _recoil(motion, own[..., 2 * k : 2 * k + 2], mode) * motion.cos
@@ -74,20 +87,17 @@ class TwoModePivot(PivotCompliance):
         return [(self.mu, self.wx, self.z), (self.share * self.mu, self.wx2, self.z2)]
 
 
-class BaseSway(Effect):
+@acceleration(
+    "stand",
+    "-w0^2 amplitude cos(ws t + psi) cos th, t lab time",
+    amplitude=size(0.00017, 0.0007, "g"),
+    ws=shape(2.0, 10.0, "rad/s", least=0.0, most=100.0),
+    psi=shape(-np.pi, np.pi, "rad"),
+)
+def base_sway(m: Motion, amplitude: float, ws: float, psi: float) -> Floats:
     """The floor sways sideways, steadily, whatever the pendulum does."""
-
-    name = "base_sway"
-    group = "stand"
-    formula = "-w0^2 amplitude cos(ws t + psi) cos th, t lab time"
-
-    amplitude: float = size(0.00017, 0.0007, "g")
-    ws: float = shape(2.0, 10.0, "rad/s", least=0.0, most=100.0)
-    psi: float = shape(-np.pi, np.pi, "rad")
-
-    def acceleration(self, motion: Motion, own: Floats) -> Floats:
-        sway = self.amplitude * np.cos(self.ws * motion.lab + self.psi)
-        return np.asarray(-(motion.w0**2) * sway * motion.cos)
+    sway = amplitude * np.cos(ws * m.lab + psi)
+    return np.asarray(-(m.w0**2) * sway * m.cos)
 
 
 class Impulses(Effect):
@@ -117,7 +127,7 @@ class ImpulseTrain(Effect):
     pattern: float = shape(0, 999_999, "", whole=True, least=0)
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
-        # The pattern is a stream of its own, the same for every part of a run.
+        # The pattern has its own stream, the same for every part of a run.
         rng = np.random.default_rng(int(self.pattern))
         found, time = [], 0.0
         while time < end:
@@ -128,85 +138,47 @@ class ImpulseTrain(Effect):
         return found
 
 
-class _DriveEffect(Effect):
-    group = "drive"
-    needs = "forced"
-    signed = True
-
-
-class DriveAmplitude(_DriveEffect):
+@_drive("p (1 + e)", signed=True, e=size(0.0015, 0.006, "", most=0.9))
+def drive_amplitude(drive: Drive, e: float) -> Drive:
     """The drive's amplitude is not what the experiment says."""
-
-    name = "drive_amplitude"
-    formula = "p (1 + e)"
-
-    e: float = size(0.0015, 0.006, "", most=0.9)
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        return dataclasses.replace(drive, p=drive.p * (1 + self.e))
+    return dataclasses.replace(drive, p=drive.p * (1 + e))
 
 
-class DrivePhase(_DriveEffect):
+@_drive("phi + d", signed=True, d=size(0.001, 0.004, "rad"))
+def drive_phase(drive: Drive, d: float) -> Drive:
     """The drive is late or early, by the same phase in all runs."""
-
-    name = "drive_phase"
-    formula = "phi + d"
-
-    d: float = size(0.001, 0.004, "rad")
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        return dataclasses.replace(drive, phase=drive.phase + self.d)
+    return dataclasses.replace(drive, phase=drive.phase + d)
 
 
-class DriveFrequency(_DriveEffect):
+@_drive("Omega (1 + e)", signed=True, e=size(1e-05, 4e-05, "", most=0.9))
+def drive_frequency(drive: Drive, e: float) -> Drive:
     """The drive's frequency is not what the experiment says."""
-
-    name = "drive_frequency"
-    formula = "Omega (1 + e)"
-
-    e: float = size(1e-05, 4e-05, "", most=0.9)
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        return dataclasses.replace(drive, frequency=drive.frequency * (1 + self.e))
+    return dataclasses.replace(drive, frequency=drive.frequency * (1 + e))
 
 
-class DriveChirp(_DriveEffect):
+@_drive("phase Omega t + r t^2/2 + phi", signed=True, r=size(1.5e-05, 6e-05, "rad/s^2"))
+def drive_chirp(drive: Drive, r: float) -> Drive:
     """The drive's frequency creeps during a run."""
-
-    name = "drive_chirp"
-    formula = "phase Omega t + r t^2/2 + phi"
-
-    r: float = size(1.5e-05, 6e-05, "rad/s^2")
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        return dataclasses.replace(drive, chirp=np.full_like(drive.p, self.r))
+    return dataclasses.replace(drive, chirp=np.full_like(drive.p, r))
 
 
-class DriveSecondHarmonic(_DriveEffect):
+@_drive(
+    "a(t) + e p cos(2 (Omega t + phi) + phase)",
+    e=size(0.0027, 0.011, "", most=10.0),
+    phase=shape(-math.pi, math.pi, "rad"),
+)
+def drive_second_harmonic(drive: Drive, e: float, phase: float) -> Drive:
     """A shaker that distorts: twice the frequency as well."""
-
-    name = "drive_second_harmonic"
-    formula = "a(t) + e p cos(2 (Omega t + phi) + phase)"
-    signed = False
-
-    e: float = size(0.0027, 0.011, "", most=10.0)
-    phase: float = shape(-math.pi, math.pi, "rad")
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        phi = np.full_like(drive.p, self.phase)
-        return dataclasses.replace(drive, p_second=self.e * drive.p, phi_second=phi)
+    phi = np.full_like(drive.p, phase)
+    return dataclasses.replace(drive, p_second=e * drive.p, phi_second=phi)
 
 
-class LateralDrive(_DriveEffect):
+@_drive(
+    "-w0^2 e p cos(Omega t + phi + phase) cos th",
+    e=size(0.0007, 0.003, "", most=10.0),
+    phase=shape(-math.pi, math.pi, "rad"),
+)
+def lateral_drive(drive: Drive, e: float, phase: float) -> Drive:
     """A shaker that does not move straight: sideways as well."""
-
-    name = "lateral_drive"
-    formula = "-w0^2 e p cos(Omega t + phi + phase) cos th"
-    signed = False
-
-    e: float = size(0.0007, 0.003, "", most=10.0)
-    phase: float = shape(-math.pi, math.pi, "rad")
-
-    def alter(self, drive: Drive, lab: Floats) -> Drive:
-        phi = np.full_like(drive.p, self.phase)
-        return dataclasses.replace(drive, p_lateral=self.e * drive.p, phi_lateral=phi)
+    phi = np.full_like(drive.p, phase)
+    return dataclasses.replace(drive, p_lateral=e * drive.p, phi_lateral=phi)
