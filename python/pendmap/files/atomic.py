@@ -26,25 +26,18 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import IO
 
+# Names of the files that the running command has written: an interrupt names them
 COMPLETE: Final[list[str]] = []
-"""Names of the files that the running command has written: an interrupt names them."""
-
+# Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-"""Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed."""
-
+# Name of a folder in which files are written before they take their places
 _STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
-"""Name of a folder in which files are written before they take their places."""
-
-_OWNER: Final = "owner"
-"""File in a stage that its run keeps locked while it lives."""
-
+_OWNER: Final = "owner"  # File in a stage that its run keeps locked while it lives
+# Bytes written on trial after a library failed to write: a full disk refuses them
 _PROBE: Final = 2**20
-"""Bytes written on trial after a library failed to write: a full disk refuses them."""
-
-_LEAST: Final = 4096
-"""Bytes written on trial before anything is computed: one block of most disks."""
+_LEAST: Final = 4096  # Bytes written on trial before anything is computed: one block of most disks
 
 
 @contextlib.contextmanager

@@ -16,18 +16,15 @@ from pendmap import ANALYSES
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
+# Version of the layout of the datasets, in their attribute ``format_version``
 FORMAT_VERSION: Final = 1
-"""Version of the layout of the datasets, in their attribute ``format_version``."""
-SUFFIXES: Final = (".nc", ".zarr")
-"""Suffixes of the files that a result is stored in."""
-_MARKS: Final = frozenset(("format_version", "kind"))
-"""Attributes that mark a dataset as a result."""
+SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of the files that a result is stored in
+_MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
+# Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
-"""Kinds of result, and the functions that return each."""
-_LARGE: Final = 4096
-"""Values from which on a variable is compressed."""
+_LARGE: Final = 4096  # Values from which on a variable is compressed
+# Names of the files of a stored result: descriptions and chunks
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
-"""Names of the files of a stored result: descriptions and chunks."""
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:

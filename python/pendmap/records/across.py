@@ -22,33 +22,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.experiment import Run
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
+# Relative difference of small-swing periods from which runs are of several rigs
 ONE_RIG: Final = 0.05
-"""Relative difference of small-swing periods from which runs are of several rigs."""
-
+# Readings: fewer shared readings are no copy, fewer remaining readings are no run
 FEWEST_SHARED: Final = 50
-"""Readings: fewer shared readings are no copy, fewer remaining readings are no run."""
-
-LEAST_SHARE: Final = 0.1
-"""Share of the shorter run: fewer shared readings are no copy."""
-
-LEAST_LEVELS: Final = 20
-"""Sensor steps that shared readings span at least; fewer agree by chance."""
-
-AGREEING: Final = 0.99
-"""Share of shared readings that agree within half a step; 1 % may be edited."""
-
-FACTOR_ERROR: Final = 1e-6
-"""Relative error of a conversion factor between units as people write it."""
-
-OFF_STEP: Final = 1e-2
-"""Steps by which distances of readings may miss whole multiples of a step."""
-
-MOST_THINNED: Final = 10
-"""Readings of which a copy keeps one, at most, to be found."""
+LEAST_SHARE: Final = 0.1  # Share of the shorter run: fewer shared readings are no copy
+LEAST_LEVELS: Final = 20  # Sensor steps that shared readings span at least; fewer agree by chance
+AGREEING: Final = 0.99  # Share of shared readings that agree within half a step; 1 % may be edited
+FACTOR_ERROR: Final = 1e-6  # Relative error of a conversion factor between units as people write it
+OFF_STEP: Final = 1e-2  # Steps by which distances of readings may miss whole multiples of a step
+MOST_THINNED: Final = 10  # Readings of which a copy keeps one, at most, to be found
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:

@@ -19,35 +19,24 @@ from pendmap.records.work import Work
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from numpy.typing import NDArray
-
     from pendmap.records.description import Description, RunPlan
     from pendmap.records.text import Table
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-_MOST_NAMED: Final = 8
-"""Columns that a message lists at most."""
-
+_MOST_NAMED: Final = 8  # Columns that a message lists at most
+# Channels from which an angle can be made
 ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-"""Channels from which an angle can be made."""
-
 POSITION_NAME: Final = "pos(ition)?"
-
+# Correlation, lines removed, from which a position is the integral of the velocity
 POSITION_AGREES: Final = 0.9
-"""Correlation, lines removed, from which a position is the integral of the velocity."""
-
 MOTOR_NAMES: Final = re.compile(
     r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
 )
-
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
-
 PIVOT_NAMES: Final = re.compile(
     r"\b(pivot|cart|carriage|trolley|slider?|shaker|stage|base|platform|support|suspension|wagen)\b"
 )
-
 ASKED_PIVOT_UNITS: Final = {
     "m": "m",
     "mm": "mm",
@@ -56,14 +45,10 @@ ASKED_PIVOT_UNITS: Final = {
     "m/s2": "m/s2",
     "g": "g",
 }
-
+# Units of a pivot's column by words in its name
 PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
-"""Units of a pivot's column by words in its name."""
-
 ANGLE_NAMES: Final = re.compile(r"pos(ition)?|.*(angle|winkel|theta|encoder).*")
-
-MOST_UNUSED: Final = 12
-"""Names of unused columns that a message lists at most."""
+MOST_UNUSED: Final = 12  # Names of unused columns that a message lists at most
 
 
 def channels_of(  # noqa: C901 (a step each)
@@ -106,13 +91,10 @@ def channels_of(  # noqa: C901 (a step each)
         findings.append(Finding("pivot-unit", text))
     sensor, missing = None, ""
     if "acceleration" in places:
-        said = asked.get("acceleration", Column())
-        heading, read_in = name_and_unit(table.names[places["acceleration"]])
+        heading, unit = name_and_unit(table.names[places["acceleration"]])
         gravity = float(description.known.get("gravity", GRAVITY))
-        scaled = said.scale is not None
-        sensor, missing = accelerometer_of(
-            said.place, said.unit or read_in, heading, gravity, scaled=scaled
-        )
+        column = asked.get("acceleration", Column())
+        sensor, missing = accelerometer_of(column, heading, unit, gravity)
     edges = asked.get("trigger", Column())
     time = values.pop("time")
     return Work(
@@ -354,7 +336,7 @@ def position_of(table: Table, places: Mapping[str, int]) -> int | None:
     return found[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
 
 
-def _bent(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bent(values: Floats) -> Floats:
     """Return values less their least-squares line."""
     place = np.arange(values.size)
     return np.asarray(values - np.polyval(np.polyfit(place, values, 1), place))
@@ -365,7 +347,7 @@ def head_of(table: Table, place: int) -> str:
     return table.names[place] or f"column {place + 1}"
 
 
-def changes(values: NDArray[np.float64]) -> bool:
+def changes(values: Floats) -> bool:
     """Return whether a column has two different numbers."""
     seen = values[np.isfinite(values)]
     return bool(seen.size) and float(np.ptp(seen)) > 0

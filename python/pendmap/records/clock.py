@@ -21,71 +21,42 @@ from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import intervals_of, normal_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices
 
-    Floats = NDArray[np.float64]
 
-
-RESTART: Final = 10
-"""Intervals that a restarted clock falls back by; samples that each part has."""
-
+RESTART: Final = 10  # Intervals that a restarted clock falls back by; samples that each part has
+# Spread of the intervals over their median from which jitter is reported
 REPORTED_JITTER: Final = 0.02
-"""Spread of the intervals over their median from which jitter is reported."""
-
-MOST_UNORDERED: Final = 0.3
-"""Share of unordered stamps from which the record is refused."""
-
+MOST_UNORDERED: Final = 0.3  # Share of unordered stamps from which the record is refused
+# Readings with one stamp, besides ten times the usual, that stop a clock
 STOPPED_READINGS: Final = 50
-"""Readings with one stamp, besides ten times the usual, that stop a clock."""
-
+# Share of repeated stamps from which the clock is coarser than the sampling
 COARSE_STAMPS: Final = 0.2
-"""Share of repeated stamps from which the clock is coarser than the sampling."""
-
-SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))
-"""Findings about intervals."""
-
+SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
+# Seconds after which counters of 16 and 32 bits in us, ms or s wrap
 COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
-"""Seconds after which counters of 16 and 32 bits in us, ms or s wrap."""
-
-SLIP_DEGREE: Final = 7
-"""Degree of the polynomials that slips are seen with."""
-
+SLIP_DEGREE: Final = 7  # Degree of the polynomials that slips are seen with
+# Radians of phase to either side that such a polynomial follows within 6e-3
 SLIP_PHASE: Final = 2.0
-"""Radians of phase to either side that such a polynomial follows within 6e-3."""
-
-SHORTEST_SIDE: Final = 8
-"""Samples to either side of a slip at least, to know both velocities."""
-
-LONGEST_SIDE: Final = 150
-"""Samples to either side of a slip at most."""
-
-FEWEST_SLIPS: Final = 3
-"""Slips of one size that make it a fault of the clock."""
-
+SHORTEST_SIDE: Final = 8  # Samples to either side of a slip at least, to know both velocities
+LONGEST_SIDE: Final = 150  # Samples to either side of a slip at most
+FEWEST_SLIPS: Final = 3  # Slips of one size that make it a fault of the clock
+# Standard errors of a slip in each pass; large slips hide small ones beside them
 CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)
-"""Standard errors of a slip in each pass; large slips hide small ones beside them."""
-
-MOST_INTERVALS: Final = 4
-"""Intervals of the longest slip."""
-
-SLOW_POWER: Final = 1e-3
-"""Power over its median below which the motion is too slow to show a slip."""
-
-OFF_INTERVAL: Final = 0.25
-"""Intervals by which a slip may miss a whole number."""
-
-MOST_OTHER_JUMPS: Final = 0.2
-"""Share of the jumps that may be no slips."""
-
-_BLOCK: Final = 4000
-"""Windows that are solved at a time."""
+MOST_INTERVALS: Final = 4  # Intervals of the longest slip
+SLOW_POWER: Final = 1e-3  # Power over its median below which the motion is too slow to show a slip
+OFF_INTERVAL: Final = 0.25  # Intervals by which a slip may miss a whole number
+MOST_OTHER_JUMPS: Final = 0.2  # Share of the jumps that may be no slips
+_BLOCK: Final = 4000  # Windows that are solved at a time
 
 
 def mend(work: Work) -> None:
     """Make the times strictly increasing and report it; raise InputError if none increase."""
-    _finite(work)
+    missing = ~np.isfinite(work.time)
+    if missing.all():
+        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
+    work.leave_out(missing, "time-missing", "row", "without a time left out")
     if work.time.size < 2:
         work.refuse_short()
     _stopped(work)
@@ -114,17 +85,6 @@ def cut_at_pauses(work: Work) -> None:
         )
         work.say("time-pause", text, at=np.array([pause + 1]))
         work.keep(kept)
-
-
-def _finite(work: Work) -> None:
-    """Leave out rows without a time."""
-    missing = np.flatnonzero(~np.isfinite(work.time))
-    if missing.size == work.time.size:
-        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
-    if missing.size:
-        text = f"{counted(missing.size, 'row')} without a time left out"
-        work.say("time-missing", text, mended=True, at=missing)
-        work.keep(np.isfinite(work.time))
 
 
 def _stopped(work: Work) -> None:
@@ -220,8 +180,8 @@ def _coarse(work: Work) -> None:
 
 
 def _ordered(work: Work) -> None:
-    # Stamps that differ by rounding alone are equal.
     """Reverse, sort or leave out rows whose times do not increase."""
+    # Stamps that differ by rounding alone are equal.
     near = 2 * float(np.spacing(np.max(np.abs(work.time))))
     steps = np.diff(work.time)
     if np.all(steps > near):
@@ -230,15 +190,10 @@ def _ordered(work: Work) -> None:
         work.keep(np.arange(work.time.size)[::-1])
         work.say("time-backwards", "the rows run backwards in time: turned round", mended=True)
         return
-    repeated = np.flatnonzero(np.abs(steps) <= near) + 1
-    if repeated.size:
-        alike = np.sum(work.theta[repeated] == work.theta[repeated - 1])
-        text = (
-            f"{counted(repeated.size, 'time stamp')} twice ({alike} with the same reading): the"
-            " first of each kept"
-        )
-        work.say("time-duplicate", text, mended=True, at=repeated)
-        work.keep(np.delete(np.arange(work.time.size), repeated))
+    again = np.append(False, np.abs(steps) <= near)
+    alike = np.sum(np.diff(work.theta, prepend=np.nan)[again] == 0)
+    why = f"twice ({alike} with the same reading): the first of each kept"
+    work.leave_out(again, "time-duplicate", "time stamp", why)
     kept = _longest_rising(work.time)
     out = np.setdiff1d(np.arange(work.time.size), kept)
     if not out.size:
@@ -246,26 +201,20 @@ def _ordered(work: Work) -> None:
     order = np.argsort(work.time, kind="stable")
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
         text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
-        work.say("time-backwards", text, mended=True, at=out)
-        _keep_apart(work, order, near)
-        return
-    if out.size > MOST_UNORDERED * work.time.size:
+        kept = order
+    elif out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
             f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
             " of order, and in order the angles make no motion"
         )
-    text = f"{counted(out.size, 'time stamp')} out of order, left out"
+    else:
+        text = f"{counted(out.size, 'time stamp')} out of order, left out"
     work.say("time-backwards", text, mended=True, at=out)
-    _keep_apart(work, kept, near)
+    work.keep(kept)
+    work.keep(np.append(True, np.diff(work.time) > near))
 
 
-def _keep_apart(work: Work, places: NDArray[np.intp], near: float) -> None:
-    """Keep the rows at these places, and the first of each stamp."""
-    work.keep(places)
-    work.keep(np.concatenate([[True], np.diff(work.time) > near]))
-
-
-def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
+def _smoother(theta: Floats, at: Indices) -> bool:
     """Return whether moved samples fit between their new neighbours as all others do."""
     if theta.size < 5 or not np.all(np.isfinite(theta)):
         return False
@@ -277,7 +226,7 @@ def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
     return bool(np.all(moved <= 3 * usual))
 
 
-def _longest_rising(time: Floats) -> NDArray[np.intp]:
+def _longest_rising(time: Floats) -> Indices:
     """Return the places of the longest strictly rising subsequence."""
     tails: list[float] = []
     ends: list[int] = []
@@ -328,7 +277,7 @@ class Slips:
     """Where a clock slipped, the corrected times, and the mean slip of one interval."""
 
     time: Floats  # corrected, s
-    places: NDArray[np.intp]  # first sample after each slip
+    places: Indices  # first sample after each slip
     slip: float  # s
     stderr: float  # s
 
@@ -372,7 +321,7 @@ def _shown(reach: int) -> Floats:
     return np.array([lag[3 * reach] for lag in lags])
 
 
-def _found(values: Floats, reach: int, limit: float) -> tuple[NDArray[np.intp], Floats]:
+def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
     """Return the first samples after slips, and the apparent slips in intervals."""
     from scipy.ndimage import maximum_filter1d
 

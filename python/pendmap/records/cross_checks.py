@@ -17,52 +17,31 @@ from pendmap.formatting import counted
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.resolution import step_of
 from pendmap.records.rod_sensors import Accelerometer
-from pendmap.records.units import PIVOT_UNITS
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-SAME_MOTION: Final = 0.8
-"""Correlation from which two channels show the same motion."""
-
+SAME_MOTION: Final = 0.8  # Correlation from which two channels show the same motion
+# Relative error that a gain of 1 may have: filtered channels miss a few per cent
 GAIN_OFF: Final = 0.1
-"""Relative error that a gain of 1 may have: filtered channels miss a few per cent."""
-
-CERTAIN_SIGN: Final = 8.0
-"""Standard errors from which a coefficient has the wrong sign."""
-
+CERTAIN_SIGN: Final = 8.0  # Standard errors from which a coefficient has the wrong sign
+# Largest span of a pivot in a laboratory, by unit
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}
-"""Largest span of a pivot in a laboratory, by unit."""
-
-DERIVATIVE_SPAN: Final = 0.12
-"""Periods over which derivatives are taken."""
-
+DERIVATIVE_SPAN: Final = 0.12  # Periods over which derivatives are taken
+# Why an acceleration beside an angle is not used
 CHECK_ONLY: Final = "a check, not fitted: the angle is"
-"""Why an acceleration beside an angle is not used."""
-
-PIVOT_ORDER: Final = {"m": 2, "m/s": 1}
-"""Derivatives from a unit of the pivot to an acceleration."""
-
-NOISE_SHARE: Final = 0.05
-"""Noise of the pivot's acceleration over its largest value, at most."""
-
-STEPS_PASSED: Final = 4.0
-"""Steps that a moving pivot passes within a window at least."""
-
+PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Derivatives from a unit of the pivot to an acceleration
+NOISE_SHARE: Final = 0.05  # Noise of the pivot's acceleration over its largest value, at most
+STEPS_PASSED: Final = 4.0  # Steps that a moving pivot passes within a window at least
+# Seconds that a window spans at most, unless it then holds only five readings
 LONGEST_WINDOW: Final = 0.2
-"""Seconds that a window spans at most, unless it then holds only five readings."""
-
-MOVING_SHARE: Final = 0.2
-"""Speed over the largest from which the pivot moves."""
+MOVING_SHARE: Final = 0.2  # Speed over the largest from which the pivot moves
 
 
 def check(work: Work) -> None:
@@ -71,28 +50,23 @@ def check(work: Work) -> None:
         _velocity(work)
     if "acceleration" in work.extra:
         _acceleration(work)
-    if work.plan.kind == "forced":
-        _far(work)
-        _drive_sign(work)
-
-
-def _far(work: Work) -> None:
-    """Report a pivot whose span shows another unit."""
-    unit, _ = PIVOT_UNITS[(work.plan.pivot or {}).get("unit", "m/s2")]
+    if work.plan.kind != "forced":
+        return
     for way, values in (work.pivot() or {}).items():
         good = values[np.isfinite(values)]
         span = float(np.ptp(good)) if good.size else 0.0
-        if span > FARTHEST_PIVOT[unit]:
-            text = f"the pivot's {way} motion spans {span:.4g} {unit}: its unit is another"
-            work.say("pivot-unit", text)
+        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
+            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
+            work.say("pivot-unit", f"{text}: its unit is another")
+    _drive_sign(work)
 
 
 def _velocity(work: Work) -> None:
     """Compare a velocity with the slope of the angle: turn it, rescale it or leave it out."""
     velocity = work.extra["velocity"]
-    missing = ~np.isfinite(velocity)
-    if missing.any():
-        text = f"{counted(int(missing.sum()), 'sample')} without velocity: the channel is left out"
+    missing = int(np.count_nonzero(~np.isfinite(velocity)))
+    if missing:
+        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
         work.say("velocity-missing", text)
         del work.extra["velocity"]
         return
@@ -111,18 +85,22 @@ def _velocity(work: Work) -> None:
         work.say("velocity-unlike", text)
         del work.extra["velocity"]
         return
-    gain = float(np.dot(slope, seen) / np.dot(slope, slope)) * scale
+    gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
     if alike < 0:
-        work.extra["velocity"] = -velocity
-        text = "the velocity has the other sign than the angle: turned round, the angle counts"
-        work.say("sign-turned", text, mended=True)
-    gain = abs(gain)
+        _turn(work, "velocity")
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
         text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
         work.say("velocity-unit", text, mended=True)
     elif abs(gain - 1) > GAIN_OFF:
         work.say("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+
+
+def _turn(work: Work, channel: str) -> None:
+    """Change the sign of a channel that runs against the angle."""
+    work.extra[channel] = -work.extra[channel]
+    text = f"the {channel} has the other sign than the angle: turned round, the angle counts"
+    work.say("sign-turned", text, mended=True)
 
 
 def _drive_sign(work: Work) -> None:
@@ -174,13 +152,11 @@ def _drive_sign(work: Work) -> None:
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
     """Return the accelerations of the pivot, or a(t) of the drive, at even times."""
     found: dict[str, Floats] = {}
-    plan = work.plan
-    if plan.drive is not None and plan.drive["phi"] is not None:
-        p, omega = plan.drive["p"] or 0.0, plan.drive["Omega"] or 0.0
-        if p:
-            found["drive"] = p * np.cos(omega * even + plan.drive["phi"])
-    unit, _ = PIVOT_UNITS[(plan.pivot or {}).get("unit", "m/s2")]
-    order = {"m/s": 1, "m": 2}.get(unit, 0)
+    drive = work.plan.drive or {}
+    p, phi = drive.get("p"), drive.get("phi")
+    if p and phi is not None:
+        found["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
+    order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     for way, values in (work.pivot() or {}).items():
         good = np.isfinite(values)
         if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
@@ -213,14 +189,12 @@ def _acceleration(work: Work) -> None:
     """Compare an acceleration with the angle beside it; turn it if its sign is the other."""
     if work.made_of is not None:
         return
-    if work.plan.kind == "forced":
-        text = "the acceleration is not used: on a forced run it holds the pivot's own"
-        work.say("acceleration-unused", text)
-        return
-    motion = _motion(work)
+    motion = None if work.plan.kind == "forced" else _motion(work)
     if motion is None:
-        text = "the acceleration is not used: too few samples beside the angle to compare it"
-        work.say("acceleration-unused", text)
+        forced = "on a forced run it holds the pivot's own"
+        short = "too few samples beside the angle to compare it"
+        why = forced if work.plan.kind == "forced" else short
+        work.say("acceleration-unused", f"the acceleration is not used: {why}")
     elif work.accelerometer is None:
         _unplaced(work, motion)
     else:
@@ -279,9 +253,8 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
     """Report how an acceleration compares with the readings expected at its place."""
     expected = motion.expected(sensor)
     alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
-    where = (
-        "" if sensor.direction == "angular" else f", {sensor.direction} at {sensor.distance_m:g} m"
-    )
+    angular = sensor.direction == "angular"
+    where = "" if angular else f", {sensor.direction} at {sensor.distance_m:g} m"
     if abs(alike) < SAME_MOTION:
         text = (
             f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
@@ -290,31 +263,20 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
         work.say("acceleration-unlike", text)
         return
     if gain < 0:
-        work.extra["acceleration"] = -work.extra["acceleration"]
-        text = "the acceleration has the other sign than the angle: turned round, the angle counts"
-        work.say("sign-turned", text, mended=True)
-    gain = abs(gain)
-    if abs(gain - 1) > GAIN_OFF:
-        text = (
-            f"the acceleration is {gain:.3g} times what the angle says{where}:"
-            f" {_other(motion, sensor)}; not used"
-        )
-        work.say("acceleration-scale", text)
+        _turn(work, "acceleration")
+    text = f"the acceleration is {abs(gain):.3g} times what the angle says{where}"
+    if abs(abs(gain) - 1) <= GAIN_OFF:
+        work.say("acceleration-agrees", f"{text}: {CHECK_ONLY}")
         return
-    text = f"the acceleration is {gain:.3g} times what the angle says{where}: {CHECK_ONLY}"
-    work.say("acceleration-agrees", text)
-
-
-def _other(motion: _Motion, sensor: Accelerometer) -> str:
-    """Return other places or units that would explain the readings."""
-    if sensor.direction == "angular":
-        return "its unit, or a distance"
-    measured = motion.measured * math.copysign(
-        1.0, _alike(motion.expected(sensor), motion.measured)
-    )
-    distance = _distance(dataclasses.replace(motion, measured=measured), sensor)
-    found = f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
-    return f"{found} or gravity_removed is wrong"
+    other = "its unit, or a distance"
+    if not angular:
+        turned = dataclasses.replace(motion, measured=math.copysign(1.0, alike) * motion.measured)
+        distance = _distance(turned, sensor)
+        other = (
+            f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
+        )
+        other += " or gravity_removed is wrong"
+    work.say("acceleration-scale", f"{text}: {other}; not used")
 
 
 def _distance(motion: _Motion, sensor: Accelerometer) -> float:

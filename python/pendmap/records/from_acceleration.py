@@ -19,45 +19,25 @@ from pendmap.records.swinging import LEAST_SWING, middle_over, swinging
 from pendmap.signal.half_cycles import swings
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.swinging import Swinging
     from pendmap.records.work import Work
-
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
+    from pendmap.signal import Floats, Stretch
 
 
-FEWEST_HALF_SWINGS: Final = 4
-"""Half swings from which a period is taken."""
-
-CERTAIN_DIP: Final = 0.3
-"""Relative dip that noise cannot cause."""
-
+FEWEST_HALF_SWINGS: Final = 4  # Half swings from which a period is taken
+CERTAIN_DIP: Final = 0.3  # Relative dip that noise cannot cause
+# Reading over the largest of a swing from which place or unit are wrong
 LARGEST_READING: Final = 1.15
-"""Reading over the largest of a swing from which place or unit are wrong."""
-
-ONE_SIDED: Final = 0.15
-"""Smaller over larger side of the readings below which the axis is radial."""
-
+ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
+# Relative distance from the centre of oscillation at which no swing is seen
 BLIND_SPOT: Final = 0.05
-"""Relative distance from the centre of oscillation at which no swing is seen."""
-
-WEAK_SPOT: Final = 0.2
-"""Relative distance from it within which a swing is seen weakly."""
-
-QUARTER_TURN_PERIOD: Final = 1.18
-"""Period of a swing of a quarter turn over that of a small one."""
-
-LEAST_DIP: Final = 0.01
-"""Relative dip between two humps at least."""
-
-DIP_NOISE: Final = 4.0
-"""Standard errors of a dip at least."""
-
+WEAK_SPOT: Final = 0.2  # Relative distance from it within which a swing is seen weakly
+QUARTER_TURN_PERIOD: Final = 1.18  # Period of a swing of a quarter turn over that of a small one
+LEAST_DIP: Final = 0.01  # Relative dip between two humps at least
+DIP_NOISE: Final = 4.0  # Standard errors of a dip at least
+# Hump over the largest reading of a swing beside a dip: there the sine is 1
 LEAST_HUMP: Final = 0.75
-"""Hump over the largest reading of a swing beside a dip: there the sine is 1."""
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:
@@ -254,7 +234,7 @@ class Wave:
         return math.asin(min(self.top / abs(gain), 1.0))
 
 
-def waves_of(time: Floats, values: Floats, part: Places, noise: float) -> list[Wave]:
+def waves_of(time: Floats, values: Floats, part: Stretch, noise: float) -> list[Wave]:
     """Return the half swings of a free stretch between crossings of the middle."""
     stretch = slice(*part)
     found = swings(time[stretch], values[stretch], least=max(LEAST_SWING * noise, 1e-12))

@@ -16,33 +16,19 @@ from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
-SPEED_REACH: Final = 0.7
-"""Radians of phase to either side from which a speed is taken."""
-
+SPEED_REACH: Final = 0.7  # Radians of phase to either side from which a speed is taken
+# Standard deviations from the median of five from which it replaces a reading
 FALSE_READING: Final = 8.0
-"""Standard deviations from the median of five from which it replaces a reading."""
-
-CERTAIN_GROWTH: Final = 4.0
-"""Standard errors of ``tau^2`` from which it is reported."""
-
+CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` from which it is reported
+# ``(tau v)^2`` at the quickest over ``still^2`` from which it is reported
 LEAST_GROWTH: Final = 0.1
-"""``(tau v)^2`` at the quickest over ``still^2`` from which it is reported."""
-
-DITHERED: Final = 0.55
-"""Noise over count below which slow readings do not show the noise."""
-
-FEWEST_RESIDUALS: Final = 200
-"""Residuals from which two numbers are fitted."""
-
+DITHERED: Final = 0.55  # Noise over count below which slow readings do not show the noise
+FEWEST_RESIDUALS: Final = 200  # Residuals from which two numbers are fitted
 ROUNDS: Final = 30
-
-BEND_REACH: Final = 0.5
-"""Radians of phase to either side from which a second derivative is taken."""
+BEND_REACH: Final = 0.5  # Radians of phase to either side from which a second derivative is taken
 
 
 @dataclasses.dataclass(frozen=True)

@@ -28,56 +28,29 @@ from pendmap.signal.local_polynomial import LocalFit, local_fit
 from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.experiment import Run
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
 
-    Floats = NDArray[np.float64]
 
-
+# Radians of phase between samples from which quartics leave some motion
 SLOW_SAMPLING: Final = 0.06
-"""Radians of phase between samples from which quartics leave some motion."""
-
-WAY_PHASE: Final = 0.25
-"""Radians of phase over which a way is measured, if longer than an interval."""
-
-DITHERED: Final = 0.55
-"""Noise over count above which neighbouring readings err independently."""
-
-CLEAR_WAY: Final = 4
-"""Counts of way from which a speed is taken."""
-
+WAY_PHASE: Final = 0.25  # Radians of phase over which a way is measured, if longer than an interval
+DITHERED: Final = 0.55  # Noise over count above which neighbouring readings err independently
+CLEAR_WAY: Final = 4  # Counts of way from which a speed is taken
+# Radians of phase between samples from which all polynomials leave some motion
 TOO_FEW: Final = 0.3
-"""Radians of phase between samples from which all polynomials leave some motion."""
-
-SPEED_RANGES: Final = 4
-"""Ranges of speed with equally many samples."""
-
-OUTLIER: Final = 8.0
-"""Standard deviations from which a residual is an outlier."""
-
-FEWEST_RESIDUALS: Final = 40
-"""Residuals from which a standard deviation is taken."""
-
-OUTLIER_RANGES: Final = 16
-"""Ranges of speed, with equally many samples, with outliers of their own."""
-
-CLEARLY_LESS: Final = 1.02
-"""Ratio of two noise readings from which one is less."""
-
+SPEED_RANGES: Final = 4  # Ranges of speed with equally many samples
+OUTLIER: Final = 8.0  # Standard deviations from which a residual is an outlier
+FEWEST_RESIDUALS: Final = 40  # Residuals from which a standard deviation is taken
+OUTLIER_RANGES: Final = 16  # Ranges of speed, with equally many samples, with outliers of their own
+CLEARLY_LESS: Final = 1.02  # Ratio of two noise readings from which one is less
+# Degree and samples of the polynomials in the order in which they are tried
 DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
-"""Degree and samples of the polynomials in the order in which they are tried."""
-
-FARTHEST: Final = 0.25
-"""Radians of phase between samples that coarse counts move apart, at most."""
-
-MORE_STRIDES: Final = 4
-"""Strides beyond the shortest that are read too."""
-
-STIFF_STRIDE: Final = 2.0
-"""Factor by which samples of the highest degree may be farther apart."""
+FARTHEST: Final = 0.25  # Radians of phase between samples that coarse counts move apart, at most
+MORE_STRIDES: Final = 4  # Strides beyond the shortest that are read too
+STIFF_STRIDE: Final = 2.0  # Factor by which samples of the highest degree may be farther apart
 
 
 @dataclasses.dataclass(frozen=True)
@@ -168,7 +141,7 @@ def noise_of(
     time: Floats,
     theta: Floats,
     *,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: Mask | None = None,
     count: float = 0.0,
 ) -> NoiseFloor:
     """Return the noise of readings, shape (N,), of any smooth motion.
@@ -183,7 +156,7 @@ def noise_of(
     return found or NoiseFloor(math.nan, math.nan)
 
 
-def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) -> NoiseFloor | None:
+def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor | None:
     """Return the noise from the windows without bad samples; None if there are too few."""
     if time.size < FEWEST_RESIDUALS:
         return None
@@ -288,13 +261,13 @@ def check(work: Work) -> None:
         work.say("noise-grows-with-speed", f"{floor.law} ({part})")
 
 
-def clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:
+def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
     """Leave out windows with bad samples, then those with outliers."""
     fit = only(fit, ~_near(bad, fit.neighbours)[fit.middle])
     return only(fit, ~_outlying(fit, speed)[fit.middle])
 
 
-def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
+def _outlying(fit: LocalFit, speed: Floats) -> Mask:
     """Return which samples share a window with an outlier among similar speeds."""
     false = np.zeros(speed.size, bool)
     sizes = np.abs(fit.residual)
@@ -309,12 +282,12 @@ def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
     return _near(false, fit.neighbours)
 
 
-def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+def _near(marked: Mask, reach: int) -> Mask:
     """Return which places are within ``reach`` of a marked one."""
     sums = np.concatenate([[0], np.cumsum(marked)])
     place = np.arange(marked.size)
     low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
-    near: NDArray[np.bool_] = sums[high] > sums[low]
+    near: Mask = sums[high] > sums[low]
     return near
 
 
@@ -324,7 +297,7 @@ def less(fit: LocalFit, other: LocalFit) -> bool:
     return fit.middle.size >= FEWEST_RESIDUALS and rms(other) > enough * rms(fit)
 
 
-def only(fit: LocalFit, which: NDArray[np.bool_]) -> LocalFit:
+def only(fit: LocalFit, which: Mask) -> LocalFit:
     """Return a fit with some of its residuals."""
     return dataclasses.replace(
         fit, middle=fit.middle[which], residual=fit.residual[which], slope=fit.slope[which]
@@ -341,9 +314,7 @@ def stderr(fit: LocalFit) -> float:
     return rms(fit) * math.sqrt(fit.sum_of_squares / (2 * fit.middle.size))
 
 
-def followed(
-    time: Floats, theta: Floats, bad: NDArray[np.bool_], speed: Floats, first: LocalFit
-) -> LocalFit:
+def followed(time: Floats, theta: Floats, bad: Mask, speed: Floats, first: LocalFit) -> LocalFit:
     """Return the fit of the lowest degree above which no degree leaves less."""
     chosen = first
     for degree, points in DEGREES[1:]:
@@ -359,7 +330,7 @@ def followed(
 def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     time: Floats,
     theta: Floats,
-    bad: NDArray[np.bool_],
+    bad: Mask,
     speed: Floats,
     count: float,
     interval: float,

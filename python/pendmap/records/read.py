@@ -35,12 +35,10 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
 
 
+# Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
-"""Suffixes of the files that are records in a folder without a description."""
-
 LEAST_RATE: Final = 1e-3
-MOST_RATE: Final = 1e9
-"""Range of a sampling rate, Hz."""
+MOST_RATE: Final = 1e9  # Range of a sampling rate, Hz
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:

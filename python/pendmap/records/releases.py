@@ -9,68 +9,39 @@ import numpy as np
 
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import even_times, normal_scale, stretches
+from pendmap.signal.robust import between, even_times, normal_scale, stretches
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
-
-    Places = tuple[int, int]
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask, Stretch
 
 
-RELEASE_RISE: Final = 0.1
-"""Growth of a swing over the largest that only a hand causes."""
-
-HELD_LONGER: Final = 1.5
-"""Delay over that of a release from rest from which a hold is seen."""
-
+RELEASE_RISE: Final = 0.1  # Growth of a swing over the largest that only a hand causes
+HELD_LONGER: Final = 1.5  # Delay over that of a release from rest from which a hold is seen
+# Sine of an angle below which a pendulum leaves too slowly to show a hold
 NEAR_UPRIGHT: Final = 0.05
-"""Sine of an angle below which a pendulum leaves too slowly to show a hold."""
-
+# Periods before a motion between which a hold is searched
 HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))
-"""Periods before a motion between which a hold is searched."""
-
-FEWEST_HELD: Final = 10
-"""Samples of a hold from which quiet is judged."""
-
-FEWEST_HALF_CYCLES: Final = 5
-"""Half cycles from which a release is a run: three swings from a hand."""
-
-HAND_SHARE: Final = 0.3
-"""Torque over the greatest restoring torque nearby that only a hand adds."""
-
-DERIVATIVE_SPAN: Final = 0.2
-"""Periods over which a second derivative is taken."""
-
-CERTAIN_HAND: Final = 6.0
-"""Standard deviations of the second derivative from which it is no noise."""
-
-USUAL_REMAINDER: Final = 4.0
-"""Median remainders from which a hand acts."""
-
-FEWEST_A_PERIOD: Final = 20.0
-"""Samples a period from which a second derivative is taken."""
-
-FREE_SHARE: Final = 0.6
-"""Share of the samples that least trimmed squares keep."""
-
-CONCENTRATIONS: Final = 12
-"""Concentration steps; half as many are enough."""
-
-SHORTEST_HOLD: Final = 0.5
-"""Periods that a hand holds at least."""
+FEWEST_HELD: Final = 10  # Samples of a hold from which quiet is judged
+FEWEST_HALF_CYCLES: Final = 5  # Half cycles from which a release is a run: three swings from a hand
+HAND_SHARE: Final = 0.3  # Torque over the greatest restoring torque nearby that only a hand adds
+DERIVATIVE_SPAN: Final = 0.2  # Periods over which a second derivative is taken
+CERTAIN_HAND: Final = 6.0  # Standard deviations of the second derivative from which it is no noise
+USUAL_REMAINDER: Final = 4.0  # Median remainders from which a hand acts
+FEWEST_A_PERIOD: Final = 20.0  # Samples a period from which a second derivative is taken
+FREE_SHARE: Final = 0.6  # Share of the samples that least trimmed squares keep
+CONCENTRATIONS: Final = 12  # Concentration steps; half as many are enough
+SHORTEST_HOLD: Final = 0.5  # Periods that a hand holds at least
 
 
 def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motion)
     work: Work,
-    parts: list[Places],
+    parts: list[Stretch],
     middle: float,
     limit: float,
     period: float,
     noise: float,
-) -> list[Places]:
+) -> list[Stretch]:
     """Return the stretches of motions that nobody touches, in order.
 
     ``parts`` are the motions, ``middle`` (rad) is the middle of the swing, ``limit`` (rad) the span
@@ -87,8 +58,8 @@ def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motio
 
 def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
     work: Work,
-    part: Places,
-    hand: NDArray[np.bool_],
+    part: Stretch,
+    hand: Mask,
     middle: float,
     period: float,
     noise: float,
@@ -130,7 +101,7 @@ def _seen(work: Work, noise: float) -> float:
     return max(6 * noise, 1.5 * work.count, 1e-4)
 
 
-def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
+def _left(work: Work, part: Stretch, level: float, noise: float) -> int | None:
     """Return where three readings in a row begin to be off a level, on one side."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     off = work.theta[good] - level
@@ -140,7 +111,7 @@ def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
     return int(good[runs[0]]) if runs.size else None
 
 
-def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
+def enough(work: Work, part: Stretch, middle: float, limit: float) -> bool:
     """Return whether a release has enough half cycles for a run."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     if not good.size:
@@ -153,7 +124,7 @@ def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
     )
 
 
-def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]:
+def grown(work: Work, part: Stretch, middle: float, limit: float) -> list[Stretch]:
     """Divide a motion where the swing grows: a hand took the pendulum and released it again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
@@ -167,7 +138,7 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
     rise = max(RELEASE_RISE * float(size.max()), 2 * limit)
-    cuts: list[Places] = []
+    cuts: list[Stretch] = []
     least, at = pairs[0], 0
     k = 1
     while k < pairs.size:
@@ -177,18 +148,15 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
             top = k
             while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
                 top += 1
-            peak = top + int(size[top + 1] > size[top]) if top + 1 < size.size else top
-            stop = int(np.searchsorted(work.time, half.peak_time[min(at + 1, size.size - 1)]))
-            go = int(np.searchsorted(work.time, half.peak_time[peak]))
-            cuts.append((stop, go))
+            ends = (min(at + 1, size.size - 1), top + int(np.argmax(size[top : top + 2])))
+            stop, go = np.searchsorted(work.time, half.peak_time[list(ends)])
+            cuts.append((int(stop), int(go)))
             least, at, k = pairs[top], top, top
         k += 1
-    edges = [low, *(place for cut in cuts for place in cut), high]
-    pieces = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pieces if b - a > 5]
+    return [(a, b) for a, b in between(cuts, low, high) if b - a > 5]
 
 
-def held_short(work: Work, part: Places, middle: float, period: float, noise: float) -> int | None:
+def held_short(work: Work, part: Stretch, middle: float, period: float, noise: float) -> int | None:
     """Return where a motion left a level at which it was held for less than a period.
 
     Returns None where it leaves as soon as a release from rest does.
@@ -214,7 +182,7 @@ def held_short(work: Work, part: Places, middle: float, period: float, noise: fl
     return left
 
 
-def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]:
+def touched(work: Work, period: float, parts: list[Stretch]) -> Mask:
     """Return which samples of a free record a hand moves, shape (N,).
 
     The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there; the
@@ -283,11 +251,9 @@ def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
     return answer
 
 
-def without_hand(
-    time: NDArray[np.float64], parts: list[Places], hand: NDArray[np.bool_], period: float
-) -> list[Places]:
+def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) -> list[Stretch]:
     """Return the stretches of motions in which no hand holds the pendulum."""
-    touches: list[Places] = []
+    touches: list[Stretch] = []
     for a, b in stretches(hand):
         # A trembling hand lets go for a moment.
         if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:

@@ -19,48 +19,25 @@ from pendmap.formatting import counted
 from pendmap.records.scale import gain_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-NYQUIST: Final = 2.0
-"""Readings in a period of the drive that resolve it at least."""
-
-GAIN_KNOWN: Final = 0.1
-"""Half of the 95 % interval of the gain from which it is reported."""
-
-LEAST_USED: Final = 0.1
-"""Share of the readings in motion that a fit uses without a warning."""
-
-RESTING: Final = ("held", "rest")
-"""Segments without motion."""
-
+NYQUIST: Final = 2.0  # Readings in a period of the drive that resolve it at least
+GAIN_KNOWN: Final = 0.1  # Half of the 95 % interval of the gain from which it is reported
+LEAST_USED: Final = 0.1  # Share of the readings in motion that a fit uses without a warning
+RESTING: Final = ("held", "rest")  # Segments without motion
+# Root mean square distance from multiples of a step that shows it; 0.29 is chance
 ON_STEPS: Final = 0.12
-"""Root mean square distance from multiples of a step that shows it; 0.29 is chance."""
-
+# Standard deviations of noise before the rounding, in counts
 SPREADS: Final = np.geomspace(0.02, 1.0, 80)
-"""Standard deviations of noise before the rounding, in counts."""
-
+# Places of the angle between the edges of its count, in counts
 PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5
-"""Places of the angle between the edges of its count, in counts."""
-
-MOST_COUNTS: Final = 9
-"""Counts that readings at rest show at most."""
-
-REST_PARTS: Final = 4
-"""Parts of a record at rest whose means agree."""
-
-REST_DRIFT: Final = 4.0
-"""Standard errors by which such means may differ."""
-
-EDGE_SHARE: Final = 0.95
-"""Share of the lines that are one count from the line before, at edges."""
-
-FEWEST_EDGES: Final = 50
-"""Readings from which edges are recognised."""
+MOST_COUNTS: Final = 9  # Counts that readings at rest show at most
+REST_PARTS: Final = 4  # Parts of a record at rest whose means agree
+REST_DRIFT: Final = 4.0  # Standard errors by which such means may differ
+EDGE_SHARE: Final = 0.95  # Share of the lines that are one count from the line before, at edges
+FEWEST_EDGES: Final = 50  # Readings from which edges are recognised
 
 
 def check(work: Work) -> None:
@@ -156,7 +133,7 @@ def levels_shared(theta: Floats, step: float) -> float:
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
 
 
-def still_noise(theta: NDArray[np.float64], count: float) -> tuple[float, float] | None:
+def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
     """Return the noise of readings at rest, rounding included, and its standard error, rad.
 
     These are mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None where one

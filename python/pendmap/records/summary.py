@@ -18,14 +18,11 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
+# Findings of a wrong unit or scale; unless corrected, results are wrong
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
-"""Findings of a wrong unit or scale; unless corrected, results are wrong."""
-
+# Findings that are reported before any number
 DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
-"""Findings that are reported before any number."""
-
-SCALE_FINDING: Final = "angle-scale"
-"""The one of these that an effect can cause, too."""
+SCALE_FINDING: Final = "angle-scale"  # The one of these that an effect can cause, too
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:

@@ -13,54 +13,31 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.signal.half_cycles import swings
-from pendmap.signal.robust import stretches
+from pendmap.signal.robust import between, stretches
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from pendmap.signal import Floats, Mask, Stretch
 
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
-
-LEAST_SWING: Final = 5.0
-"""Standard errors below which a reading is no swing."""
-
-STILL_SPAN: Final = 8.0
-"""Standard deviations of noise within which a whole period shows no motion."""
-
-STILL_SCATTER: Final = 1.5
-"""Noise by which half a period may scatter without motion."""
-
+LEAST_SWING: Final = 5.0  # Standard errors below which a reading is no swing
+STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
+STILL_SCATTER: Final = 1.5  # Noise by which half a period may scatter without motion
+# Scatter of a whole period over its distance from the middle in a trembling hold
 STEADY_HOLD: Final = 0.1
-"""Scatter of a whole period over its distance from the middle in a trembling hold."""
-
-FEWEST_QUIET: Final = 10
-"""Samples of half a period from which quiet is judged."""
-
-FEWEST_HALF_SWINGS: Final = 3
-"""Half swings that are more than a hand on its way."""
-
-UNEVEN: Final = 0.15
-"""Relative difference in time of half swings of one side, at most."""
-
-GROWTH: Final = 1.1
-"""Half swing over the one of the same side before, at most."""
-
-DECAY: Final = 0.6
-"""Half swing over the one of the same side before, at least."""
-
-RELEASE_STEP: Final = 2.5
-"""Fastest changes of a free swing from which a step is a release."""
-
-DECAYED: Final = 0.05
-"""Swing over the largest below which a motion has decayed."""
+FEWEST_QUIET: Final = 10  # Samples of half a period from which quiet is judged
+FEWEST_HALF_SWINGS: Final = 3  # Half swings that are more than a hand on its way
+UNEVEN: Final = 0.15  # Relative difference in time of half swings of one side, at most
+GROWTH: Final = 1.1  # Half swing over the one of the same side before, at most
+DECAY: Final = 0.6  # Half swing over the one of the same side before, at least
+RELEASE_STEP: Final = 2.5  # Fastest changes of a free swing from which a step is a release
+DECAYED: Final = 0.05  # Swing over the largest below which a motion has decayed
 
 
 @dataclasses.dataclass(frozen=True)
 class Swinging:
     """Stretches of a record, as first place and the one after the last."""
 
-    free: list[Places]  # free swings, in order
-    held: list[Places]  # quiet stretches before a release
+    free: list[Stretch]  # free swings, in order
+    held: list[Stretch]  # quiet stretches before a release
 
 
 def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
@@ -76,9 +53,8 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
         return Swinging(whole, [])
     period = float(np.median(crossing[2:] - crossing[:-2]))
     quiet = _quiet(time, reading, period, noise)
-    edges = [0, *(place for stretch in quiet for place in stretch), time.size]
     largest, free, held = 0.0, [], []
-    for edge, high in zip(edges[::2], edges[1::2], strict=True):
+    for edge, high in between(quiet, 0, time.size):
         low = edge
         if high - low <= 5:
             continue
@@ -112,7 +88,7 @@ def middle_over(time: Floats, reading: Floats, least: float) -> float:
     return middle
 
 
-def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Places]:
+def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Stretch]:
     """Return stretches in which nothing changes, in order."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
@@ -141,7 +117,7 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[P
     return found
 
 
-def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+def _all_of(middles: Mask, width: int) -> Mask:
     """Return which samples are in windows of ``width`` about places within the record."""
     from scipy.ndimage import binary_dilation
 

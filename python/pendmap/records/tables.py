@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
-    from numpy.typing import NDArray
 
     from pendmap.records.description import Reader
+    from pendmap.signal import Floats
 
 
-LARGEST_READING: Final = 1e18
-"""Largest number of a reading; nanoseconds since 1970 are 2e18."""
-
+LARGEST_READING: Final = 1e18  # Largest number of a reading; nanoseconds since 1970 are 2e18
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -35,9 +33,8 @@ _KNOWN: Final = {
     b"%PDF": "must be CSV or Parquet, it is a PDF file",
     b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
 }
-
+# Reader of a workbook (.xlsx, .xls) by its first bytes
 ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
-"""Reader of a workbook (.xlsx, .xls) by its first bytes."""
 
 
 def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
@@ -78,7 +75,7 @@ def _parquet(data: bytes, where: str) -> Table:
     return Table(names, values, order + 1, order=order)
 
 
-def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
+def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
     """Unpack the columns of a Parquet file within the bounds that it declares."""
     import pandas as pd
     import pyarrow as pa

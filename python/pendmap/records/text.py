@@ -17,51 +17,33 @@ from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.description import Reader
+    from pendmap.signal import Floats, Indices
 
 
-MOST_COLUMNS: Final = 1000
-"""Columns of a table at most."""
-
-MOST_BYTES: Final = 2**30
-"""Largest file, and bytes of its numbers, at most."""
-
-LONGEST_LINE: Final = 40 * MOST_COLUMNS
-"""Characters of the longest line that may be a row."""
-
-SAMPLE_LINES: Final = 400
-"""Lines, from all over a file, from which separators are found."""
-
-LEAST_ROWS: Final = 0.5
-"""Share of the lines that are rows of numbers at least."""
-
-MOST_CONTROLS: Final = 0.02
-"""Share of control characters above which a file is no text."""
-
-MOST_NULS: Final = 0.2
-"""Share of NUL bytes above which a file is no text."""
-
+MOST_COLUMNS: Final = 1000  # Columns of a table at most
+MOST_BYTES: Final = 2**30  # Largest file, and bytes of its numbers, at most
+LONGEST_LINE: Final = 40 * MOST_COLUMNS  # Characters of the longest line that may be a row
+SAMPLE_LINES: Final = 400  # Lines, from all over a file, from which separators are found
+LEAST_ROWS: Final = 0.5  # Share of the lines that are rows of numbers at least
+MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
+MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
+# Separators with decimal signs, in the order of preference
 SEPARATORS: Final = (
     *((";", ","), ("\t", ","), ("\t", "."), (";", "."), (",", ".")),
     *(("|", "."), (" ", "."), (" ", ","), (",", ",")),
 )
-"""Separators with decimal signs, in the order of preference."""
-
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _NOTHING: Final = frozenset(
     ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity")
 )
+# Words that loggers write for the levels of a trigger
 _LEVELS: Final = {
     **dict.fromkeys(("true", "high", "on"), "1"),
     **dict.fromkeys(("false", "low", "off"), "0"),
 }
-"""Words that loggers write for the levels of a trigger."""
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
-
-_HEADS: Final = 30
-"""Lines above the numbers of a short file at most."""
+_HEADS: Final = 30  # Lines above the numbers of a short file at most
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,12 +51,12 @@ class Table:
     """Columns of numbers, and their rows in the file."""
 
     names: tuple[str, ...]  # headings; empty texts without a header
-    values: NDArray[np.float64]  # shape (rows, columns); NaN where there is no number
-    rows: NDArray[np.intp]  # lines of the file, from 1 (of a Parquet file: rows of the table)
+    values: Floats  # shape (rows, columns); NaN where there is no number
+    rows: Indices  # lines of the file, from 1 (of a Parquet file: rows of the table)
     findings: tuple[Finding, ...] = ()
     headed: bool = True
-    # Places among the lines that are not empty: unreadable lines leave a place out.
-    order: NDArray[np.intp] = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
+    # Stretch among the lines that are not empty: unreadable lines leave a place out.
+    order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
 def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
@@ -168,7 +150,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     return Table(names, values, np.asarray(rows), tuple(findings), headed, order)
 
 
-def _numbers(column: object, decimal: str) -> NDArray[np.float64]:
+def _numbers(column: object, decimal: str) -> Floats:
     """Return the numbers of a column; NaN for anything else."""
     import pandas as pd
 

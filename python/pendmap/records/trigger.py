@@ -11,33 +11,18 @@ import numpy as np
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices, Stretch
 
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
-
-BETWEEN_LEVELS: Final = 0.02
-"""Share of the samples between two levels at most."""
-
+BETWEEN_LEVELS: Final = 0.02  # Share of the samples between two levels at most
+# Distance from the threshold over that of the levels within which noise is no edge
 DEAD_BAND: Final = 0.2
-"""Distance from the threshold over that of the levels within which noise is no edge."""
-
-RELEASES_APART: Final = 3.0
-"""Periods of small swings between releases at least."""
-
-BOUNCE: Final = 0.3
-"""Drive periods within which a second edge is a bounce."""
-
-FEWEST_EDGES: Final = 4
-"""Edges from which the frequency of a drive is taken."""
-
+RELEASES_APART: Final = 3.0  # Periods of small swings between releases at least
+BOUNCE: Final = 0.3  # Drive periods within which a second edge is a bounce
+FEWEST_EDGES: Final = 4  # Edges from which the frequency of a drive is taken
+# Periods by which edges of a drive miss its beat, rms, besides the sampling
 UNEVEN_EDGES: Final = 0.1
-"""Periods by which edges of a drive miss its beat, rms, besides the sampling."""
-
-DIFFERENT: Final = 3.0
-"""Standard errors from which a given frequency or phase is another."""
+DIFFERENT: Final = 3.0  # Standard errors from which a given frequency or phase is another
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +36,7 @@ class Beat:
     left_out: int  # bounces
 
 
-def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp], str] | None:
+def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str] | None:
     """Return the places of the first samples after each edge, and which edge it is.
 
     The threshold is between the means of the two levels; missing values keep the level. By default
@@ -81,7 +66,7 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp],
     return (rising if edge == "rising" else falling), edge
 
 
-def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]:
+def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
     """Return the edges that do not follow a counted one within ``dead``, s."""
     kept: list[int] = []
     for k in places.tolist():
@@ -90,7 +75,7 @@ def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]
     return kept
 
 
-def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
+def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
     """Return the motion after each edge of the trigger; ``parts`` where it shows no release."""
     if "trigger" not in work.extra or not parts:
         return parts
@@ -127,12 +112,12 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
     return motions
 
 
-def _none(found: tuple[NDArray[np.intp], str] | None) -> str:
+def _none(found: tuple[Indices, str] | None) -> str:
     """Return why there is no edge."""
     return "has no two levels" if found is None else f"has no {found[1]} edge"
 
 
-def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) -> Beat | None:
+def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat | None:
     """Return the frequency with which edges recur; None where they do not.
 
     Each edge is between two samples, so that the edges bound the period by ``(t_j - t_i +- (d_i +

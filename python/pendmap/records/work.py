@@ -19,14 +19,10 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import RunPlan
     from pendmap.records.rod_sensors import Accelerometer
+    from pendmap.signal import Floats, Indices, Mask
 
-    Floats = NDArray[np.float64]
-
-FEWEST_SAMPLES = 5
-"""Samples that a record must have."""
-
-_FEWEST_PEAKS = 3
-"""Turning points that a record of turning points must have."""
+FEWEST_SAMPLES = 5  # Samples that a record must have
+_FEWEST_PEAKS = 3  # Turning points that a record of turning points must have
 
 
 @dataclasses.dataclass
@@ -39,9 +35,9 @@ class Work:
     declared: frozenset[str]  # channels with a unit or scale in [columns]
     time: Floats
     theta: Floats
-    rows: NDArray[np.intp]  # lines of the file
+    rows: Indices  # lines of the file
     extra: dict[str, Floats]  # further channels; the pivot's as pivot:vertical, pivot:horizontal
-    trusted: NDArray[np.bool_]
+    trusted: Mask
     findings: list[Finding]
     columns: Mapping[str, str]  # the heading of each channel
     unused: tuple[str, ...]  # headings of the columns that no channel is read from
@@ -70,7 +66,7 @@ class Work:
         text: str,
         *,
         mended: bool = False,
-        at: NDArray[np.intp] | None = None,
+        at: Indices | None = None,
         span: tuple[float, float] | None = None,
     ) -> None:
         """Add a finding, at samples or over a span of time in s."""
@@ -89,6 +85,19 @@ class Work:
         self.time, self.theta = self.time[which], self.theta[which]
         self.rows, self.trusted = self.rows[which], self.trusted[which]
         self.extra = {name: values[which] for name, values in self.extra.items()}
+
+    def leave_out(self, which: Mask, what: str, noun: str, why: str) -> None:
+        """Leave out samples, if any, and report how many and why."""
+        at = np.flatnonzero(which)
+        if at.size:
+            self.say(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
+            self.keep(~which)
+
+    def distrust(self, at: Indices, what: str, text: str) -> None:
+        """Take samples, if any, out of fits, and report them."""
+        if at.size:
+            self.trusted[at] = False
+            self.say(what, text, at=at)
 
     def apart(self) -> tuple[list[Work], list[Finding]]:
         """Return a work for each release, and the findings that belong to none of them.

@@ -14,40 +14,24 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices, Mask
 
 
-POINTS: Final = 9
-"""Samples of a window."""
-
-_EVEN: Final = 1e-3
-"""Relative error of an even interval."""
-
-_BLOCK: Final = 20_000
-"""Uneven windows that are solved at a time."""
-
-_NORMAL_MAD: Final = 0.674489750196
-"""Median of the absolute value of a standard normal variable."""
-
-_OUTLIER: Final = 4.5
-"""Standard deviations from which a residual is left out."""
-
-_ROUNDS: Final = 4
-"""Repetitions of a fit without outliers at most."""
-
+POINTS: Final = 9  # Samples of a window
+_EVEN: Final = 1e-3  # Relative error of an even interval
+_BLOCK: Final = 20_000  # Uneven windows that are solved at a time
+_NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
+_OUTLIER: Final = 4.5  # Standard deviations from which a residual is left out
+_ROUNDS: Final = 4  # Repetitions of a fit without outliers at most
 _EVEN_WINDOW: Final = 1e-3
-
-_WINDOW_BLOCK: Final = 4096
-"""Windows of uneven samples that are solved at a time."""
+_WINDOW_BLOCK: Final = 4096  # Windows of uneven samples that are solved at a time
 
 
 @dataclasses.dataclass(frozen=True)
 class LocalFit:
     """Residuals and slopes of polynomials through neighbouring samples."""
 
-    middle: NDArray[np.intp]  # samples of the residuals, shape (M,)
+    middle: Indices  # samples of the residuals, shape (M,)
     residual: Floats  # reading less polynomial over the noise gain, shape (M,)
     slope: Floats  # in the middle, shape (M,)
     neighbours: int  # samples to each side of a window
@@ -268,7 +252,7 @@ def smoothed_velocity(
     return slope, stderr
 
 
-def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
+def _evenly(time: Floats, step: float, reach: int) -> Mask:
     """Return around which samples a window of ``reach`` to each side is evenly spaced."""
     even = np.zeros(time.size, bool)
     # All intervals of a window together may be off by as much as one.
@@ -281,7 +265,7 @@ def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
 
 
 def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
-    time: Floats, theta: Floats, at: NDArray[np.intp], width: int, scale: float, degree: int
+    time: Floats, theta: Floats, at: Indices, width: int, scale: float, degree: int
 ) -> tuple[Floats, Floats]:
     """Return slopes and their errors at some samples, each from a window of its own spacing."""
     # The first and the last whole window serve the ends.
