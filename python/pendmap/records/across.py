@@ -39,29 +39,20 @@ MOST_THINNED: Final = 10  # Readings of which a copy keeps one, at most, to be f
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs in which each reading counts once, and the findings across runs."""
-    made = once_each(runs)
-    found = _unlike(made)
+    made, found = once_each(runs), list[Finding]()
+    swings = {
+        run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
+        for run in made
+        if run.kind == "free" and not run.peaks_only and run.moves
+    }
+    known = sorted((period, name) for name, period in swings.items() if math.isfinite(period))
+    if known and known[-1][0] > (1 + ONE_RIG) * known[0][0]:
+        short, long = (f"{period:.4g} s in {name}" for period, name in (known[0], known[-1]))
+        text = f"small swings take {short} and {long}: these are not runs of one pendulum"
+        found.append(Finding("rigs-differ", text))
     if runs and all(run.hold_out for run in runs):
         found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
     return tuple(made), tuple(found)
-
-
-def _unlike(runs: Sequence[Run]) -> list[Finding]:
-    """Return a finding if the periods of small swings differ between runs."""
-    swings = {
-        run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
-        for run in runs
-        if run.kind == "free" and not run.peaks_only and run.moves
-    }
-    known = {name: period for name, period in swings.items() if math.isfinite(period)}
-    if len(known) < 2 or max(known.values()) <= (1 + ONE_RIG) * min(known.values()):
-        return []
-    short, long = min(known, key=lambda n: known[n]), max(known, key=lambda n: known[n])
-    text = (
-        f"small swings take {known[short]:.4g} s in {short} and {known[long]:.4g} s in {long}: "
-        "these are not runs of one pendulum"
-    )
-    return [Finding("rigs-differ", text)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,9 +111,7 @@ def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
     """Return the first copied reading of ``other`` and their number; None without a copy."""
     size = min(one.theta.size, other.theta.size)
     least = max(FEWEST_SHARED, round(LEAST_SHARE * size))
-    if size < least:
-        return None
-    for mine, its in _ticks(one, other):
+    for mine, its in _ticks(one, other) if size >= least else ():
         lags = _lags(_spread(one.theta, mine), _spread(other.theta, its), least)
         for lag in lags | ({0} if one.theta.size == other.theta.size else set()):
             _, a, b = np.intersect1d(mine, its + lag, assume_unique=True, return_indices=True)
@@ -136,15 +125,12 @@ def _ticks(one: _Motion, other: _Motion) -> list[tuple[NDArray[np.int64], NDArra
     in_a_row = np.arange(one.theta.size), np.arange(other.theta.size)
     ratio = other.interval / one.interval
     times = round(max(ratio, 1 / ratio))
-    whole = abs(max(ratio, 1 / ratio) / times - 1) < OFF_STEP
-    by_time = (
-        one.tick * (times if whole and ratio < 1 else 1),
-        other.tick * (times if whole and ratio > 1 else 1),
-    )
+    if abs(max(ratio, 1 / ratio) / times - 1) >= OFF_STEP:
+        times = 1
+    by_time = one.tick * (times if ratio < 1 else 1), other.tick * (times if ratio > 1 else 1)
     wide = any(t.size and t[-1] >= MOST_THINNED * t.size for t in by_time)
-    if wide or all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True)):
-        return [in_a_row]
-    return [in_a_row, by_time]
+    same = all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True))
+    return [in_a_row] if wide or same else [in_a_row, by_time]
 
 
 def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
@@ -206,17 +192,15 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
     trusted[first : first + count] = False
     if int(trusted.sum()) < max(FEWEST_SHARED, LEAST_SHARE * before):
         trusted[:] = False
-    copied = before - int(trusted.sum())
     text = (
-        f"{run.name} is a copy of {other.name}: {copied} of its {counted(before, 'reading')} are "
-        "readings of that run, and count once"
+        f"{run.name} is a copy of {other.name}: {before - int(trusted.sum())} of its"
+        f" {counted(before, 'reading')} are readings of that run, and count once"
     )
-    if run.hold_out and not trusted.any():
-        text += ": held out, it would test nothing"
-    low, high = float(run.time[first]), float(run.time[first + count - 1])
-    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
     segments = run.segments
     if not trusted.any():
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
+        text += ": held out, it would test nothing" if run.hold_out else ""
+    low, high = float(run.time[first]), float(run.time[first + count - 1])
+    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
     findings = (*run.findings, found)
     return dataclasses.replace(run, trusted=trusted, segments=segments, findings=findings)

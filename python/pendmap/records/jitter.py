@@ -17,6 +17,7 @@ from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
     from pendmap.signal import Floats
+    from pendmap.signal.local_polynomial import LocalFit
 
 
 SPEED_REACH: Final = 0.7  # Radians of phase to either side from which a speed is taken
@@ -105,24 +106,18 @@ def _lag(time: Floats, seconds: float) -> int:
     return max(int(seconds / float(np.median(np.diff(time)))), 1)
 
 
-def law_of(  # noqa: PLR0913 (residuals, and what is known of them)
-    residual: Floats,
-    square: Floats,
-    *,
-    worth: float,
-    fastest: float,
-    count: float = 0.0,
-    interval: float = 0.0,
+def law_of(
+    fit: LocalFit, square: Floats, *, fastest: float, count: float = 0.0, interval: float = 0.0
 ) -> SpeedLaw | None:
-    """Return how noise grows with speed; None where that does not show.
+    """Return how the noise of a fit grows with speed; None where that does not show.
 
-    ``square`` holds squared speeds, (rad/s)^2; ``worth`` residuals count as one independent one.
+    ``square`` holds the squared speed of each residual, (rad/s)^2.
     """
-    found = _adapted(residual, square, worth, count)
+    found = _adapted(fit.residual, square, fit.sum_of_squares, count)
     if found is not None and count and found[0] < DITHERED * count:
         # Slow readings that share a count have one error, which residuals do not show.
         quick = square >= (count / interval) ** 2
-        found = _adapted(residual[quick], square[quick], worth, count)
+        found = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
     return None if found is None else SpeedLaw(*found, fastest)
 
 

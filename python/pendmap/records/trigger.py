@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -83,33 +84,35 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
     if found is None or not found[0].size:
         work.say("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
         return parts
-    kept = _debounced(work.time, found[0], period)
+    edges, edge = found
+    kept = _debounced(work.time, edges, period)
     apart = np.diff(work.time[kept])
     if apart.size and np.median(apart) < RELEASES_APART * period:
         text = (
-            f"the trigger's {counted(len(kept), f'{found[1]} edge')} recur after"
+            f"the trigger's {counted(len(kept), f'{edge} edge')} recur after"
             f" {np.median(apart):.3g} s, three swings and less: it marks no release"
         )
         work.say("trigger-unlike", text)
         return parts
     motions = []
-    for k, low in enumerate(kept):
-        high = kept[k + 1] if k + 1 < len(kept) else work.time.size
+    for low, high in itertools.pairwise([*kept, work.time.size]):
         after = [(max(a, low), min(b, high)) for a, b in parts if a < high and b > low]
-        if not after:
-            continue
-        a, b = max(after, key=lambda part: part[1] - part[0])
-        # The angle shows the release to a fraction of a swing, the trigger to a sample.
-        motions.append((low if work.time[a] - work.time[low] < period else a, b))
+        if after:
+            a, b = max(after, key=lambda part: part[1] - part[0])
+            # The angle shows the release to a fraction of a swing, the trigger to a sample.
+            motions.append((low if work.time[a] - work.time[low] < period else a, b))
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
         return parts
     times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")
-    bounced = found[0].size - len(kept)
-    bounces = f"; {counted(bounced, 'bounce')} left out" if bounced else ""
-    text = f"the trigger's {found[1]} edge marks {counted(len(kept), 'release')}, at {times} s"
-    work.say("trigger-release", text + bounces)
+    text = f"the trigger's {edge} edge marks {counted(len(kept), 'release')}, at {times} s"
+    work.say("trigger-release", text + _bounces(edges.size - len(kept)))
     return motions
+
+
+def _bounces(number: int) -> str:
+    """Return how many edges are left out as bounces."""
+    return f"; {counted(number, 'bounce')} left out" if number else ""
 
 
 def _none(found: tuple[Indices, str] | None) -> str:
@@ -127,16 +130,15 @@ def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat |
     """
     if places.size < FEWEST_EDGES:
         return None
-    apart = np.diff(time[places])
     # Without a known frequency: bounces are many and short, periods few and long.
-    period = 2 * math.pi / omega if omega else float(np.quantile(apart, 0.9))
+    period = 2 * math.pi / omega if omega else float(np.quantile(np.diff(time[places]), 0.9))
     kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
     if kept.size < FEWEST_EDGES:
         return None
     before, after = time[kept - 1], time[kept]
     middle = (before + after) / 2
-    period = float(np.median(np.diff(middle)))
-    number = np.concatenate([[0.0], np.cumsum(np.round(np.diff(middle) / period))])
+    apart = np.diff(middle)
+    number = np.concatenate([[0.0], np.cumsum(np.round(apart / float(np.median(apart))))])
     if np.any(np.diff(number) < 1):
         return None
     (period, start), covariance = np.polyfit(number, middle, 1, cov="unscaled")
@@ -146,58 +148,41 @@ def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat |
     if period <= 0 or spread > UNEVEN_EDGES * period + 2 * sampling:
         return None
     error = max(spread, sampling) * math.sqrt(float(covariance[0, 0]))
-    low, high = _allowed(before, after, number)
+    low, high = 0.0, math.inf
+    for k in range(1, kept.size):
+        steps = number[k:] - number[:-k]
+        low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
+        high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
     if low <= high:
         period, error = (low + high) / 2, (high - low) / math.sqrt(12)
     w = 2 * math.pi / period
     return Beat(w, w * error / period, middle, max(spread, sampling), places.size - kept.size)
 
 
-def _allowed(before: Floats, after: Floats, number: Floats) -> tuple[float, float]:
-    """Return the least and the greatest period that all edges allow, s."""
-    low, high = 0.0, math.inf
-    for k in range(1, number.size):
-        steps = number[k:] - number[:-k]
-        low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
-        high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
-    return low, high
-
-
 def check_drive(work: Work) -> None:
     """Report the frequency that the trigger of a forced run shows; take its phase if stated."""
     if work.plan.kind != "forced" or "trigger" not in work.extra:
         return
-    drive = work.plan.drive
-    given = drive["Omega"] if drive else None
     found = edges_of(work.extra["trigger"], work.edge)
-    if found is None or found[0].size < FEWEST_EDGES:
-        why = (
-            f"the trigger {_none(found)}"
-            if found is None or not found[0].size
-            else (f"the trigger has {counted(found[0].size, f'{found[1]} edge')}")
-        )
+    given = (work.plan.drive or {}).get("Omega")
+    beat = beat_of(work.time, found[0], given) if found else None
+    if found is None or beat is None:
+        why = f"the trigger {_none(found)}"
+        if found and found[0].size:
+            edges = counted(found[0].size, f"{found[1]} edge")
+            uneven = f"the trigger's {edges} do not recur evenly"
+            why = uneven if found[0].size >= FEWEST_EDGES else f"the trigger has {edges}"
         work.say("trigger-unlike", f"{why}: it shows no drive")
         return
-    beat = beat_of(work.time, found[0], given)
-    if beat is None:
-        text = (
-            f"the trigger's {found[0].size} {found[1]} edges do not recur evenly: it shows no drive"
-        )
-        work.say("trigger-unlike", text)
-        return
-    bounces = f"; {counted(beat.left_out, 'bounce')} left out" if beat.left_out else ""
     said = (
         f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
-        f" {counted(beat.time.size, f'{found[1]} edge')}{bounces}"
+        f" {counted(beat.time.size, f'{found[1]} edge')}{_bounces(beat.left_out)}"
     )
-    if drive is None or given is None:
-        work.say("trigger-drive", said)
-        return
-    if abs(beat.omega - given) > DIFFERENT * beat.stderr:
+    if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
         work.say("trigger-differs", f"{said}: the drive is given with {given:.7g}")
         return
     work.say("trigger-drive", said)
-    if work.phase is not None:
+    if given is not None and work.phase is not None:
         _phase(work, beat, given, work.phase)
 
 

@@ -38,6 +38,22 @@ class LocalFit:
     sum_of_squares: float  # M residuals are worth M over this many independent ones
     shares: Floats  # of the samples in the variance of a residual, shape (points,); sum 1
 
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, rad."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def stderr(self) -> float:
+        """Standard error of the root mean square of residuals that share samples, rad."""
+        return self.rms * math.sqrt(self.sum_of_squares / (2 * self.middle.size))
+
+    def only(self, which: Mask) -> LocalFit:
+        """Return the fit with some of its residuals."""
+        return dataclasses.replace(
+            self, middle=self.middle[which], residual=self.residual[which], slope=self.slope[which]
+        )
+
 
 def local_fit(
     time: Floats, theta: Floats, *, degree: int = 4, points: int = POINTS, stride: int = 1
