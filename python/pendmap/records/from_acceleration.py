@@ -69,7 +69,13 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     weak = signal < 4 * LEAST_SWING
     doubt = _refuse_blind(found, waves, where, weak=weak)
     _refuse_large(each, found, where)
-    _refuse_held(values, moves, found, where)
+    for low, high in moves.held:
+        level = abs(float(np.median(values[low:high])))
+        if found.gravity and level > LARGEST_READING * found.gravity:
+            raise InputError(
+                f"{where}: the acceleration is {level:.3g} {found.unit} while the pendulum is"
+                f" held, and gravity gives at most {found.gravity:.3g}: unit is wrong"
+            )
     if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
     work.theta, work.accelerometer = _unfolded(values, each, moves, found, noise), found
@@ -144,9 +150,10 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
     top = float(np.quantile([wave.top for waves in each for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > LARGEST_READING * most:
-        removed = "" if sensor.gravity else ", gravity removed"
-        place = f" at distance_m = {sensor.distance_m:g}{removed}"
-        place = "" if sensor.direction == "angular" else place
+        place = ""
+        if sensor.direction != "angular":
+            removed = "" if sensor.gravity else ", gravity removed"
+            place = f" at distance_m = {sensor.distance_m:g}{removed}"
         raise InputError(
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}{place}: unit, distance_m, direction or gravity_removed is wrong"
@@ -154,22 +161,10 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
     for waves in each:
         folds = [k for k, wave in enumerate(waves) if wave.dip > CERTAIN_DIP]
         before = waves[: folds[-1]] if folds else []
-        if not any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
-            continue
-        raise InputError(
-            f"{where}: the pendulum turns over the top, which an acceleration alone does not show:"
-            " it must have an angle or a velocity beside it, or a later from_s"
-        )
-
-
-def _refuse_held(values: Floats, moves: Swinging, sensor: Accelerometer, where: str) -> None:
-    """Refuse holds that read more than gravity."""
-    for low, high in moves.held:
-        level = abs(float(np.median(values[low:high])))
-        if sensor.gravity and level > LARGEST_READING * sensor.gravity:
+        if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
             raise InputError(
-                f"{where}: the acceleration is {level:.3g} {sensor.unit} while the pendulum is"
-                f" held, and gravity gives at most {sensor.gravity:.3g}: unit is wrong"
+                f"{where}: the pendulum turns over the top, which an acceleration alone does not"
+                " show: it must have an angle or a velocity beside it, or a later from_s"
             )
 
 
@@ -181,35 +176,27 @@ def _unfolded(
     noise: float,
 ) -> Floats:
     """Return the angle of each sample, rad."""
-    most = abs(sensor.gain)
-    theta = np.arcsin(np.clip(values / most, -1, 1)) * math.copysign(1.0, sensor.gain)
-    for (begin, _), waves in zip(moves.free, each, strict=True):
-        for wave in _from_start(values, begin, waves, most, noise):
+    most, sense = abs(sensor.gain), math.copysign(1.0, sensor.gain)
+    theta = np.arcsin(np.clip(values / most, -1, 1)) * sense
+    for (begin, _), whole in zip(moves.free, each, strict=True):
+        waves = list(whole)
+        if waves and waves[0].low > begin + 2:
+            # A swing released beyond a quarter turn begins in a dip.
+            start = wave_of(values, begin, waves[0].low, noise)
+            if not start.folded(most) and waves[0].folded(most):
+                start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=waves[0].dip)
+            waves.insert(0, start)
+        for wave in waves:
             if wave.folded(most):
                 low, high = wave.humps
                 inside = values[low : high + 1]
                 folded = np.arcsin(np.clip(np.abs(inside) / wave.top, 0, 1))
-                sign = np.sign(inside) * math.copysign(1.0, sensor.gain)
-                theta[low : high + 1] = sign * (math.pi - folded)
+                theta[low : high + 1] = np.sign(inside) * sense * (math.pi - folded)
     for low, high in moves.held:
         # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
         pull = values[low:high] / sensor.gravity if sensor.gravity else np.zeros(high - low)
         theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
     return np.asarray(theta)
-
-
-def _from_start(
-    values: Floats, begin: int, waves: list[Wave], most: float, noise: float
-) -> list[Wave]:
-    """Return the half swings and the part of one before the first crossing."""
-    if not waves or waves[0].low <= begin + 2:
-        return waves
-    first = waves[0]
-    # A swing released beyond a quarter turn begins in a dip.
-    start = wave_of(values, begin, first.low, noise)
-    if not start.folded(most) and first.folded(most):
-        start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=first.dip)
-    return [start, *waves]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -67,18 +67,17 @@ def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
     """Return where a motion that begins with a quiet hold has clearly left it."""
     low, high = part
     for shares in HOLD_WINDOWS:
-        before, sure = (
-            int(np.searchsorted(work.time, work.time[low] - share * period)) for share in shares
-        )
+        times = work.time[low] - np.array(shares) * period
+        before, sure = np.searchsorted(work.time, times).tolist()
         level = _quiet(work, before, sure, noise)
         left = None if level is None else _left(work, (sure, high), level, noise)
         if left is None:
             continue
-        if hand[before:low].all():
-            # The hand holds the pendulum until the motion begins.
-            found = held_short(work, (before, high), middle, period, noise)
-            return low if found is None else min(low, found)
-        return max(low, left)
+        if not hand[before:low].all():
+            return max(low, left)
+        # The hand holds the pendulum until the motion begins.
+        found = held_short(work, (before, high), middle, period, noise)
+        return low if found is None else min(low, found)
     return low
 
 
@@ -165,21 +164,20 @@ def held_short(work: Work, part: Stretch, middle: float, period: float, noise: f
     if not work.trusted[low : low + 5].all():
         return None
     # The first readings give the level of the hold, then all readings near it.
-    level = float(np.median(work.theta[low : low + 5]))
-    left = _left(work, part, level, noise)
-    if left is None:
-        return None
-    level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
-    left = _left(work, part, level, noise)
+    left = low
+    for _ in range(2):
+        level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
+        found = _left(work, part, level, noise)
+        if found is None:
+            return None
+        left = found
     pull = abs(math.sin(level - middle))
-    if left is None or pull < NEAR_UPRIGHT:
+    if pull < NEAR_UPRIGHT:
         return None
-    w0 = 2 * math.pi / period
-    usual = math.sqrt(2 * _seen(work, noise) / (w0**2 * pull))
+    usual = math.sqrt(2 * _seen(work, noise) / pull) * period / (2 * math.pi)
     interval = float(np.median(np.diff(work.time)))
-    if work.time[left] - work.time[low] <= HELD_LONGER * usual + 4 * interval:
-        return None
-    return left
+    held = work.time[left] - work.time[low] > HELD_LONGER * usual + 4 * interval
+    return left if held else None
 
 
 def touched(work: Work, period: float, parts: list[Stretch]) -> Mask:
@@ -257,9 +255,8 @@ def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) 
     for a, b in stretches(hand):
         # A trembling hand lets go for a moment.
         if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:
-            touches[-1] = (touches[-1][0], b)
-        else:
-            touches.append((a, b))
+            a, _ = touches.pop()  # noqa: PLW2901 (joined)
+        touches.append((a, b))
     held = np.zeros(time.size, bool)
     for a, b in touches:
         if time[b - 1] - time[a] >= SHORTEST_HOLD * period:
@@ -268,7 +265,5 @@ def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) 
                 t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
             ]
             held[near[0][0] : near[-1][1]] = True
-    free = []
-    for low, high in parts:
-        free += [(low + a, low + b) for a, b in stretches(~held[low:high])]
+    free = [(low + a, low + b) for low, high in parts for a, b in stretches(~held[low:high])]
     return [(a, b) for a, b in free if b - a > 5 and time[b - 1] - time[a] > SHORTEST_HOLD * period]

@@ -42,14 +42,6 @@ FEWEST_EDGES: Final = 50  # Readings from which edges are recognised
 
 def check(work: Work) -> None:
     """Report too few readings for a fit or the drive, and swings too small for the gain."""
-    _few(work)
-    _drive(work)
-    if work.plan.kind == "free" and work.made_of is None and not work.integrated:
-        _gain(work)
-
-
-def _few(work: Work) -> None:
-    """Report a run of which a fit uses few readings in motion."""
     moving = np.ones(work.time.size, bool)
     for part in work.segments:
         if part.what in RESTING:
@@ -61,40 +53,25 @@ def _few(work: Work) -> None:
             "says little about the others"
         )
         work.say("few-used", text)
-
-
-def _drive(work: Work) -> None:
-    """Report a sampling rate that does not resolve the drive."""
-    omega = (work.plan.drive or {}).get("Omega")
-    if not omega:
-        return
     rate = 1 / float(np.median(np.diff(work.time)))
-    drive = float(omega) / math.tau
-    if rate >= NYQUIST * drive:
-        return
-    slow = abs(drive - rate * round(drive / rate))
-    text = (
-        f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a "
-        f"period do not resolve it, {NYQUIST:g} and more would; it looks like one of "
-        f"{slow:.3g} Hz"
-    )
-    work.say("drive-unresolved", text)
-
-
-def _gain(work: Work) -> None:
-    """Report small swings that do not show the gain of the sensor."""
-    gain = gain_of(work)
-    if gain is None:
-        return
-    low, high = gain
-    if high - low <= 2 * GAIN_KNOWN:
-        return
-    between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
-    text = (
-        f"swings so small hardly show the gain of the sensor: the readings are {between} times the "
-        "angle (95 %), by how the period grows with the swing; friction is as uncertain"
-    )
-    work.say("gain-unknown", text)
+    drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
+    if rate < NYQUIST * drive:
+        text = (
+            f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a"
+            f" period do not resolve it, {NYQUIST:g} and more would; it looks like one of"
+            f" {abs(drive - rate * round(drive / rate)):.3g} Hz"
+        )
+        work.say("drive-unresolved", text)
+    free = work.plan.kind == "free" and work.made_of is None and not work.integrated
+    gain = gain_of(work) if free else None
+    if gain is not None and gain[1] - gain[0] > 2 * GAIN_KNOWN:
+        low, high = gain
+        between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
+        text = (
+            f"swings so small hardly show the gain of the sensor: the readings are {between} times"
+            " the angle (95 %), by how the period grows with the swing; friction is as uncertain"
+        )
+        work.say("gain-unknown", text)
 
 
 def step_of(theta: Floats) -> float:
@@ -188,13 +165,11 @@ def put_on_edges(work: Work) -> None:
     """Put the readings of a log of edges on the edges."""
     if work.plan.pivot is not None or not logs_edges(work.theta):
         return
-    step = step_of(work.theta)
-    way = np.sign(np.round(np.diff(work.theta) / step))
-    work.edges, work.seen = True, step
+    work.edges, work.seen = True, step_of(work.theta)
+    way = np.sign(np.round(np.diff(work.theta) / work.seen))
     # A log of the edges themselves shows an edge twice at a turning point.
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
-        work.theta[1:] -= 0.5 * step * way
-        work.theta[0] -= 0.5 * step * way[0]
+        work.theta -= 0.5 * work.seen * np.append(way[0], way)
         work.trusted[0] = False  # it may be what stood there as the log began
 
 

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.signal import Stretch
 from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import between, stretches
 
 if TYPE_CHECKING:
-    from pendmap.signal import Floats, Mask, Stretch
+    from pendmap.signal import Floats, Mask
 
 LEAST_SWING: Final = 5.0  # Standard errors below which a reading is no swing
 STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
@@ -48,28 +49,25 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
     # A lone false reading is neither a step nor the end of a hold.
     reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
-    whole = [(0, time.size)]
     if crossing.size < FEWEST_HALF_SWINGS:
-        return Swinging(whole, [])
+        return Swinging([(0, time.size)], [])
     period = float(np.median(crossing[2:] - crossing[:-2]))
     quiet = _quiet(time, reading, period, noise)
-    largest, free, held = 0.0, [], []
+    largest, free, held = 0.0, list[Stretch](), list[Stretch]()
     for edge, high in between(quiet, 0, time.size):
-        low = edge
-        if high - low <= 5:
+        if high - edge <= 5:
             continue
-        part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        if swings(time[low:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
+        part = reading[edge:high] - middle_over(time[edge:high], reading[edge:high], least)
+        if swings(time[edge:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
             continue
         largest = max(largest, float(np.max(np.abs(part))))
-        low += let_go(time[low:high], part, noise)
+        low = edge + let_go(time[edge:high], part, noise)
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        end = low + _untouched(
-            time[low:high], part, least, DECAYED * largest, more=high < time.size
-        )
+        small = DECAYED * largest
+        end = _untouched(time[low:high], part, least, small, more=high < time.size)
         held += [stretch for stretch in quiet if stretch[1] == edge]
-        free.append((low, end))
-    return Swinging(free or whole, held)
+        free.append((low, low + end))
+    return Swinging(free or [(0, time.size)], held)
 
 
 def middle_over(time: Floats, reading: Floats, least: float) -> float:
@@ -147,28 +145,22 @@ def _untouched(time: Floats, values: Floats, least: float, small: float, *, more
     """
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
+    slack = least if math.isfinite(least) else 0.0  # the noise of few samples is not known
+
+    def follows(k: int) -> bool:
+        """Whether a half swing follows freely from the one of the same side before it."""
+        even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
+        return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)
+
     last = tops.size - 1
     # Two half swings together: a hand may cause a single one like those before.
-    while last > 2 and not all(_alike(halves, tops, k, least) for k in (last, last - 1)):
+    while last > 2 and not (follows(last) and follows(last - 1)):
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
         return time.size  # it decays to its rest
     tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
-    usual = tops[last - 1] * GROWTH + least
-    longest = (1 + UNEVEN) * halves[last - 1]
-    grown = np.max(np.abs(tail), initial=0.0) > usual
-    if (
-        not more
-        and last == tops.size - 1
-        and not grown
-        and (time[-1] - found.crossing[-1] < longest)
-    ):
+    grown = np.max(np.abs(tail), initial=0.0) > tops[last - 1] * GROWTH + least
+    whole = time[-1] - found.crossing[-1] < (1 + UNEVEN) * halves[last - 1]
+    if whole and last == tops.size - 1 and not more and not grown:
         return time.size
     return int(np.searchsorted(time, found.crossing[last + 1]))
-
-
-def _alike(halves: Floats, tops: Floats, k: int, least: float) -> bool:
-    """Return whether a half swing follows freely from the one of the same side before it."""
-    even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
-    slack = least if math.isfinite(least) else 0.0
-    return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)
