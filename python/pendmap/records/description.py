@@ -84,9 +84,6 @@ class Description:
     runs: tuple[RunPlan, ...] = ()
 
 
-ALONE: Final = Description()  # Description of a file without an ``experiment.toml``
-
-
 def read_description(path: Path) -> Description:
     """Read an ``experiment.toml``; raise InputError, with the path, for what is not allowed."""
     content = read_toml(path)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import io
 import re
 from collections import Counter
 from typing import TYPE_CHECKING, Final
@@ -17,6 +16,8 @@ from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendmap.records.description import Reader
     from pendmap.signal import Floats, Indices
 
@@ -95,66 +96,47 @@ def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
 
 def parsed(text: str, reader: Reader, where: str) -> Table:
     """Return the table of a text; raise InputError if there are no rows of numbers."""
-    import pandas as pd
-
-    whole = text.endswith(("\n", "\r"))
-    lines = [(k, line) for k, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if line.strip()]
-    lines = [(k, line) for k, line in lines if k > reader.skip_rows]
+    every = enumerate(re.split(r"\r\n|\n|\r", text), 1)
+    lines = [(k, line) for k, line in every if line.strip() and k > reader.skip_rows]
     if not lines:
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
-    long = sum(len(line) > LONGEST_LINE for _, line in lines)
-    if long > LEAST_ROWS * len(lines):
+    if sum(len(line) > LONGEST_LINE for _, line in lines) > LEAST_ROWS * len(lines):
         raise InputError(
             f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
             f"{LONGEST_LINE} characters"
         )
     # A line that is too long is left out as unreadable.
-    lines = (
-        [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines] if long else lines
-    )
+    lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
     delimiter, decimal, width = _way(lines, reader, where)
-    fits = [_fits(line, delimiter, decimal, width) for _, line in lines]
-    first = fits.index(True)
+    rows = [_row(line, delimiter, decimal, width) for _, line in lines]
+    first = next(k for k, row in enumerate(rows) if row)
     findings = []
-    if fits[-1] and not whole and _cut(lines, fits, delimiter):
-        fits[-1] = False
-        findings.append(Finding("half-line", "the last line breaks off and is left out", True))  # noqa: FBT003
+    if rows[-1] and not text.endswith(("\n", "\r")) and _cut(rows):
+        rows[-1] = None
+        text = "the last line breaks off and is left out"
+        findings.append(Finding("half-line", text, mended=True))
     names, headed = _header([line for _, line in lines[:first]], delimiter, width)
     if headed and len(names) != width:
         raise InputError(
             f"{where}: as many columns must have names as numbers, got {len(names)} with names and"
             f" {width} with numbers; decimal commas need another delimiter, like ;"
         )
-    dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
+    dropped = [k for (k, _), row in zip(lines[first:], rows[first:], strict=True) if not row]
     if dropped and not (findings and len(dropped) == 1):
         shown = ", ".join(map(str, dropped[:3])) + (", ..." if len(dropped) > 3 else "")
         said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
-        findings.append(Finding("unreadable-lines", said, True, f"line {shown}"))  # noqa: FBT003
-    rows = [k for (k, _), fit in zip(lines, fits, strict=True) if fit]
-    kept = "\n".join(line.strip(" ") for (_, line), fit in zip(lines, fits, strict=True) if fit)
-    try:
-        frame = pd.read_csv(
-            io.StringIO(kept),
-            sep=r"\s+" if delimiter == " " else delimiter,
-            header=None,
-            names=list(range(width)),
-            index_col=False,
-            dtype=str,
-            keep_default_na=False,
-            skipinitialspace=True,
-        )
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"{where}: cannot be read: {' '.join(str(error).split())}") from None
-    values = np.column_stack([_numbers(frame[k], decimal) for k in range(width)])
-    order = np.flatnonzero(fits) - first
-    return Table(names, values, np.asarray(rows), tuple(findings), headed, order)
+        findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
+    order = np.array([k for k, row in enumerate(rows) if row], np.intp)
+    numbers = [_numbers(column, decimal) for column in zip(*filter(None, rows), strict=True)]
+    places = np.array([lines[k][0] for k in order])
+    return Table(names, np.column_stack(numbers), places, tuple(findings), headed, order - first)
 
 
-def _numbers(column: object, decimal: str) -> Floats:
+def _numbers(column: Sequence[str], decimal: str) -> Floats:
     """Return the numbers of a column; NaN for anything else."""
     import pandas as pd
 
-    texts = pd.Series(column).astype(str).str.strip()
+    texts = pd.Series(column)
     if decimal != ".":
         texts = texts.str.replace(decimal, ".", regex=False)
     numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
@@ -198,13 +180,14 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
     found = _common(sample, reader, 2) or _common(sample, reader, 1)
     if found == (",", ".", 2) and reader.decimal is None and _fractions(sample):
         return ";", ",", 1
+    least = LEAST_ROWS * len(sample)
     if found is not None:
-        fitting = sum(_fits(line, *found) for line in sample)
-        if fitting >= LEAST_ROWS * len(sample) or fitting >= len(sample) - _HEADS:
+        fitting = sum(_row(line, *found) is not None for line in sample)
+        if fitting >= min(least, len(sample) - _HEADS):
             return found
     for decimal in (".", ","):
         alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
-        if sum(_fits(line, *alone) for line in sample) > LEAST_ROWS * len(sample):
+        if sum(_row(line, *alone) is not None for line in sample) > least:
             return alone
     advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
     raise InputError(
@@ -214,49 +197,41 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
 
 def _fractions(sample: list[str]) -> bool:
     """Return whether the digits behind the commas are decimals: some begin with 0."""
-    parts = [line.split(",") for line in sample if _fits(line, ",", ".", 2)]
+    parts = [row for line in sample if (row := _row(line, ",", ".", 2))]
     digits = all(re.fullmatch(r"\s*[+-]?\d+", a) and re.fullmatch(r"\d+\s*", b) for a, b in parts)
     return digits and any(b.startswith("0") and len(b.strip()) > 1 for _, b in parts)
 
 
 def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
     """Return delimiter, decimal sign and width of most lines with ``least`` numbers."""
-    best: tuple[int, tuple[str, str, int] | None] = (0, None)
-    ways = [
-        (reader.delimiter or delimiter, reader.decimal or decimal)
-        for delimiter, decimal in SEPARATORS
-    ]
+    most, best = 0, None
+    quoted = any('"' in line for line in sample)
+    ways = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
     for delimiter, decimal in dict.fromkeys(ways):
-        if delimiter == decimal and not any('"' in line for line in sample):
+        if delimiter == decimal and not quoted:
             continue
         widths = Counter(
             len(parts)
             for parts in (_split(line, delimiter) for line in sample)
             if len(parts) > 1 and _is_row(parts, decimal) >= least
         )
-        if widths:
-            width, count = widths.most_common(1)[0]
-            if count > best[0]:
-                best = (count, (delimiter, decimal, width))
-    return best[1]
+        for width, count in widths.most_common(1):
+            if count > most:
+                most, best = count, (delimiter, decimal, width)
+    return best
 
 
-def _fits(line: str, delimiter: str, decimal: str, width: int) -> bool:
-    """Return whether a line is a row of this width."""
+def _row(line: str, delimiter: str, decimal: str, width: int) -> list[str] | None:
+    """Return the parts of a line that is a row of this width."""
     parts = _split(line, delimiter)
-    return len(parts) == width and _is_row(parts, decimal) > 0
+    return parts if len(parts) == width and _is_row(parts, decimal) else None
 
 
-def _cut(lines: list[tuple[int, str]], fits: list[bool], delimiter: str) -> bool:
-    """Return whether a last line without an end has fewer digits than all before it."""
-
-    def decimals(line: str) -> int:
-        parts = re.split(r"[.,]", _split(line, delimiter)[-1])
-        return len(parts[1]) if len(parts) > 1 else 0
-
-    before = zip(lines[-21:-1], fits[-21:-1], strict=True)
-    digits = {decimals(line) for (_, line), fit in before if fit}
-    return len(digits) == 1 and decimals(lines[-1][1]) < next(iter(digits))
+def _cut(rows: list[list[str] | None]) -> bool:
+    """Return whether a last row has fewer digits than all of twenty before it."""
+    ends = [row[-1].replace(",", ".") for row in rows[-21:] if row]
+    *before, last = (len(end.partition(".")[2]) for end in ends)
+    return len(set(before)) == 1 and last < before[0]
 
 
 def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
