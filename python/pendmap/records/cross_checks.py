@@ -8,6 +8,7 @@ A swing alone does not tell the distance of a tangential sensor from the sense o
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -121,27 +122,22 @@ def _drive_sign(work: Work) -> None:
     if window > count // 4:
         return
 
-    def smooth(values: Floats, derivative: int = 0) -> Floats:
-        smoothed: Floats = savgol_filter(values, window, 3, deriv=derivative, delta=interval)
-        return smoothed
-
-    sine, cosine = np.sin(theta), np.cos(theta)
-    columns, names = [smooth(sine)], [""]
-    for name, accelerating in _pushes(work, even, smooth).items():
-        columns.append(smooth(accelerating * (cosine if name == "horizontal" else sine)))
-        names.append(name)
-    table = np.column_stack(columns)
-    if len(names) == 1 or np.linalg.matrix_rank(table) < len(names):
+    smooth = functools.partial(savgol_filter, window_length=window, polyorder=3, delta=interval)
+    pushes = _pushes(work, even, smooth)
+    arms = {name: np.cos if name == "horizontal" else np.sin for name in pushes}
+    columns = [smooth(push * arms[name](theta)) for name, push in pushes.items()]
+    table = np.column_stack([smooth(np.sin(theta)), *columns])
+    if not pushes or np.linalg.matrix_rank(table) < table.shape[1]:
         return
-    target = smooth(theta, 2)
+    target = smooth(theta, deriv=2)
     answer = np.linalg.lstsq(table, target, rcond=None)[0]
     rest = target - table @ answer
-    worth = max(count / window, len(names) + 1.0)
+    worth = max(count / window, table.shape[1] + 1.0)
     variance = float(np.sum(rest**2)) / count * (count / worth)
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
     if answer[0] > 0:
         return  # no pendulum about 0: nothing to tell a sign by
-    for name, value, error in zip(names[1:], answer[1:], errors[1:], strict=True):
+    for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
             said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
             text = f"{said} acts with the other sign than the angle shows: turned by 180 degrees?"
@@ -163,7 +159,7 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
             continue
         if np.max(np.abs(values[good])) < 1e6:
             motion = np.interp(even, work.time[good], values[good])
-            found[way] = smooth(motion, order) if order else motion
+            found[way] = smooth(motion, deriv=order) if order else motion
     return found
 
 
@@ -270,8 +266,7 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
         return
     other = "its unit, or a distance"
     if not angular:
-        turned = dataclasses.replace(motion, measured=math.copysign(1.0, alike) * motion.measured)
-        distance = _distance(turned, sensor)
+        distance = _distance(motion, math.copysign(1.0, alike), sensor)
         other = (
             f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
         )
@@ -279,13 +274,12 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
     work.say("acceleration-scale", f"{text}: {other}; not used")
 
 
-def _distance(motion: _Motion, sensor: Accelerometer) -> float:
+def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
     """Return the distance that the readings show, m, for the given gravity and direction."""
+    measured = sign * motion.measured
     if sensor.direction == "radial":
-        rest = motion.measured - sensor.gravity * np.cos(motion.theta)
-        return _slope(motion.velocity**2, rest)
-    gain = _slope(np.sin(motion.theta), motion.measured)
-    return (sensor.gravity - gain) / motion.w0**2
+        return _slope(motion.velocity**2, measured - sensor.gravity * np.cos(motion.theta))
+    return (sensor.gravity - _slope(np.sin(motion.theta), measured)) / motion.w0**2
 
 
 def _unplaced(work: Work, motion: _Motion) -> None:
@@ -298,9 +292,9 @@ def _unplaced(work: Work, motion: _Motion) -> None:
         work.say("acceleration-unlike", text)
         return
     if abs(radial) > abs(sine):
-        turned = dataclasses.replace(motion, measured=math.copysign(1.0, radial) * motion.measured)
-        distance = _distance(turned, Accelerometer("radial", 1.0, gravity))
-        without = _distance(turned, Accelerometer("radial", 1.0, 0.0))
+        sign = math.copysign(1.0, radial)
+        distance = _distance(motion, sign, Accelerometer("radial", 1.0, gravity))
+        without = _distance(motion, sign, Accelerometer("radial", 1.0, 0.0))
         said = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
     else:
         gain = abs(_slope(np.sin(motion.theta), motion.measured))
@@ -311,11 +305,8 @@ def _unplaced(work: Work, motion: _Motion) -> None:
             f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
             f" {without:.3g} if gravity is removed"
         )
-    text = (
-        f"the acceleration looks {said}; {work.place_missing} in [columns] would make it"
-        f" {CHECK_ONLY}"
-    )
-    work.say("acceleration-unused", text)
+    use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
+    work.say("acceleration-unused", f"the acceleration looks {said}; {use}")
 
 
 def smooth_pivot(work: Work) -> None:
