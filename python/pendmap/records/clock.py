@@ -7,6 +7,7 @@ interval. A polynomial with a term ``d v`` from each sample on, fitted around it
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from bisect import bisect_left
 from typing import TYPE_CHECKING, Final
@@ -73,18 +74,19 @@ def cut_at_pauses(work: Work) -> None:
     """Keep the side with more samples of a pause longer than the rest of the record."""
     while work.time.size > 2:
         steps = np.diff(work.time)
-        pause = int(np.argmax(steps))
-        rest = float(work.time[-1] - work.time[0] - steps[pause])
-        if steps[pause] <= max(rest, RESTART * float(np.median(steps))):
+        at = int(np.argmax(steps)) + 1
+        pause = steps[at - 1]
+        rest = float(work.time[-1] - work.time[0] - pause)
+        if pause <= max(rest, RESTART * float(np.median(steps))):
             return
-        before = pause + 1 >= work.time.size - pause - 1
-        kept = np.arange(pause + 1) if before else np.arange(pause + 1, work.time.size)
+        places = np.arange(work.time.size)
+        side = "before" if at >= work.time.size - at else "after"
         text = (
-            f"nothing for {steps[pause]:.3g} s, longer than all the rest: what is"
-            f" {'before' if before else 'after'} is used; from_s and to_s choose another part"
+            f"nothing for {pause:.3g} s, longer than all the rest: what is {side} is used; from_s"
+            " and to_s choose another part"
         )
-        work.say("time-pause", text, at=np.array([pause + 1]))
-        work.keep(kept)
+        work.say("time-pause", text, at=np.array([at]))
+        work.keep(places < at if side == "before" else places >= at)
 
 
 def _stopped(work: Work) -> None:
@@ -125,58 +127,53 @@ def _wrapped(work: Work) -> None:
 def _restarted(work: Work) -> None:
     """Keep the longest stretch of a clock that starts again."""
     steps = np.diff(work.time)
-    rising = steps[steps > 0]
-    if not rising.size:
-        return
-    usual = float(np.median(rising))
-    falls = np.flatnonzero(steps < -RESTART * usual) + 1
-    edges = [0, *falls.tolist(), work.time.size]
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
+    falls = (np.flatnonzero(steps < -RESTART * usual) + 1).tolist()
     # A single false stamp is no restart: the stamps after it continue those before.
-    starts = [0]
-    for k, low in enumerate(edges[1:-1], 1):
-        part = work.time[low : edges[k + 1]]
-        before = work.time[starts[-1] : low]
+    edges = [0]
+    for low, high in itertools.pairwise([*falls, work.time.size]):
+        part, before = work.time[low:high], work.time[edges[-1] : low]
         again = part.size > RESTART and np.median(part[:RESTART]) < np.median(before[-RESTART:])
         if again and before.size > RESTART:
-            starts.append(low)
-    if len(starts) == 1:
+            edges.append(low)
+    if len(edges) == 1:
         return
-    edges = [*starts, work.time.size]
-    sizes = np.diff(edges)
-    best = int(np.argmax(sizes))
+    starts = np.array(edges[1:])
+    edges.append(work.time.size)
+    best = int(np.argmax(np.diff(edges)))
+    low, high = edges[best : best + 2]
     text = (
-        f"the clock starts again {counted(len(starts) - 1, 'time')}: of {len(starts)} parts the"
-        f" longest is used, rows {work.rows[edges[best]]} to {work.rows[edges[best + 1] - 1]}"
+        f"the clock starts again {counted(starts.size, 'time')}: of {starts.size + 1} parts the"
+        f" longest is used, rows {work.rows[low]} to {work.rows[high - 1]}"
     )
-    work.say("time-restarts", text, mended=False, at=np.asarray(starts[1:]))
-    work.keep(np.arange(edges[best], edges[best + 1]))
+    work.say("time-restarts", text, at=starts)
+    work.keep(np.arange(low, high))
 
 
 def _coarse(work: Work) -> None:
     """Spread stamps evenly where several samples share each of them."""
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
-    if 0 < same < 1 and np.all(steps >= 0) and logs_edges(work.theta):
+    if not 0 < same < 1 or np.any(steps < 0):
+        return
+    if logs_edges(work.theta):
         work.time = spread_stamps(work.time)
         text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
         work.say("time-coarse", text, mended=True)
         return
-    if same < COARSE_STAMPS or same == 1 or np.any(steps < 0):
-        return
     rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
-    if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:
-        return  # the samples are repeated with their stamps
+    repeated = np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9  # samples and stamps
+    if same < COARSE_STAMPS or repeated:
+        return
     place = np.arange(work.time.size)
     slope, start = np.polyfit(place, work.time - work.time[0], 1)
     tick = float(np.median(steps[steps > 0]))
     away = work.time - work.time[0] - (start + slope * place)
-    if slope <= 0 or np.max(np.abs(away)) > 1.5 * tick:
-        return  # samples are lost besides: left to the rest
-    work.time = work.time[0] + start + slope * place
-    text = (
-        f"{100 * same:.0f} % of the stamps repeat the one before: spread evenly, {1 / slope:.6g} Hz"
-    )
-    work.say("time-coarse", text, mended=True)
+    if slope > 0 and np.max(np.abs(away)) <= 1.5 * tick:  # no samples are lost besides
+        work.time = work.time[0] + start + slope * place
+        share = f"{100 * same:.0f} % of the stamps repeat the one before"
+        text = f"{share}: spread evenly, {1 / slope:.6g} Hz"
+        work.say("time-coarse", text, mended=True)
 
 
 def _ordered(work: Work) -> None:
@@ -222,8 +219,7 @@ def _smoother(theta: Floats, at: Indices) -> bool:
     usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
     if not usual:  # most were moved: a motion has bends that are small against its way
         return bool(np.median(bend) < 0.1 * np.ptp(theta))
-    moved = bend[np.clip(at - 1, 0, bend.size - 1)]
-    return bool(np.all(moved <= 3 * usual))
+    return bool(np.all(bend[np.clip(at - 1, 0, bend.size - 1)] <= 3 * usual))
 
 
 def _longest_rising(time: Floats) -> Indices:
@@ -258,14 +254,13 @@ def _spacing(work: Work) -> None:
         return
     if gaps.size:
         worst = gaps[int(np.argmax(steps[gaps]))]
+        low, high = work.time[worst : worst + 2].tolist()
         text = (
             f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
-            f" longest {steps[worst]:.3g} s at {moment(work.time[worst])} s"
+            f" longest {steps[worst]:.3g} s at {moment(low)} s"
         )
-        span = (float(work.time[worst]), float(work.time[worst + 1]))
-        work.say("time-gap", text, at=gaps, span=span)
-    even = np.delete(steps, gaps)
-    spread = math.sqrt(float(np.mean((even - usual) ** 2)))
+        work.say("time-gap", text, at=gaps, span=(low, high))
+    spread = math.sqrt(float(np.mean((np.delete(steps, gaps) - usual) ** 2)))
     if spread > REPORTED_JITTER * usual:
         share = 100 * spread / usual
         text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
@@ -290,7 +285,10 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
     reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
     if reach < SHORTEST_SIDE or time.size < 20 * reach:
         return None
-    shown = _shown(reach)
+    # Apparent sizes of slips of 1, 2, ... intervals: a jump spoils the velocity.
+    place = np.arange(-3 * reach, 3 * reach + 1)
+    tried = [_tried(place + k * (place >= 0.0), reach) for k in range(1, MOST_INTERVALS + 1)]
+    shown = np.array([gain[3 * reach] / power[3 * reach] for gain, power in tried])
     mended, places = time.copy(), list[int]()
     slip = stderr = 0.0
     for limit in CERTAIN_SLIP:
@@ -306,19 +304,11 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
             stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))
         if not good.any():
             break
-        starts = np.searchsorted(mended, grid[at[good]] - interval / 2)
-        for k, count in zip(starts.tolist(), number[good].tolist(), strict=True):
+        starts = np.searchsorted(mended, grid[at[good]] - interval / 2).tolist()
+        for k, count in zip(starts, number[good].tolist(), strict=True):
             mended[k:] += count * interval
-            places.append(int(k))
+        places += starts
     return Slips(mended, np.unique(places), slip, stderr)
-
-
-def _shown(reach: int) -> Floats:
-    """Return the apparent sizes of slips of 1, 2, ... intervals; a jump spoils the velocity."""
-    place = np.arange(-3 * reach, 3 * reach + 1)
-    lines = [place + number * (place >= 0.0) for number in range(1, MOST_INTERVALS + 1)]
-    lags = [gain / power for gain, power in (_tried(line, reach) for line in lines)]
-    return np.array([lag[3 * reach] for lag in lags])
 
 
 def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
