@@ -41,8 +41,8 @@ def make(work: Work) -> None:
         peaks = work.theta[np.isfinite(work.theta)]
         if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
             text = (
-                "the turning points have one sign: taken for those of both sides, one each half"
-                " swing; with those of one side alone w0 comes out half as large"
+                "the turning points have one sign: they are taken as one each half swing; if all"
+                " are of one side, w0 comes out half as large"
             )
             work.say("peaks-one-sign", text)
     elif "angle" not in work.columns:
@@ -94,7 +94,7 @@ def _accelerated(work: Work) -> None:
     sensor, why = work.accelerometer, ""
     if sensor is None:
         why = (
-            "an acceleration alone tells no angle, where the sensor sits is not known:"
+            "an acceleration alone gives an angle only if the place of the sensor is known:"
             f" {work.place_missing} missing in [columns] of experiment.toml: it must be like"
             f" {PLACE_EXAMPLE}"
         )

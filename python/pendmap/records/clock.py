@@ -82,8 +82,8 @@ def cut_at_pauses(work: Work) -> None:
         places = np.arange(work.time.size)
         side = "before" if at >= work.time.size - at else "after"
         text = (
-            f"nothing for {pause:.3g} s, longer than all the rest: what is {side} is used; from_s"
-            " and to_s choose another part"
+            f"a pause of {pause:.3g} s, longer than the rest of the record: the part {side} it is"
+            " used; from_s and to_s choose another"
         )
         work.say("time-pause", text, at=np.array([at]))
         work.keep(places < at if side == "before" else places >= at)
@@ -119,7 +119,7 @@ def _wrapped(work: Work) -> None:
         at = np.flatnonzero(np.abs(steps + wrap) < slack)
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
             work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
-            text = f"the clock's counter began again {counted(at.size, 'time')}, continued"
+            text = f"the counter of the clock wrapped {counted(at.size, 'time')}: continued"
             work.say("time-wrapped", text, mended=True, at=at + 1)
             return
 

@@ -132,8 +132,8 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
         # Weak readings give an uncertain frequency, and with it an uncertain centre of oscillation.
         raise InputError(
             f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
-            " g/w0^2 from the pivot, where gravity and the swing cancel: nothing but damping is"
-            " felt there; it must be another place on the rod, or have an angle beside it"
+            " g/w0^2 from the pivot, where gravity and the swing cancel: only damping is"
+            " measured there; it must be another place on the rod, or have an angle beside it"
         )
     if away > WEAK_SPOT:
         return ""

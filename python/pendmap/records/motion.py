@@ -72,7 +72,7 @@ def check(work: Work) -> None:
     span = (int(ends[0]), int(ends[-1]) + 1)
     period = _period(work, middle)
     if period is None:
-        work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
+        work.say("no-swing", "too few whole swings: little can be checked")
         return
     if work.made_of is not None:
         parts = _let_swing(told, middle, limit, span)

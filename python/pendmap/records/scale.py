@@ -308,7 +308,7 @@ def turn_to_rest(work: Work) -> None:
         work.say("gauge-turned", text, mended=True)
     else:
         work.theta -= turns + off
-        text = f"{text}, the rest is elsewhere than the zero: taken off"
+        text = f"{text}, not about its zero: subtracted"
         work.say("zero-offset", text, mended=True)
 
 

@@ -116,14 +116,14 @@ def _lines(run: Run) -> Iterator[str]:
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run), noise_unit(run))}"
     if (bias := _bias(run)) is not None:
-        said = f"{bias:+.3g} rad/s, what the gyroscope reads of nothing by the angle's drift"
+        said = f"{bias:+.3g} rad/s, reading of the gyroscope at rest by the drift of the angle"
         yield f"  bias      {said}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
     mended = sum(found.mended for found in run.findings)
     many = counted(len(run.findings), "finding")
-    yield f"  {many}, {mended} of them mended" if run.findings else "  nothing odd was found"
+    yield f"  {many}, {mended} of them mended" if run.findings else "  no findings"
     for found in run.findings:
         yield f"  {_line(found)}"
 
@@ -190,14 +190,14 @@ def _bias(run: Run) -> float | None:
 def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     """Return the noise in words."""
     if not math.isfinite(noise.sigma):
-        return "too few samples to tell"
+        return "unknown, too few samples"
     degrees = f"{math.degrees(noise.sigma):.2g} degrees{unit.removeprefix('rad')}"
     if noise.bound:
-        few = "motion is left in it at so few samples a period"
+        few = "motion included: few samples a period"
         return f"at most {noise.sigma:.2g} {unit} ({degrees}), {few}"
     said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
-        return f"{said}, that of counting: the record shows no more"
+        return f"{said}, that of rounding to counts: the record shows no less"
     if noise.by_speed:
         slow, fast = noise.by_speed[0], noise.by_speed[-1]
         if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
