@@ -53,6 +53,10 @@ class Work:
     phase: float | None = None  # phase of the drive at that edge, rad
     edges: bool = False  # each reading is an edge of an encoder
     pivot_unit: str | None = None
+    middle: float = 0.0  # of the swing, rad
+    period: float = math.nan  # of small swings, s
+    noise: float = 0.0  # of a reading, rad
+    limit: float = 0.0  # span of readings within which nothing moves, rad
 
     @property
     def made_of(self) -> Accelerometer | None:
