@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import pendmap
-from pendmap.records import text as reading
+from pendmap.records import tables as reading
 from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 

@@ -22,7 +22,7 @@ import pendmap
 from pendmap import InputError, viewer
 from pendmap.errors import one_line
 from pendmap.records.description import read_description
-from pendmap.records.text import MOST_COLUMNS
+from pendmap.records.tables import MOST_COLUMNS
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from pendmap.records.description import Description, RunPlan
-    from pendmap.records.text import Table
+    from pendmap.records.tables import Table
     from pendmap.signal import Floats
 
 

@@ -30,7 +30,7 @@ from pendmap.records.tables import read_table
 if TYPE_CHECKING:
     import os
 
-    from pendmap.records.text import Table
+    from pendmap.records.tables import Table
     from pendmap.records.work import Work
 
 
