@@ -20,7 +20,6 @@ from pendmap.signal.half_cycles import swings
 
 if TYPE_CHECKING:
     from pendmap.records.rod_sensors import Accelerometer
-    from pendmap.records.swinging import Swinging
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Stretch
 
@@ -49,14 +48,14 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     time, reading, where = work.time, work.extra["acceleration"], work.where
     noise = noise_of(time, reading).sigma
     noise = noise if math.isfinite(noise) else 0.0
-    moves = swinging(time, reading, noise)
+    free, held = swinging(time, reading, noise)
     least = max(LEAST_SWING * noise, 1e-12)
-    middles = [middle_over(time[a:b], reading[a:b], least) for a, b in moves.free]
-    middle = float(np.average(middles, weights=[b - a for a, b in moves.free]))
-    free = np.concatenate([reading[a:b] for a, b in moves.free])
-    _refuse_radial(free, middle, accelerometer, where)
+    middles = [middle_over(time[a:b], reading[a:b], least) for a, b in free]
+    middle = float(np.average(middles, weights=[b - a for a, b in free]))
+    swung = np.concatenate([reading[a:b] for a, b in free])
+    _refuse_radial(swung, middle, accelerometer, where)
     values = reading - middle
-    each = [waves_of(time, values, part, noise) for part in moves.free]
+    each = [waves_of(time, values, part, noise) for part in free]
     waves = [wave for part in each for wave in part]
     if len(waves) < FEWEST_HALF_SWINGS:
         raise InputError(
@@ -69,7 +68,7 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     weak = signal < 4 * LEAST_SWING
     doubt = _refuse_blind(found, waves, where, weak=weak)
     _refuse_large(each, found, where)
-    for low, high in moves.held:
+    for low, high in held:
         level = abs(float(np.median(values[low:high])))
         if found.gravity and level > LARGEST_READING * found.gravity:
             raise InputError(
@@ -78,7 +77,11 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
             )
     if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
-    work.theta, work.accelerometer = _unfolded(values, each, moves, found, noise), found
+    work.theta, work.accelerometer = _unfolded(values, each, free, found, noise), found
+    for low, high in held:
+        # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
+        pull = values[low:high] / found.gravity if found.gravity else np.zeros(high - low)
+        work.theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
     return doubt
 
 
@@ -171,14 +174,14 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
 def _unfolded(
     values: Floats,
     each: list[list[Wave]],
-    moves: Swinging,
+    free: list[Stretch],
     sensor: Accelerometer,
     noise: float,
 ) -> Floats:
-    """Return the angle of each sample, rad."""
+    """Return the angle of each sample of free swings, rad."""
     most, sense = abs(sensor.gain), math.copysign(1.0, sensor.gain)
     theta = np.arcsin(np.clip(values / most, -1, 1)) * sense
-    for (begin, _), whole in zip(moves.free, each, strict=True):
+    for (begin, _), whole in zip(free, each, strict=True):
         waves = list(whole)
         if waves and waves[0].low > begin + 2:
             # A swing released beyond a quarter turn begins in a dip.
@@ -192,10 +195,6 @@ def _unfolded(
                 inside = values[low : high + 1]
                 folded = np.arcsin(np.clip(np.abs(inside) / wave.top, 0, 1))
                 theta[low : high + 1] = np.sign(inside) * sense * (math.pi - folded)
-    for low, high in moves.held:
-        # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
-        pull = values[low:high] / sensor.gravity if sensor.gravity else np.zeros(high - low)
-        theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
     return np.asarray(theta)
 
 

@@ -112,11 +112,8 @@ def _let_swing(told: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches of free swings that an accelerometer shows."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
-    pieces = [
-        piece
-        for low, high in swinging(time, readings, noise).free
-        for piece in grown(told, (span[0] + low, span[0] + high))
-    ]
+    free, _ = swinging(time, readings, noise)
+    pieces = [piece for low, high in free for piece in grown(told, (span[0] + low, span[0] + high))]
     return [
         (low + let_go(told.time[low:high], told.theta[low:high] - told.middle, noise), high)
         for low, high in pieces

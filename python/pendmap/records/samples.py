@@ -50,8 +50,8 @@ def check(work: Work) -> None:
     if work.made_of is not None:
         # The acceleration is checked: the angle made of it has corners.
         readings = work.extra["acceleration"]
-        moves = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        find_spikes(work, readings, work.made_of.unit, moves.free)
+        free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
+        find_spikes(work, readings, work.made_of.unit, free)
     elif work.integrated:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))

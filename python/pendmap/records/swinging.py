@@ -6,7 +6,6 @@ they are constant, swinging they recur in nearly equal times and do not grow.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -33,16 +32,8 @@ RELEASE_STEP: Final = 2.5  # Fastest changes of a free swing from which a step i
 DECAYED: Final = 0.05  # Swing over the largest below which a motion has decayed
 
 
-@dataclasses.dataclass(frozen=True)
-class Swinging:
-    """Stretches of a record, as first place and the one after the last."""
-
-    free: list[Stretch]  # free swings, in order
-    held: list[Stretch]  # quiet stretches before a release
-
-
-def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
-    """Return where a pendulum swings freely and where it is held, from an acceleration."""
+def swinging(time: Floats, reading: Floats, noise: float) -> tuple[list[Stretch], list[Stretch]]:
+    """Return the free swings and the quiet holds before a release that an acceleration shows."""
     from scipy.ndimage import median_filter
 
     least = max(LEAST_SWING * noise, 1e-12)
@@ -50,7 +41,7 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
     reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
     if crossing.size < FEWEST_HALF_SWINGS:
-        return Swinging([(0, time.size)], [])
+        return [(0, time.size)], []
     period = float(np.median(crossing[2:] - crossing[:-2]))
     quiet = _quiet(time, reading, period, noise)
     largest, free, held = 0.0, list[Stretch](), list[Stretch]()
@@ -67,7 +58,7 @@ def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
         end = _untouched(time[low:high], part, least, small, more=high < time.size)
         held += [stretch for stretch in quiet if stretch[1] == edge]
         free.append((low, low + end))
-    return Swinging(free or [(0, time.size)], held)
+    return free or [(0, time.size)], held
 
 
 def middle_over(time: Floats, reading: Floats, least: float) -> float:
