@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted, moment
+from pendmap.formatting import counted, listed, moment
 from pendmap.records.noise import fastest
 from pendmap.records.resolution import logs_edges, spread_stamps
 from pendmap.signal.local_polynomial import even_weights
@@ -101,7 +101,7 @@ def _stopped(work: Work) -> None:
     own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
     begin, end = edges[stops] + usual * own, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
-    times = ", ".join(moment(work.time[k]) for k in begin[:3]) + (", ..." if begin.size > 3 else "")
+    times = listed([moment(work.time[k]) for k in begin], 3)
     text = (
         f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
         " without a time of their own left out"

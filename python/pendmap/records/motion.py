@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted, moment
+from pendmap.formatting import counted, listed, moment
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.noise import noise_of
@@ -182,15 +182,11 @@ def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
     spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in parts]
     taken = [span for span, use in zip(spans, used, strict=True) if use]
     short = [span for span, use in zip(spans, used, strict=True) if not use]
-
-    def listed(some: list[str]) -> str:
-        return ", ".join(some[:MOST_LISTED]) + (", ..." if len(some) > MOST_LISTED else "")
-
     each = "each taken as a run" if len(taken) > 1 else "one is used"
     # The times are those of the used samples; holds end late rather than early.
-    text = f"{counted(len(parts), 'release')}, used from {listed(taken)}: {each}"
+    text = f"{counted(len(parts), 'release')}, used from {listed(taken, MOST_LISTED)}: {each}"
     if short:
-        text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
+        text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
     low, high = work.releases[0][0], work.releases[-1][1] - 1
     work.say("several-releases", text, span=(float(work.time[low]), float(work.time[high])))
 

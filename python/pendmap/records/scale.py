@@ -20,7 +20,7 @@ from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
 
 
 DEGREE: Final = math.pi / 180
@@ -50,8 +50,19 @@ class Periods:
     @property
     def small(self) -> float:
         """The median period of the smallest third of the swings, s."""
-        third = np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
-        return float(np.median(self.period[third]))
+        return float(np.median(self.period[self._smallest]))
+
+    @property
+    def smallest(self) -> float:
+        """The period of vanishing swings, s: ``small`` less its growth, below half a turn."""
+        if float(np.min(self.amplitude)) >= math.pi:
+            return self.small
+        growth = _growth(np.minimum(self.amplitude[self._smallest], 3.0))
+        return self.small / float(np.median(growth))
+
+    @property
+    def _smallest(self) -> Indices:
+        return np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
 
 
 def check(work: Work) -> None:
@@ -84,15 +95,7 @@ def small_period(time: Floats, theta: Floats, count: float) -> float:
     found = _periods(time, theta - (middle_of(time, theta) or 0.0), count)
     if found is None or float(np.min(found.amplitude)) >= math.pi:
         return math.nan
-    return _small(found)
-
-
-def _small(found: Periods) -> float:
-    """Return the period of small swings, s, from the smallest ones and their growth."""
-    if float(np.min(found.amplitude)) >= math.pi:
-        return found.small
-    smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
-    return found.small / float(np.median(_growth(np.minimum(smallest, 3.0))))
+    return found.smallest
 
 
 def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
@@ -257,7 +260,7 @@ def _known(work: Work, found: Periods) -> None:
     if "length_m" in known:
         root = math.sqrt(known["length_m"] / known.get("gravity", GRAVITY))
         expected[f"length_m = {known['length_m']:g} m"] = 2 * math.pi * root
-    seen = _small(found)
+    seen = found.smallest
     for said, period in expected.items():
         if abs(seen / period - 1) > UNLIKE_RIG:
             text = f"small swings take {seen:.4g} s, by {said} {period:.4g} s: one of them is wrong"

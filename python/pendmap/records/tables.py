@@ -16,7 +16,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import read_whole
-from pendmap.formatting import counted
+from pendmap.formatting import counted, listed
 from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
 
@@ -274,7 +274,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
         )
     dropped = [k for (k, _), row in zip(lines[first:], rows[first:], strict=True) if not row]
     if dropped and not (findings and len(dropped) == 1):
-        shown = ", ".join(map(str, dropped[:3])) + (", ..." if len(dropped) > 3 else "")
+        shown = listed([str(k) for k in dropped], 3)
         said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
         findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
     order = np.array([k for k, row in enumerate(rows) if row], np.intp)

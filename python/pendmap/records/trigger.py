@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import counted
+from pendmap.formatting import counted, listed
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -104,7 +104,7 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
         return parts
-    times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")
+    times = listed([f"{work.time[k]:.6g}" for k in kept], 6)
     text = f"the trigger's {edge} edge marks {counted(len(kept), 'release')}, at {times} s"
     work.say("trigger-release", text + _bounces(edges.size - len(kept)))
     return motions

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted
+from pendmap.formatting import counted, listed
 from pendmap.records.experiment import Finding, Segment
 
 if TYPE_CHECKING:
@@ -76,8 +76,8 @@ class Work:
         """Add a finding, at samples or over a span of time in s."""
         where = ""
         if at is not None and at.size:
-            shown = ", ".join(str(int(self.rows[k])) for k in at[:3])
-            where = f"{'rows' if at.size > 1 else 'row'} {shown}{', ...' if at.size > 3 else ''}"
+            shown = listed([str(row) for row in self.rows[at[:4]]], 3)
+            where = f"{'rows' if at.size > 1 else 'row'} {shown}"
             span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
         if span is not None and not all(map(math.isfinite, span)):
             span = None
