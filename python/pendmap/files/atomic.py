@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import IO
 
-# Names of the files that the running command has written: an interrupt names them
-COMPLETE: Final[list[str]] = []
+COMPLETE: Final[list[str]] = []  # Files written so far, named by an interrupt
 # Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -34,8 +33,7 @@ STOPS: Final = tuple(
 # Name of a folder in which files are written before they take their places
 _STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
 _OWNER: Final = "owner"  # File in a stage that its run keeps locked while it lives
-# Bytes written on trial after a library failed to write: a full disk refuses them
-_PROBE: Final = 2**20
+_PROBE: Final = 2**20  # Bytes written on trial, which a full disk refuses
 _LEAST: Final = 4096  # Bytes written on trial before anything is computed: one block of most disks
 
 

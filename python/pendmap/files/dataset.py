@@ -17,8 +17,7 @@ from pendmap import ANALYSES
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
-# Version of the layout of the datasets, in their attribute ``format_version``
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 1  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of the files that a result is stored in
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each

@@ -13,8 +13,7 @@ from pendmap.errors import InputError
 from pendmap.files.atomic import read_whole
 
 _LONGEST: Final = 100  # Characters of a line of TOML that a table within a table may take
-# Bytes of the largest TOML file that is read: a thousand runs take a tenth of it
-_MOST_TOML: Final = 2**22
+_MOST_TOML: Final = 2**22  # Bytes of a TOML file at most: a thousand runs take a tenth
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -25,10 +25,8 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-# Relative difference of small-swing periods from which runs are of several rigs
-ONE_RIG: Final = 0.05
-# Readings: fewer shared readings are no copy, fewer remaining readings are no run
-FEWEST_SHARED: Final = 50
+ONE_RIG: Final = 0.05  # Relative difference of small-swing periods that shows several rigs
+FEWEST_SHARED: Final = 50  # Readings of a copy, and of a run without its copies, at least
 LEAST_SHARE: Final = 0.1  # Share of the shorter run: fewer shared readings are no copy
 LEAST_LEVELS: Final = 20  # Sensor steps that shared readings span at least; fewer agree by chance
 AGREEING: Final = 0.99  # Share of shared readings that agree within half a step; 1 % may be edited

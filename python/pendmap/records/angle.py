@@ -22,14 +22,12 @@ WRAPPED_SPAN: Final = 1.01  # Turns that wrapped readings span at most: one turn
 WRAP_JUMP: Final = 0.75  # Turns between neighbours from which a jump is a wrap
 LARGEST_ANGLE: Final = 1e5  # Largest number in rad that can be an angle: ten thousand turns
 MOST_HUGE: Final = 0.5  # Share of larger numbers from which the column is refused
-# Most steps of the circle fit; five are enough from the algebraic circle
-GAUSS_NEWTON_STEPS: Final = 50
+GAUSS_NEWTON_STEPS: Final = 50  # Steps of the circle fit at most; five are enough
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius from which it is reported
 FEWEST_PEAKS: Final = 6  # Readings that show a pattern of turning points at least
 KEEP_PATTERN: Final = 0.9  # Share of the readings that must keep to the pattern
 PEAK_RISE: Final = 0.02  # Relative rise from one amplitude to the next that reading errors explain
-# Relative change from one interval to the next that periods show at most
-PERIOD_CHANGE: Final = 0.15
+PERIOD_CHANGE: Final = 0.15  # Relative change between neighbouring periods at most
 CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which they are those of a clock
 
 
@@ -150,7 +148,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
     if not size or not math.isfinite(size):
         raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
-    a, b, radius = _algebraic(u, v)
+    # Kasa's circle, by least squares of u^2 + v^2, is the start.
+    columns = np.column_stack([u, v, np.ones(u.size)])
+    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
+    a, b = float(solution[0]) / 2, float(solution[1]) / 2
+    radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
     kept = np.ones(u.size, bool)
     for _ in range(2):
         a, b, radius, error, rms = _geometric(u[kept], v[kept], a, b, radius)
@@ -178,14 +180,6 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
             " arc is short"
         )
         work.say("circle-uncertain", text)
-
-
-def _algebraic(u: Floats, v: Floats) -> tuple[float, float, float]:
-    """Return centre and radius of Kasa's circle: least squares of u^2 + v^2."""
-    columns = np.column_stack([u, v, np.ones(u.size)])
-    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
-    a, b = solution[0] / 2, solution[1] / 2
-    return float(a), float(b), math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
 
 
 def _geometric(

@@ -28,8 +28,7 @@ _MOST_NAMED: Final = 8  # Columns that a message lists at most
 # Channels from which an angle can be made
 ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
 POSITION_NAME: Final = "pos(ition)?"
-# Correlation, lines removed, from which a position is the integral of the velocity
-POSITION_AGREES: Final = 0.9
+POSITION_AGREES: Final = 0.9  # Correlation that makes a position the integral of a velocity
 MOTOR_NAMES: Final = re.compile(
     r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
 )

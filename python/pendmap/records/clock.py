@@ -27,24 +27,19 @@ if TYPE_CHECKING:
 
 
 RESTART: Final = 10  # Intervals that a restarted clock falls back by; samples that each part has
-# Spread of the intervals over their median from which jitter is reported
-REPORTED_JITTER: Final = 0.02
+REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals from which jitter is reported
 MOST_UNORDERED: Final = 0.3  # Share of unordered stamps from which the record is refused
-# Readings with one stamp, besides ten times the usual, that stop a clock
-STOPPED_READINGS: Final = 50
-# Share of repeated stamps from which the clock is coarser than the sampling
-COARSE_STAMPS: Final = 0.2
+STOPPED_READINGS: Final = 50  # Readings with one stamp that stop a clock, and 10 times the usual
+COARSE_STAMPS: Final = 0.2  # Share of repeated stamps that makes a clock coarse
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
 # Seconds after which counters of 16 and 32 bits in us, ms or s wrap
 COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
 SLIP_DEGREE: Final = 7  # Degree of the polynomials that slips are seen with
-# Radians of phase to either side that such a polynomial follows within 6e-3
-SLIP_PHASE: Final = 2.0
+SLIP_PHASE: Final = 2.0  # Radians of phase to either side that it follows within 6e-3
 SHORTEST_SIDE: Final = 8  # Samples to either side of a slip at least, to know both velocities
 LONGEST_SIDE: Final = 150  # Samples to either side of a slip at most
 FEWEST_SLIPS: Final = 3  # Slips of one size that make it a fault of the clock
-# Standard errors of a slip in each pass; large slips hide small ones beside them
-CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)
+CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)  # Standard errors of a slip in each pass
 MOST_INTERVALS: Final = 4  # Intervals of the longest slip
 SLOW_POWER: Final = 1e-3  # Power over its median below which the motion is too slow to show a slip
 OFF_INTERVAL: Final = 0.25  # Intervals by which a slip may miss a whole number

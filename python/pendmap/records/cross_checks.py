@@ -29,19 +29,16 @@ if TYPE_CHECKING:
 
 
 SAME_MOTION: Final = 0.8  # Correlation from which two channels show the same motion
-# Relative error that a gain of 1 may have: filtered channels miss a few per cent
-GAIN_OFF: Final = 0.1
+GAIN_OFF: Final = 0.1  # Relative error of a gain that the filter of a channel may cause
 CERTAIN_SIGN: Final = 8.0  # Standard errors from which a coefficient has the wrong sign
-# Largest span of a pivot in a laboratory, by unit
-FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}
+FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Largest span
 DERIVATIVE_SPAN: Final = 0.12  # Periods over which derivatives are taken
 # Why an acceleration beside an angle is not used
 CHECK_ONLY: Final = "a check, not fitted: the angle is"
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Derivatives from a unit of the pivot to an acceleration
 NOISE_SHARE: Final = 0.05  # Noise of the pivot's acceleration over its largest value, at most
 STEPS_PASSED: Final = 4.0  # Steps that a moving pivot passes within a window at least
-# Seconds that a window spans at most, unless it then holds only five readings
-LONGEST_WINDOW: Final = 0.2
+LONGEST_WINDOW: Final = 0.2  # Seconds of a window of more than five readings at most
 MOVING_SHARE: Final = 0.2  # Speed over the largest from which the pivot moves
 
 

@@ -26,17 +26,14 @@ if TYPE_CHECKING:
 
 FEWEST_HALF_SWINGS: Final = 4  # Half swings from which a period is taken
 CERTAIN_DIP: Final = 0.3  # Relative dip that noise cannot cause
-# Reading over the largest of a swing from which place or unit are wrong
-LARGEST_READING: Final = 1.15
+LARGEST_READING: Final = 1.15  # Reading over the largest of a swing: place or unit is wrong
 ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-# Relative distance from the centre of oscillation at which no swing is seen
-BLIND_SPOT: Final = 0.05
+BLIND_SPOT: Final = 0.05  # Relative distance from the centre of oscillation that shows no swing
 WEAK_SPOT: Final = 0.2  # Relative distance from it within which a swing is seen weakly
 QUARTER_TURN_PERIOD: Final = 1.18  # Period of a swing of a quarter turn over that of a small one
 LEAST_DIP: Final = 0.01  # Relative dip between two humps at least
 DIP_NOISE: Final = 4.0  # Standard errors of a dip at least
-# Hump over the largest reading of a swing beside a dip: there the sine is 1
-LEAST_HUMP: Final = 0.75
+LEAST_HUMP: Final = 0.75  # Hump beside a dip over the largest reading, there the sine is 1
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:

@@ -21,11 +21,9 @@ if TYPE_CHECKING:
 
 
 SPEED_REACH: Final = 0.7  # Radians of phase to either side from which a speed is taken
-# Standard deviations from the median of five from which it replaces a reading
-FALSE_READING: Final = 8.0
+FALSE_READING: Final = 8.0  # Standard deviations from the median of five that replace a reading
 CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` from which it is reported
-# ``(tau v)^2`` at the quickest over ``still^2`` from which it is reported
-LEAST_GROWTH: Final = 0.1
+LEAST_GROWTH: Final = 0.1  # Reported ``(tau v)^2`` at the quickest over ``still^2``
 DITHERED: Final = 0.55  # Noise over count below which slow readings do not show the noise
 FEWEST_RESIDUALS: Final = 200  # Residuals from which two numbers are fitted
 ROUNDS: Final = 30

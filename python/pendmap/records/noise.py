@@ -34,20 +34,17 @@ if TYPE_CHECKING:
     from pendmap.signal.local_polynomial import LocalFit
 
 
-# Radians of phase between samples from which quartics leave some motion
-SLOW_SAMPLING: Final = 0.06
+SLOW_SAMPLING: Final = 0.06  # Radians of phase between samples that quartics do not follow
 WAY_PHASE: Final = 0.25  # Radians of phase over which a way is measured, if longer than an interval
 DITHERED: Final = 0.55  # Noise over count above which neighbouring readings err independently
 CLEAR_WAY: Final = 4  # Counts of way from which a speed is taken
-# Radians of phase between samples from which all polynomials leave some motion
-TOO_FEW: Final = 0.3
+TOO_FEW: Final = 0.3  # Radians of phase between samples that no polynomial follows
 SPEED_RANGES: Final = 4  # Ranges of speed with equally many samples
 OUTLIER: Final = 8.0  # Standard deviations from which a residual is an outlier
 FEWEST_RESIDUALS: Final = 40  # Residuals from which a standard deviation is taken
 OUTLIER_RANGES: Final = 16  # Ranges of speed, with equally many samples, with outliers of their own
 CLEARLY_LESS: Final = 1.02  # Ratio of two noise readings from which one is less
-# Degree and samples of the polynomials in the order in which they are tried
-DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
+DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))  # Degrees and samples, as tried
 FARTHEST: Final = 0.25  # Radians of phase between samples that coarse counts move apart, at most
 MORE_STRIDES: Final = 4  # Strides beyond the shortest that are read too
 STIFF_STRIDE: Final = 2.0  # Factor by which samples of the highest degree may be farther apart

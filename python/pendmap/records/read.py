@@ -221,7 +221,6 @@ def _runs(  # noqa: C901 (a step each)
     if moves and work.made_of is None:
         scale.check(work)
     samples.say_steps(work)
-    resolution.say_edges(work)
     if moves:
         motion.check(work)
         trigger.check_drive(work)

@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 
 RELEASE_RISE: Final = 0.1  # Growth of a swing over the largest that only a hand causes
 HELD_LONGER: Final = 1.5  # Delay over that of a release from rest from which a hold is seen
-# Sine of an angle below which a pendulum leaves too slowly to show a hold
-NEAR_UPRIGHT: Final = 0.05
-# Periods before a motion between which a hold is searched
-HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))
+NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to see
+HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))  # Periods before a motion
 FEWEST_HELD: Final = 10  # Samples of a hold from which quiet is judged
 FEWEST_HALF_CYCLES: Final = 5  # Half cycles from which a release is a run: three swings from a hand
 HAND_SHARE: Final = 0.3  # Torque over the greatest restoring torque nearby that only a hand adds

@@ -27,12 +27,9 @@ NYQUIST: Final = 2.0  # Readings in a period of the drive that resolve it at lea
 GAIN_KNOWN: Final = 0.1  # Half of the 95 % interval of the gain from which it is reported
 LEAST_USED: Final = 0.1  # Share of the readings in motion that a fit uses without a warning
 RESTING: Final = ("held", "rest")  # Segments without motion
-# Root mean square distance from multiples of a step that shows it; 0.29 is chance
-ON_STEPS: Final = 0.12
-# Standard deviations of noise before the rounding, in counts
-SPREADS: Final = np.geomspace(0.02, 1.0, 80)
-# Places of the angle between the edges of its count, in counts
-PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5
+ON_STEPS: Final = 0.12  # Root mean square distance from multiples of a step; chance gives 0.29
+SPREADS: Final = np.geomspace(0.02, 1.0, 80)  # Noise before rounding, in counts
+PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5  # Places of the angle in a count
 MOST_COUNTS: Final = 9  # Counts that readings at rest show at most
 REST_PARTS: Final = 4  # Parts of a record at rest whose means agree
 REST_DRIFT: Final = 4.0  # Standard errors by which such means may differ
@@ -171,14 +168,3 @@ def put_on_edges(work: Work) -> None:
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
         work.theta -= 0.5 * work.seen * np.append(way[0], way)
         work.trusted[0] = False  # it may be what stood there as the log began
-
-
-def say_edges(work: Work) -> None:
-    """Report that the readings are edges, once their unit is certain."""
-    if work.edges:
-        text = (
-            f"an encoder of {2 * math.pi / work.seen:.5g} counts a turn writes a line at each edge:"
-            f" the angles are those of {counted(work.theta.size, 'edge')}, their errors those of"
-            " the stamps; none is missing between two of them"
-        )
-        work.say("edges-logged", text, mended=True)

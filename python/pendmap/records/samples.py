@@ -37,8 +37,7 @@ VANISHED: Final = 0.1  # Differences between readings over those across from whi
 FEWEST_SAMPLES: Final = 200  # Samples from which interpolation is searched
 INTERVALS: Final = 60  # Intervals between readings that are examined
 READINGS_A_PERIOD: Final = 5.0  # Readings a period at least; fewer confuse phases with places
-# Noise of neighbours over the most at any spacing that interpolation leaves
-SMOOTH_NEIGHBOURS: Final = 0.3
+SMOOTH_NEIGHBOURS: Final = 0.3  # Noise of neighbours over the most that interpolation leaves
 INDEPENDENT: Final = 0.7  # Noise over the most at any spacing from which readings are independent
 DIGITS: Final = 3e-6  # Noise over the span below which it is that of digits
 FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic from which motion is left
@@ -76,17 +75,25 @@ def _count(work: Work) -> float:
 
 
 def say_steps(work: Work) -> None:
-    """Report the step of the readings, once their unit is certain."""
-    if work.integrated or work.edges:
-        return  # an integral has none; of edges they are said already
+    """Report the step of the readings, or that they are edges, once their unit is certain."""
+    if work.integrated:
+        return  # an integral has no steps
+    turn = f"{2 * math.pi / (work.seen or math.inf):.5g}"
+    if work.edges:
+        text = (
+            f"an encoder of {turn} counts a turn writes a line at each edge: the angles are those"
+            f" of {counted(work.theta.size, 'edge')}, their errors those of the stamps; none is"
+            " missing between two of them"
+        )
+        work.say("edges-logged", text, mended=True)
+        return
     counts, seen = work.known.get("encoder_counts"), work.seen
     work.count = _count(work)
     text = f"the readings come in steps of {seen:.4g} rad"
-    turn = f"{2 * math.pi / (seen or math.inf):.5g} a turn"
     if counts is None and seen > FINEST:
-        work.say("counts-seen", f"{text} ({turn})")
+        work.say("counts-seen", f"{text} ({turn} a turn)")
     elif counts is not None and work.count == seen > 3 * math.pi / float(counts):
-        work.say("counts-differ", f"{text}, {turn}: encoder_counts says {counts}")
+        work.say("counts-differ", f"{text}, {turn} a turn: encoder_counts says {counts}")
 
 
 def _clipped(work: Work, unit: str) -> None:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 LEAST_SWING: Final = 5.0  # Standard errors below which a reading is no swing
 STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
 STILL_SCATTER: Final = 1.5  # Noise by which half a period may scatter without motion
-# Scatter of a whole period over its distance from the middle in a trembling hold
-STEADY_HOLD: Final = 0.1
+STEADY_HOLD: Final = 0.1  # Scatter of a trembling hold over its distance from the middle
 FEWEST_QUIET: Final = 10  # Samples of half a period from which quiet is judged
 FEWEST_HALF_SWINGS: Final = 3  # Half swings that are more than a hand on its way
 UNEVEN: Final = 0.15  # Relative difference in time of half swings of one side, at most

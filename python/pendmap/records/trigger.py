@@ -16,13 +16,11 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Stretch
 
 BETWEEN_LEVELS: Final = 0.02  # Share of the samples between two levels at most
-# Distance from the threshold over that of the levels within which noise is no edge
-DEAD_BAND: Final = 0.2
+DEAD_BAND: Final = 0.2  # Distance from the threshold over that of the levels, without edges
 RELEASES_APART: Final = 3.0  # Periods of small swings between releases at least
 BOUNCE: Final = 0.3  # Drive periods within which a second edge is a bounce
 FEWEST_EDGES: Final = 4  # Edges from which the frequency of a drive is taken
-# Periods by which edges of a drive miss its beat, rms, besides the sampling
-UNEVEN_EDGES: Final = 0.1
+UNEVEN_EDGES: Final = 0.1  # Periods by which edges of a drive miss its beat, rms
 DIFFERENT: Final = 3.0  # Standard errors from which a given frequency or phase is another
 
 

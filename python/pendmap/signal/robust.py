@@ -13,14 +13,10 @@ if TYPE_CHECKING:
 
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
-# Intervals in ticks from which samples are missing; one lost sample makes 2
-LONG_INTERVAL: Final = 1.6
-# Robust scatter of intervals in ticks from which one long interval is no gap
-SCATTERED_STAMPS: Final = 0.1
-# Stamps on each side whose means tell a lost sample from a stamp that is off
-STAMPS_BESIDE: Final = 8
-# Standard deviations of such means from which a step of the clock is a gap
-CERTAIN_GAP: Final = 4.0
+LONG_INTERVAL: Final = 1.6  # Ticks of an interval from which samples are missing
+SCATTERED_STAMPS: Final = 0.1  # Robust scatter of intervals, in ticks, that hides a gap
+STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared
+CERTAIN_GAP: Final = 4.0  # Standard deviations of a step of these means that is a gap
 
 
 def normal_scale(values: Floats) -> float:
