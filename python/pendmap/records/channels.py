@@ -94,7 +94,8 @@ def channels_of(  # noqa: C901 (a step each)
         time=time,
         theta=values.pop("angle", np.zeros(time.size)),
         rows=table.rows.copy(),
-        extra=values | pivot,
+        extra=values,
+        pivot=pivot,
         trusted=np.ones(time.size, bool),
         findings=[*table.findings, *findings],
         columns=heads,
@@ -183,13 +184,14 @@ def _pivot(
     if plan.pivot is None:
         return {}, None, []
     unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
-    ways = [way for way in ("vertical", "horizontal") if way in plan.pivot]
-    places = [_place(plan.pivot[way], table, f"{where}: pivot: {way}") for way in ways]
-    found = {
-        f"pivot:{way}": np.asarray(table.values[:, place] * factor * plan.pivot_scale)
-        for way, place in zip(ways, places, strict=True)
+    places = {
+        way: _place(plan.pivot[way], table, f"{where}: pivot: {way}")
+        for way in ("vertical", "horizontal")
+        if way in plan.pivot
     }
-    return found, unit, places
+    scale = plan.pivot_scale
+    found = {way: table.values[:, place] * factor * scale for way, place in places.items()}
+    return found, unit, list(places.values())
 
 
 def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:

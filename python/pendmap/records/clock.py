@@ -156,7 +156,7 @@ def _coarse(work: Work) -> None:
         text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
         work.say("time-coarse", text, mended=True)
         return
-    rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
+    rows = np.diff(np.stack([work.theta, *work.extra.values(), *work.pivot.values()]), axis=1)
     repeated = np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9  # samples and stamps
     if same < COARSE_STAMPS or repeated:
         return

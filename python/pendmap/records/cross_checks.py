@@ -50,7 +50,7 @@ def check(work: Work) -> None:
         _acceleration(work)
     if work.plan.kind != "forced":
         return
-    for way, values in (work.pivot() or {}).items():
+    for way, values in work.pivot.items():
         good = values[np.isfinite(values)]
         span = float(np.ptp(good)) if good.size else 0.0
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
@@ -150,7 +150,7 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
     if p and phi is not None:
         found["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
-    for way, values in (work.pivot() or {}).items():
+    for way, values in work.pivot.items():
         good = np.isfinite(values)
         if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
             continue
@@ -309,16 +309,16 @@ def _unplaced(work: Work, motion: _Motion) -> None:
 def smooth_pivot(work: Work) -> None:
     """Replace places or speeds of the pivot that come in steps by smooth accelerations."""
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
-    motion = work.pivot() or {}
-    if not order or work.time.size < 20 or not all(np.isfinite(v).all() for v in motion.values()):
+    known = all(np.isfinite(values).all() for values in work.pivot.values())
+    if not order or work.time.size < 20 or not known:
         return
     interval, even = even_times(work.time)
     if not even.size:
         return
-    places = {way: np.interp(even, work.time, values) for way, values in motion.items()}
+    places = {way: np.interp(even, work.time, values) for way, values in work.pivot.items()}
     windows = [
         _cubic_window(places[way], step_of(values), order, interval)
-        for way, values in motion.items()
+        for way, values in work.pivot.items()
         if np.ptp(values) > 0
     ]
     if not windows or max(windows) < 7:
@@ -327,7 +327,7 @@ def smooth_pivot(work: Work) -> None:
 
     for way, values in places.items():
         pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
-        work.extra[f"pivot:{way}"] = np.interp(work.time, even, pushed)
+        work.pivot[way] = np.interp(work.time, even, pushed)
     what = "places" if order == 2 else "speeds"
     text = (
         f"the pivot's {what} come in steps: its acceleration is that of cubics through"

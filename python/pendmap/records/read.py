@@ -259,7 +259,7 @@ def _run(work: Work, name: str, digest: str) -> Run:
         accelerometer=work.made_of,
         gyroscope=gyroscope,
         drive=plan.drive,
-        pivot=work.pivot(),
+        pivot=work.pivot or None,
         pivot_unit=work.pivot_unit,
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
         peaks_only=work.peaks_only,

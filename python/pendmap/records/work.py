@@ -36,7 +36,8 @@ class Work:
     time: Floats
     theta: Floats
     rows: Indices  # lines of the file
-    extra: dict[str, Floats]  # further channels; the pivot's as pivot:vertical, pivot:horizontal
+    extra: dict[str, Floats]  # further channels
+    pivot: dict[str, Floats]  # recorded motion of the pivot by direction
     trusted: Mask
     findings: list[Finding]
     columns: Mapping[str, str]  # the heading of each channel
@@ -89,6 +90,7 @@ class Work:
         self.time, self.theta = self.time[which], self.theta[which]
         self.rows, self.trusted = self.rows[which], self.trusted[which]
         self.extra = {name: values[which] for name, values in self.extra.items()}
+        self.pivot = {way: values[which] for way, values in self.pivot.items()}
 
     def leave_out(self, which: Mask, what: str, noun: str, why: str) -> None:
         """Leave out samples, if any, and report how many and why."""
@@ -148,15 +150,6 @@ class Work:
                 f"{self.where}: must have {least} samples or more with time and angle, got"
                 f" {counted(self.time.size, 'sample')}"
             )
-
-    def pivot(self) -> dict[str, Floats] | None:
-        """Return the pivot's recorded motion by direction, or None."""
-        found = {
-            name.removeprefix("pivot:"): values
-            for name, values in self.extra.items()
-            if name.startswith("pivot:")
-        }
-        return found or None
 
 
 def _within(low: float | None, high: float | None, begin: float, end: float) -> bool:
