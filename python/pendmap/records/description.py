@@ -153,35 +153,21 @@ def _number(name: str, value: object) -> float:
     return number
 
 
-def _positive(name: str, value: object) -> float:
-    number = _number(name, value)
-    if number < 1 / _LARGEST:
-        raise InputError(f"{name} must be more than 0, at least {1 / _LARGEST:g}, got {number:g}")
-    return number
+def _number_that(allowed: Callable[[float], bool], wanted: str) -> Callable[[str, object], float]:
+    """Return the check of a number that is allowed."""
+
+    def check(name: str, value: object) -> float:
+        number = _number(name, value)
+        if not allowed(number):
+            raise InputError(f"{name} must be {wanted}, got {number:g}")
+        return number
+
+    return check
 
 
-def _scale(name: str, value: object) -> float:
-    scale = _number(name, value)
-    if scale == 0:
-        raise InputError(f"{name} must be any number but 0, got 0")
-    return scale
-
-
-def _sign(name: str, value: object) -> float:
-    sign = _number(name, value)
-    if abs(sign) != 1:
-        raise InputError(f"{name} must be 1 or -1, got {sign:g}")
-    return sign
-
-
-def _distance(name: str, value: object) -> float:
-    distance = check_number(name, value)
-    if not 0 < distance <= _FARTHEST:
-        raise InputError(
-            f"{name} must be more than 0, up to {_FARTHEST:g}, from the pivot to the sensor in m,"
-            f" got {distance:g}"
-        )
-    return distance
+_positive = _number_that(
+    lambda number: number >= 1 / _LARGEST, f"more than 0, at least {1 / _LARGEST:g}"
+)
 
 
 def _text(name: str, value: object) -> str:
@@ -242,11 +228,19 @@ _RIG: Final[Checks] = {
     "encoder_counts": lambda name, value: check_whole(name, value, 1, _MOST_COUNTS),
     **dict.fromkeys(("max_angle", "max_velocity", "max_frequency"), _positive),
 }
-_COLUMN: Final[Checks] = {"name": _text, "unit": _text, "scale": _scale, "zero": _number}
+_COLUMN: Final[Checks] = {
+    "name": _text,
+    "unit": _text,
+    "scale": _number_that(lambda number: number != 0, "any number but 0"),
+    "zero": _number,
+}
 _COLUMNS: Final[Mapping[str, Checks]] = {
     "acceleration": {
         "direction": _one_of("tangential", "radial", "angular"),
-        "distance_m": _distance,
+        "distance_m": _number_that(
+            lambda number: 0 < number <= _FARTHEST,
+            f"more than 0, up to {_FARTHEST:g}, from the pivot to the sensor in m",
+        ),
         "gravity_removed": check_flag,
     },
     "trigger": {"edge": _one_of("rising", "falling"), "phase": _number},
@@ -268,7 +262,7 @@ _PIVOT: Final[Checks] = {
     **dict.fromkeys(("vertical", "horizontal"), _text),
     "unit": _one_of(*PIVOT_UNITS),
     "scale": _positive,
-    "sign": _sign,
+    "sign": _number_that(lambda number: abs(number) == 1, "1 or -1"),
 }
 
 
