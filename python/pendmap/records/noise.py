@@ -28,6 +28,8 @@ from pendmap.signal.local_polynomial import LocalFit, local_fit
 from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pendmap.records.experiment import Run
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
@@ -161,16 +163,21 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
     swing, phase = fastest(time, theta, count)
     slow = swing * interval > SLOW_SAMPLING
     speed = speed_of(time, theta, phase)
-    first = clean(local_fit(time, theta), bad, speed)
+
+    def fitted(degree: int = 4, points: int = 9, stride: int = 1) -> LocalFit:
+        fit = local_fit(time, theta, degree=degree, points=points, stride=stride)
+        return clean(fit, bad, speed)
+
+    first = fitted()
     if first.middle.size < FEWEST_RESIDUALS:
         return None
-    fit = followed(time, theta, bad, speed, first) if slow else first
-    next_fit = clean(local_fit(time, theta, degree=6, points=11), bad, speed)
+    fit = followed(fitted, first) if slow else first
+    next_fit = fitted(degree=6, points=11)
     enough = next_fit.middle.size >= FEWEST_RESIDUALS
     colour = first.rms / max(next_fit.rms, 1e-300) if enough else 1.0
     least, slowest, law = count / math.sqrt(12), 0.0, None
     if count and fit.rms < DITHERED * count:
-        far = apart(time, theta, bad, speed, count, interval, swing, fit if slow else None)
+        far = apart(fitted, count, interval, swing, fit if slow else None)
         if far is None:
             still = still_noise(theta if bad.all() else theta[~bad], count)
             if still is not None:
@@ -274,26 +281,24 @@ def _near(marked: Mask, reach: int) -> Mask:
 
 def less(fit: LocalFit, other: LocalFit) -> bool:
     """Return whether a fit's residual is significantly less than another's."""
-    enough = CLEARLY_LESS + 2 * fit.stderr / max(fit.rms, 1e-300)
-    return fit.middle.size >= FEWEST_RESIDUALS and other.rms > enough * fit.rms
+    if fit.middle.size < FEWEST_RESIDUALS:
+        return False
+    return other.rms > (CLEARLY_LESS + 2 * fit.stderr / max(fit.rms, 1e-300)) * fit.rms
 
 
-def followed(time: Floats, theta: Floats, bad: Mask, speed: Floats, first: LocalFit) -> LocalFit:
+def followed(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
     """Return the fit of the lowest degree above which no degree leaves less."""
     chosen = first
     for degree, points in DEGREES[1:]:
-        higher = clean(local_fit(time, theta, degree=degree, points=points), bad, speed)
-        if higher.middle.size < FEWEST_RESIDUALS or not less(higher, chosen):
+        higher = fitted(degree=degree, points=points)
+        if not less(higher, chosen):
             break
         chosen = higher
     return chosen
 
 
-def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
-    time: Floats,
-    theta: Floats,
-    bad: Mask,
-    speed: Floats,
+def apart(
+    fitted: Callable[..., LocalFit],
     count: float,
     interval: float,
     swing: float,
@@ -308,7 +313,7 @@ def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     while True:
         # Neighbours of slower motion are within a count and have equal errors.
         slowest = count / (stride * interval)
-        fit = clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad, speed)
+        fit = fitted(degree=6, points=11, stride=stride)
         if stride == 1 and nearest is not None and less(nearest, fit):
             fit = nearest
         quick = np.abs(fit.slope) >= slowest
@@ -321,8 +326,7 @@ def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     farthest = max(int(STIFF_STRIDE * FARTHEST / (swing * interval)), 1)
     for longer in range(stride + 1, min(stride + MORE_STRIDES, farthest) + 1):
         degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
-        more = local_fit(time, theta, degree=degree, points=points, stride=longer)
-        more = clean(more, bad, speed)
+        more = fitted(degree=degree, points=points, stride=longer)
         found.append(more.only(np.abs(more.slope) >= slowest))
     middle, residual, slope = (
         np.concatenate([getattr(each, name) for each in found])
