@@ -21,7 +21,6 @@ from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
     import pandas as pd
@@ -259,11 +258,17 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     # A line that is too long is left out as unreadable.
     lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
     delimiter, decimal, width = _way(lines, reader, where)
-    rows = [_row(line, delimiter, decimal, width) for _, line in lines]
-    first = next(k for k, row in enumerate(rows) if row)
+    cells, fits = list[str](), list[bool]()
+    for _, line in lines:
+        row = _row(line, delimiter, decimal, width)
+        fits.append(row is not None)
+        cells += row or ()
+    columns = [cells[k::width] for k in range(width)]
+    first = fits.index(True)
     findings = []
-    if rows[-1] and not text.endswith(("\n", "\r")) and _cut(rows):
-        rows[-1] = None
+    if fits[-1] and not text.endswith(("\n", "\r")) and _cut(columns[-1][-21:]):
+        fits[-1] = False
+        columns = [column[:-1] for column in columns]
         text = "the last line breaks off and is left out"
         findings.append(Finding("half-line", text, mended=True))
     names, headed = _header([line for _, line in lines[:first]], delimiter, width)
@@ -272,18 +277,18 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
             f"{where}: as many columns must have names as numbers, got {len(names)} with names and"
             f" {width} with numbers; decimal commas need another delimiter, like ;"
         )
-    dropped = [k for (k, _), row in zip(lines[first:], rows[first:], strict=True) if not row]
+    dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
     if dropped and not (findings and len(dropped) == 1):
         shown = listed([str(k) for k in dropped], 3)
         said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
         findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
-    order = np.array([k for k, row in enumerate(rows) if row], np.intp)
-    numbers = [_numbers(column, decimal) for column in zip(*filter(None, rows), strict=True)]
+    order = np.flatnonzero(fits)
+    numbers = [_numbers(column, decimal) for column in columns]
     places = np.array([lines[k][0] for k in order])
     return Table(names, np.column_stack(numbers), places, tuple(findings), headed, order - first)
 
 
-def _numbers(column: Sequence[str], decimal: str) -> Floats:
+def _numbers(column: list[str], decimal: str) -> Floats:
     """Return the numbers of a column; NaN for anything else."""
     import pandas as pd
 
@@ -378,10 +383,9 @@ def _row(line: str, delimiter: str, decimal: str, width: int) -> list[str] | Non
     return parts if len(parts) == width and _is_row(parts, decimal) else None
 
 
-def _cut(rows: list[list[str] | None]) -> bool:
-    """Return whether a last row has fewer digits than all of twenty before it."""
-    ends = [row[-1].replace(",", ".") for row in rows[-21:] if row]
-    *before, last = (len(end.partition(".")[2]) for end in ends)
+def _cut(cells: list[str]) -> bool:
+    """Return whether the last cell has fewer decimals than all before it."""
+    *before, last = (len(cell.replace(",", ".").partition(".")[2]) for cell in cells)
     return len(set(before)) == 1 and last < before[0]
 
 
