@@ -138,7 +138,7 @@ def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
 
 
 def test_files_of_phyphox(tmp_path: Path) -> None:
-    """As phyphox writes them: three axes, with gravity, or without as "Linear Acceleration"."""
+    """Files of phyphox: three axes, with gravity, or without as "Linear Acceleration"."""
     for heading, gravity in (("Acceleration", GRAVITY), ("Linear Acceleration", 0.0)):
         time, _, across = readings(distance=0.3, gravity=gravity)
         _, _, along = readings("radial", distance=0.3, gravity=gravity, seed=1)

@@ -48,7 +48,7 @@ def _is_tables(value: object) -> bool:
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> str:
-    """Return one ``[[name]]``; tables too long for a line follow as tables of their own."""
+    """Return one ``[[name]]``; tables too long for a line follow as separate tables."""
     lines, further = [f"[[{name}]]\n"], []
     for key, value in table.items():
         line = f"{_value({key: value})[2:-2]}\n"

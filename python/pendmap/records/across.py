@@ -1,4 +1,4 @@
-"""What the runs of an experiment show together: copied readings and unlike rigs.
+"""Checks across the runs of an experiment: copied readings and unlike rigs.
 
 Readings are copied where consecutive readings equal those of another run up to a factor and a zero,
 within the written digits. Two recordings of one motion differ by their noise.

@@ -99,7 +99,7 @@ def _stopped(work: Work) -> None:
     times = listed([moment(work.time[k]) for k in begin], 3)
     text = (
         f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
-        " without a time of their own left out"
+        " without own times left out"
     )
     work.say("time-stops", text, mended=True, at=begin)
     work.keep(np.delete(np.arange(work.time.size), out))

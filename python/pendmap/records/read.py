@@ -73,7 +73,7 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
 
     A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
     decay. A folder is an experiment with an ``experiment.toml``; without it each file is a free
-    decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
+    decay. Each free release of a file is one run, named ``decay 1/3``. Nothing is written.
     Each fault is a finding under a stable key. Data are corrected only where the correction is
     unambiguous: wrapped turns are unwrapped, milliseconds become seconds. ``Run.trusted`` marks the
     samples for fitting.

@@ -1,6 +1,6 @@
 """Half cycles of a record, without errors, for checks.
 
-The methods of identification have peaks and crossings of their own, with standard errors.
+The methods of identification have other peaks and crossings, with standard errors.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
 
 
 def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Return residual over its gain, and slope, of windows (M, points) of their own spacing."""
+    """Return residual over its gain, and slope, of uneven windows, shape (M, points)."""
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]
@@ -283,7 +283,7 @@ def _evenly(time: Floats, step: float, reach: int) -> Mask:
 def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
     time: Floats, theta: Floats, at: Indices, width: int, scale: float, degree: int
 ) -> tuple[Floats, Floats]:
-    """Return slopes and their errors at some samples, each from a window of its own spacing."""
+    """Return slopes and their errors at some samples, each from an uneven window."""
     # The first and the last whole window serve the ends.
     first = np.clip(at - width // 2, 0, time.size - width)
     within = first[:, None] + np.arange(width)
