@@ -35,6 +35,11 @@ def counted(count: int, noun: str, several: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {several or noun + 's'}"
 
 
+def listed(texts: Sequence[str], most: int) -> str:
+    """Return the first ``most`` of some texts, ``1, 2, 3, ...`` where there are more."""
+    return ", ".join(texts[:most]) + (", ..." if len(texts) > most else "")
+
+
 def percent(value: float) -> str:
     """Return ``0.123 %``; empty where a value is not finite."""
     return f"{value:.3g} %" if math.isfinite(value) else ""

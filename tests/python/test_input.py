@@ -1,4 +1,4 @@
-"""What Python callers hand over: refused by name, or taken as it was meant."""
+"""Arguments of Python callers: refused by name, or taken as they were meant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The acceleration channel: what it needs, how it is refused, what is said beside an angle."""
+"""The acceleration channel: what it needs, how it is refused, what is reported beside an angle."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_what_is_missing_or_wrong_is_named(tmp_path: Path, place: str, refused: 
     assert "\n" not in str(error.value)
 
 
-def test_a_place_belongs_to_an_acceleration_alone(tmp_path: Path) -> None:
+def test_only_an_acceleration_has_a_place(tmp_path: Path) -> None:
     time, theta, _ = readings(seconds=20)
     there = experiment(tmp_path, "", time, theta, names="t_s,theta_rad")
     text = (there / "experiment.toml").read_text(encoding="utf-8")
@@ -103,9 +103,9 @@ def test_a_wrong_unit_is_told_by_readings_that_no_swing_has(tmp_path: Path) -> N
         read(experiment(tmp_path, column(PLACE % 0.1, "g"), time, force))
 
 
-def test_the_centre_of_oscillation_sees_nothing(tmp_path: Path) -> None:
+def test_the_centre_of_oscillation_is_refused(tmp_path: Path) -> None:
     time, _, force = readings(distance=CENTRE)
-    with pytest.raises(InputError, match="nothing but damping is felt there"):
+    with pytest.raises(InputError, match="only damping is measured there"):
         read(experiment(tmp_path, column(PLACE % CENTRE), time, force))
     near = 0.85 * CENTRE
     time, _, force = readings(distance=near)
@@ -117,7 +117,7 @@ def test_the_centre_of_oscillation_sees_nothing(tmp_path: Path) -> None:
     assert float(percent[1]) == pytest.approx(0.1 / (CENTRE - near), rel=0.1)
 
 
-def test_a_signal_near_the_noise_is_said(tmp_path: Path) -> None:
+def test_a_signal_near_the_noise_is_reported(tmp_path: Path) -> None:
     time, _, force = readings(release=0.05, friction=0.0, noise=0.03)
     text = said(read(experiment(tmp_path, column(PLACE % 0.1), time, force)))
     assert "times the noise" in text["acceleration-weak"]
@@ -138,7 +138,7 @@ def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
 
 
 def test_files_of_phyphox(tmp_path: Path) -> None:
-    """As phyphox writes them: three axes, with gravity, or without as "Linear Acceleration"."""
+    """Files of phyphox: three axes, with gravity, or without as "Linear Acceleration"."""
     for heading, gravity in (("Acceleration", GRAVITY), ("Linear Acceleration", 0.0)):
         time, _, across = readings(distance=0.3, gravity=gravity)
         _, _, along = readings("radial", distance=0.3, gravity=gravity, seed=1)
@@ -170,7 +170,7 @@ BESIDE = {
 
 
 @pytest.mark.parametrize("case", BESIDE)
-def test_beside_an_angle_it_is_a_check_that_is_said(tmp_path: Path, case: str) -> None:
+def test_beside_an_angle_it_is_a_check_that_is_reported(tmp_path: Path, case: str) -> None:
     place, sign, key, words = BESIDE[case]
     time, theta, force = readings(release=1.2)
     theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)

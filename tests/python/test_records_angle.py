@@ -1,4 +1,4 @@
-"""What is found of the angle, and what a mend gives back."""
+"""Findings about the angle, and the angle after their correction."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_pivot_with_the_right_sign_is_left_alone(tmp_path: Path) -> None:
     assert "sign-turned" not in found(run)
 
 
-def test_a_period_unlike_the_rig_is_said(tmp_path: Path) -> None:
+def test_a_period_unlike_the_rig_is_reported(tmp_path: Path) -> None:
     time, theta = clean()
     description = '[rig]\nw0 = 3.0\n[[run]]\nfile = "a.csv"\n'
     (run,) = experiment(tmp_path, description, a=text((time, theta))).runs
@@ -126,7 +126,7 @@ def test_a_period_unlike_the_rig_is_said(tmp_path: Path) -> None:
     ("rig", "says"),
     [("length_m = 250", "length_m = 250 m"), ("w0 = 6200", "w0 = 6200"), ("length_m = 0.25", "")],
 )
-def test_a_rig_in_other_units_is_said(tmp_path: Path, rig: str, says: str) -> None:
+def test_a_rig_in_other_units_is_reported(tmp_path: Path, rig: str, says: str) -> None:
     described = f'[rig]\n{rig}\n[[run]]\nfile = "a.csv"\n'
     there = experiment(tmp_path, described, a=text(clean()))
     said = found(there.runs[0]).get("period-unlike-rig")
@@ -170,7 +170,7 @@ def test_a_rest_that_is_seen_tells_the_zero(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.theta, theta, atol=0.01)
 
 
-def test_angles_too_large_are_said_to_be(tmp_path: Path) -> None:
+def test_angles_too_large_are_reported(tmp_path: Path) -> None:
     time, theta = clean()
     theta[-200:] = 0
     with pytest.raises(pendmap.InputError, match="too large"):
@@ -214,7 +214,7 @@ def test_slow_turns_between_lines_are_not_clipped(tmp_path: Path, form: str) -> 
 
 
 @pytest.mark.parametrize("limit", [0.3, 1.0, 2.0])
-def test_one_end_of_a_sensor_is_said_once(tmp_path: Path, limit: float) -> None:
+def test_one_end_of_a_sensor_is_reported_once(tmp_path: Path, limit: float) -> None:
     time, theta = clean(start=3.0, duration=12.0)
     run = read(tmp_path, text((time, np.minimum(theta, limit))))
     assert found(run)["clipped"].text.startswith(f"the sensor ends at {limit:.4g} rad: ")
@@ -222,7 +222,7 @@ def test_one_end_of_a_sensor_is_said_once(tmp_path: Path, limit: float) -> None:
 
 @pytest.mark.parametrize("gain", [0.75, 1.5])
 @pytest.mark.parametrize("gyroscope", [True, False])
-def test_a_gain_that_the_period_disproves_is_said_with_its_error(
+def test_a_gain_that_the_period_disproves_is_reported_with_its_error(
     tmp_path: Path, gain: float, *, gyroscope: bool
 ) -> None:
     time, theta, speed = motion(start=1.4, duration=60.0)

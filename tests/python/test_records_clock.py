@@ -1,4 +1,4 @@
-"""What is found of the clock, and what a mend gives back."""
+"""Findings about the clock, and the times after their correction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_pause_longer_than_all_the_rest_cuts_the_record(tmp_path: Path, *, lat
     first = time.size // 3 if late else 2 * time.size // 3
     jumped = np.where(np.arange(time.size) < first, time, time + 1e6)
     run = read(tmp_path, text((jumped, theta)))
-    assert found(run)["time-pause"].text.startswith("nothing for 1e+06 s")
+    assert found(run)["time-pause"].text.startswith("a pause of 1e+06 s")
     assert run.time.size == max(first, time.size - first)
     assert np.ptp(run.time) < np.ptp(time)
     limits = "from_s = 5e5" if not late else "to_s = 5e5"

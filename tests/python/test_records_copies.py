@@ -150,7 +150,7 @@ def test_runs_of_several_pendulums_are_told_before_any_number(tmp_path: Path) ->
     assert [found.what for found in read.findings] == ["rigs-differ"]
     with pytest.raises(pendmap.InputError, match="no model follows these records"):
         identify_experiment(read)
-    # Of one pendulum: nothing is said, and the periods are those of the small swing.
+    # Runs of one pendulum have no finding; the periods are those of the small swing.
     same = experiment(
         tmp_path / "same",
         {

@@ -35,7 +35,7 @@ def one_line(message: str) -> None:
 
 
 def consistent(run: pendmap.Run) -> None:
-    """What every run keeps, whatever its file was."""
+    """Check the properties that every run has."""
     assert run.time.shape == run.theta.shape == run.trusted.shape
     assert run.time.dtype == run.theta.dtype == np.float64
     assert run.time.size >= 3
@@ -109,7 +109,7 @@ def test_a_damaged_description_is_refused_in_one_line(name: str, tmp_path: Path)
     one_line(str(error.value))
 
 
-def test_a_clean_record_has_nothing_odd(tmp_path: Path) -> None:
+def test_a_clean_record_has_no_finding(tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_text(sound(), encoding="utf-8")
     (run,) = pendmap.read_experiment(path).runs

@@ -1,4 +1,4 @@
-"""Files without a description: folders of them, records without times, columns nobody asked for."""
+"""Files without a description: folders of them, records without times, unused columns."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_without_times_and_rate_both_ways_are_named(
 
 
 @pytest.mark.parametrize("rate", ["0", "-5", "1e12", "quick"])
-def test_a_rate_that_is_none_is_refused(pendmap_command: Run, tmp_path: Path, rate: str) -> None:
+def test_an_invalid_rate_is_refused(pendmap_command: Run, tmp_path: Path, rate: str) -> None:
     path = tmp_path / "alone.txt"
     path.write_text(text((clean()[1],), ""), encoding="utf-8")
     run = pendmap_command("look", path, f"--rate={rate}")

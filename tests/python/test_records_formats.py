@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import pendmap
-from pendmap.records import text as reading
+from pendmap.records import tables as reading
 from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 
@@ -81,7 +81,7 @@ def test_tracker_with_an_angle(tmp_path: Path) -> None:
     same(run)
 
 
-def test_a_short_arc_is_said(tmp_path: Path) -> None:
+def test_a_short_arc_is_reported(tmp_path: Path) -> None:
     time, theta, _ = motion(start=0.08, rate=30.0)
     noise = np.random.default_rng(2).normal(0, 0.5, (2, theta.size))
     content = text((time, 100 * np.sin(theta) + noise[0], 100 * np.cos(theta) + noise[1]), "t,x,y")
@@ -129,7 +129,7 @@ def test_parquet_is_the_same(tmp_path: Path) -> None:
     assert run.sha256 == hashlib.sha256((tmp_path / "a.parquet").read_bytes()).hexdigest()
 
 
-def test_everything_of_a_description(tmp_path: Path) -> None:
+def test_every_key_of_a_description(tmp_path: Path) -> None:
     time, theta = clean()
     volts = 2.5 + theta / 1.2566
     content = "made by hand\nin spring\nTime;volts\n" + text((1000 * time, volts), "", "%.7f")
@@ -221,7 +221,7 @@ def test_an_angle_alone_has_no_times(tmp_path: Path) -> None:
         read(tmp_path, text((clean()[1],), "theta_rad"))
 
 
-def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_said(tmp_path: Path) -> None:
+def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_reported(tmp_path: Path) -> None:
     time, theta = clean()
     content = text((time, theta, np.cos(time)), "t_s,theta_rad,acc_y")
     described = '[[run]]\nfile = "run.csv"\nkind = "forced"\n'
@@ -246,7 +246,7 @@ def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_said(tmp_path: P
         ("from_s = 19.999", "must be times within .*, they leave 1 sample"),
     ],
 )
-def test_a_description_is_refused_in_true_words(tmp_path: Path, line: str, says: str) -> None:
+def test_a_refused_description_names_its_fault(tmp_path: Path, line: str, says: str) -> None:
     with pytest.raises(pendmap.InputError, match=says):
         experiment(tmp_path, f'[[run]]\nfile = "run.csv"\n{line}\n', run=text(clean()))
 

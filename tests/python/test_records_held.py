@@ -1,4 +1,4 @@
-"""An accelerometer alone: where a hand holds and lets go, and what is not said of a made angle."""
+"""An accelerometer alone: holds and releases, and what is not reported of a made angle."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def test_figures_of_a_made_angle_say_why_they_judge_none(tmp_path: Path) -> None
         assert not any("error of each" in axes.get_title() for axes in made.axes)
 
 
-def test_of_the_centre_of_oscillation_no_wrong_place_is_said(tmp_path: Path) -> None:
+def test_no_wrong_centre_of_oscillation_is_reported(tmp_path: Path) -> None:
     centre = GRAVITY / TRUTH["w0"] ** 2
     time, _, force = readings(distance=centre, release=2.5)
     place = (

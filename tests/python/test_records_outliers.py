@@ -66,7 +66,7 @@ def test_an_outlier_beside_a_gap(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rate", [60.0, 100.0, 500.0])
-def test_two_in_a_hundred_with_gaps(tmp_path: Path, rate: float) -> None:
+def test_two_percent_of_outliers_with_gaps(tmp_path: Path, rate: float) -> None:
     time, theta, _ = motion(duration=40.0, rate=rate)
     rng = np.random.default_rng(5)
     readings = noisy(theta, 0.004)
@@ -82,7 +82,9 @@ def test_two_in_a_hundred_with_gaps(tmp_path: Path, rate: float) -> None:
 
 @pytest.mark.parametrize("start", [1.2, 2.9, 0.1])
 @pytest.mark.parametrize("rate", [25.0, 100.0, 1000.0])
-def test_nothing_is_found_where_nothing_is(tmp_path: Path, start: float, rate: float) -> None:
+def test_a_record_without_outliers_has_no_finding(
+    tmp_path: Path, start: float, rate: float
+) -> None:
     time, theta, _ = motion(start=start, rate=rate)
     for seed in range(4):
         run = read(tmp_path, text((time, noisy(theta, 0.003, seed=seed))))

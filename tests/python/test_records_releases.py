@@ -89,7 +89,7 @@ def test_all_releases_tell_more_than_the_longest(tmp_path: Path) -> None:
     assert np.sum((both[..., 0] / size) ** 2) < np.sum((one[..., 0] / size) ** 2)
 
 
-def test_every_command_says_the_releases(tmp_path: Path, pendmap_command: Command) -> None:
+def test_every_command_reports_the_releases(tmp_path: Path, pendmap_command: Command) -> None:
     path = write(tmp_path, released((1.2, 2.0), (12.03, 15.02)))
     there = pendmap.read_experiment(path)
     report = identify_experiment(there, methods=["trajectory"])
@@ -111,7 +111,7 @@ def test_every_command_says_the_releases(tmp_path: Path, pendmap_command: Comman
     assert [run.name for run in data.fitted] == ["decay 1/2", "decay 2/2"]
 
 
-def test_what_a_run_is_said_to_be_is_inherited(tmp_path: Path) -> None:
+def test_each_release_inherits_the_description_of_its_run(tmp_path: Path) -> None:
     made = released(*THREE)
     described = (
         '[[run]]\nfile = "decay.csv"\nlab_time_s = 300\nhold_out = true\n'

@@ -1,4 +1,4 @@
-"""The noise of a sensor at rest, of how often it shows which count."""
+"""The noise of a sensor at rest, from the shares of the counts that it shows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def shown(noise: float, place: float, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("noise", [0.07, 0.14, 0.28, 0.5])
-def test_it_is_that_of_the_sensor_wherever_the_angle_lies(noise: float) -> None:
+def test_the_noise_is_that_of_the_sensor_wherever_the_angle_lies(noise: float) -> None:
     expected = COUNT * math.hypot(noise, 1 / math.sqrt(12))
     ratios = []
     for seed, place in enumerate(np.linspace(-0.5, 0.5, 9)):
@@ -31,7 +31,7 @@ def test_it_is_that_of_the_sensor_wherever_the_angle_lies(noise: float) -> None:
     assert np.abs(np.array(ratios) - 1).max() < 0.15
 
 
-def test_three_counts_tell_it_to_a_few_percent() -> None:
+def test_three_counts_show_the_noise_to_a_few_percent() -> None:
     found = still_noise(shown(0.3, 0.1, 1), COUNT)
     assert found is not None
     expected = COUNT * math.hypot(0.3, 1 / math.sqrt(12))
@@ -39,6 +39,6 @@ def test_three_counts_tell_it_to_a_few_percent() -> None:
     assert abs(found[0] - expected) < 3 * found[1]
 
 
-def test_one_count_alone_and_a_motion_say_nothing() -> None:
+def test_one_count_alone_and_a_motion_show_no_noise() -> None:
     assert still_noise(np.zeros(500), COUNT) is None
     assert still_noise(COUNT * np.round(np.linspace(0, 3, 500)), COUNT) is None

@@ -127,7 +127,7 @@ def test_nothing_before_the_edge_is_used(tmp_path: Path) -> None:
         (lambda t: pulses(t, np.sort(np.random.default_rng(1).uniform(0, 20, 30)), 0.02), "three"),
     ],
 )
-def test_what_marks_no_release_is_said(tmp_path: Path, trigger: object, says: str) -> None:
+def test_what_marks_no_release_is_reported(tmp_path: Path, trigger: object, says: str) -> None:
     time, theta = clean()
     path = tmp_path / "a.csv"
     path.write_text(text((time, theta, trigger(time)), NAMES), encoding="utf-8")  # type: ignore[operator]

@@ -48,7 +48,7 @@ def test_declared_turning_points_are_taken(tmp_path: Path) -> None:
     assert run.trusted.all()
 
 
-def test_turning_points_without_signs_are_said_to_be_of_both_sides(tmp_path: Path) -> None:
+def test_turning_points_without_signs_are_taken_as_those_of_both_sides(tmp_path: Path) -> None:
     time, theta = turns(1.2, 1e-3)
     description = '[columns]\npeaks = "theta_rad"\n[[run]]\nfile = "a.csv"\n'
     (run,) = experiment(tmp_path, description, a=text((time, np.abs(theta)))).runs

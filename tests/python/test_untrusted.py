@@ -22,7 +22,7 @@ import pendmap
 from pendmap import InputError, viewer
 from pendmap.errors import one_line
 from pendmap.records.description import read_description
-from pendmap.records.text import MOST_COLUMNS
+from pendmap.records.tables import MOST_COLUMNS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -183,7 +183,7 @@ def test_a_description_is_read_or_refused_whatever_its_values(tmp_path: Path) ->
 
 
 def test_a_parquet_file_with_one_byte_wrong_ends_no_process(tmp_path: Path) -> None:
-    # In a process of its own: a library that aborts takes the process down.
+    # A separate process: a library that aborts ends it.
     code = (
         "import sys, numpy as np, pyarrow as pa\n"
         "from pyarrow import parquet\n"

@@ -23,50 +23,35 @@ except ImportError:  # without locks no folder of another run is certainly left 
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from types import FrameType
     from typing import IO
 
-COMPLETE: Final[list[str]] = []
-"""Names of the files that the running command has written: an interrupt names them."""
-
+COMPLETE: Final[list[str]] = []  # Files written so far, named by an interrupt
+# Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-"""Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed."""
-
+# Name of a folder in which files are written before they take their places
 _STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
-"""Name of a folder in which files are written before they take their places."""
-
-_OWNER: Final = "owner"
-"""File in a stage that its run keeps locked while it lives."""
-
-_PROBE: Final = 2**20
-"""Bytes written on trial after a library failed to write: a full disk refuses them."""
-
-_LEAST: Final = 4096
-"""Bytes written on trial before anything is computed: one block of most disks."""
+_OWNER: Final = "owner"  # File in a stage that its run keeps locked while it lives
+_PROBE: Final = 2**20  # Bytes written on trial, which a full disk refuses
+_LEAST: Final = 4096  # Bytes written on trial before anything is computed: one block of most disks
 
 
 @contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
     """Hold signals that ask to stop back until the end of the block, then let them happen.
 
-    An interrupt in the middle of a library that writes may leave its locks closed (NetCDF's, for
-    one) and the program waiting for ever. Outside the main thread, where no signal arrives,
-    nothing is done.
+    An interrupted library may leave its locks closed and wait for ever (NetCDF's does). Outside the
+    main thread, where no signal arrives, nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[int] = []
-
-    def hold(number: int, _: FrameType | None) -> None:
-        held.append(number)
-
     before = {number: signal.getsignal(number) for number in STOPS}
     holding = [number for number in STOPS if before[number] not in (signal.SIG_IGN, None)]
     for number in holding:
-        signal.signal(number, hold)
+        signal.signal(number, lambda number, _: held.append(number))
     try:
         yield
     finally:
@@ -78,30 +63,11 @@ def held_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterator[Path]:
-    """Give a temporary place beside ``path`` to write in and put the file there at the end.
+    """Yield a temporary place beside ``path`` of the same name and put its file there at the end.
 
-    Whatever happens in between, ``path`` then holds either the whole new file or what it held
-    before, and nothing else is left. An interrupt waits until the file is in its place.
-
-    Parameters
-    ----------
-    path : str or path
-        Where the file shall be in the end; an existing file is replaced.
-    suffixes : sequence of str
-        The suffixes allowed, lower case, with their dots.
-
-    Yields
-    ------
-    Path
-        Where to write; it has the same name.
-
-    Raises
-    ------
-    InputError
-        If the suffix is not one of ``suffixes``.
-    OSError
-        If the folder does not exist, the path is a folder, nothing may be written there, or the
-        disk takes no more, whatever error a library makes of that.
+    ``path`` always holds either the whole new file or what it held before. Raises InputError for
+    suffixes other than ``suffixes`` (lower case), OSError where nothing can be written, whatever a
+    library makes of that. An interrupt waits until the file is in its place.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -120,25 +86,11 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary place beside ``path`` for a folder and put it there at the end.
+    """Yield a temporary place beside ``path`` for a new folder and put it there at the end.
 
-    What ``path`` held stays until the new folder is whole, and goes then: whether it may be
-    replaced is for the caller to check. An interrupt waits until the folder is in its place.
-
-    Parameters
-    ----------
-    path : str or path
-        Where the folder shall be in the end; of a link, where it leads.
-
-    Yields
-    ------
-    Path
-        Where to make the folder; it does not exist yet.
-
-    Raises
-    ------
-    OSError
-        If the folder above does not exist, nothing may be written there, or the disk takes no more.
+    A folder at ``path`` stays until the new one is whole, and is removed then; whether it may be is
+    for the caller to check. A link is followed. Raises OSError where nothing can be written. An
+    interrupt waits until the folder is in its place.
     """
     target = Path(path).resolve()
     with _named(Path(path)), _stage(target.parent) as stage:
@@ -157,19 +109,12 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
-    """Read a file of at most ``most`` bytes; pipes and devices are refused, not waited for.
-
-    Raises
-    ------
-    InputError
-        If it is a pipe, a device, or longer.
-    OSError
-        If it cannot be read.
-    """
+    """Return the bytes of a file; raise InputError for more than ``most``, a pipe or a device."""
     source = Path(path)
-    _check_regular(source, source.stat().st_mode)
-    with open(source, "rb", opener=_at_once) as stream:
-        _check_regular(source, os.fstat(stream.fileno()).st_mode)
+    check_regular(source)
+    at_once = getattr(os, "O_NONBLOCK", 0)  # a pipe that takes its place is not waited for
+    with open(source, "rb", opener=lambda name, flags: os.open(name, flags | at_once)) as stream:
+        check_regular(source, stream.fileno())
         data = bytearray()
         with _named(source):
             while len(data) <= most and (read := stream.read(_PROBE)):
@@ -179,44 +124,19 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
     return bytes(data)
 
 
-def check_regular(path: str | os.PathLike[str]) -> None:
-    """Refuse what is no regular file: a folder, a pipe or a device.
-
-    Raises
-    ------
-    InputError
-        If it is a pipe or a device.
-    OSError
-        If it is a folder, or there is nothing.
-    """
-    _check_regular(Path(path), Path(path).stat().st_mode)
-
-
-def _check_regular(source: Path, mode: int) -> None:
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(source))
-    if not stat.S_ISREG(mode):
-        raise InputError(f"{source}: must be a file, it is a pipe or a device")
-
-
-def _at_once(name: str, flags: int) -> int:
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -> None:
+    """Raise OSError for a folder or nothing, InputError for a pipe or a device."""
+    found = Path(path).stat() if descriptor is None else os.fstat(descriptor)
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{path}: must be a file, it is a pipe or a device")
 
 
 def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
-    """Refuse a place where no file can be written, before it is computed.
+    """Raise OSError where a file or folder of ``size`` bytes cannot be made, before its content is.
 
-    Parameters
-    ----------
-    path : str or path
-        The file or folder that shall be made.
-    size : int
-        Bytes that it will have at least.
-
-    Raises
-    ------
-    OSError
-        If the folder does not exist, nothing may be written there, or there is less space.
+    That is a folder that does not exist, a place where nothing may be written, or a full disk.
     """
     target = Path(path)
     with _named(target), _stage(target.parent) as stage:
@@ -263,26 +183,20 @@ def _stage(folder: Path) -> Iterator[Path]:
     """Give a hidden folder, removed at the end together with stages of runs that were killed."""
     with held_interrupts():
         _sweep(folder)
-        stage, owner = _made(folder)
-        try:
-            yield stage
-        finally:
-            _remove(stage)
-            owner.close()
-
-
-def _made(folder: Path) -> tuple[Path, IO[bytes]]:
-    """Make a stage and lock it; a run that sweeps at the same moment may take it away again."""
-    while True:
-        stage = folder / f".pendmap-{uuid.uuid4().hex}.part"
-        stage.mkdir()
-        try:
-            owner = (stage / _OWNER).open("xb")
-        except FileNotFoundError:
-            continue
-        if _locked(owner) and (stage / _OWNER).exists():
-            return stage, owner
-        owner.close()
+        while True:
+            stage = folder / f".pendmap-{uuid.uuid4().hex}.part"
+            stage.mkdir()
+            # A run that sweeps at the same moment may take the stage away again.
+            with contextlib.suppress(FileNotFoundError):
+                owner = (stage / _OWNER).open("xb")
+                if _locked(owner) and (stage / _OWNER).exists():
+                    break
+                owner.close()
+        with owner:
+            try:
+                yield stage
+            finally:
+                _remove(stage)
 
 
 def _locked(owner: IO[bytes]) -> bool:

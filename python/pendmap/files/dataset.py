@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import os
 import re
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import xarray as xr
@@ -16,18 +17,14 @@ from pendmap import ANALYSES
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
-FORMAT_VERSION: Final = 1
-"""Version of the layout of the datasets, in their attribute ``format_version``."""
-SUFFIXES: Final = (".nc", ".zarr")
-"""Suffixes of the files that a result is stored in."""
-_MARKS: Final = frozenset(("format_version", "kind"))
-"""Attributes that mark a dataset as a result."""
+FORMAT_VERSION: Final = 1  # Version of the layout, in the attribute ``format_version``
+SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of the files that a result is stored in
+_MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
+# Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
-"""Kinds of result, and the functions that return each."""
-_LARGE: Final = 4096
-"""Values from which on a variable is compressed."""
+_LARGE: Final = 4096  # Values from which on a variable is compressed
+# Names of the files of a stored result: descriptions and chunks
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
-"""Names of the files of a stored result: descriptions and chunks."""
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -61,36 +58,20 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     'melnikov.nc'
     """
     target = Path(path)
-    if not (isinstance(dataset, xr.Dataset) and _is_result(dataset)):
+    if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
             f"{target}: what shall be saved is not a result of pendmap: it must be one of the "
             f"datasets that {', '.join(sorted(made))} return"
         )
-    if target.suffix.lower() == ".zarr":
-        return _save_zarr(dataset, target)
-    with whole_file(target, SUFFIXES) as part:
-        dataset.to_netcdf(part, engine="netcdf4", encoding=_encoding(dataset))
-    return target
-
-
-def _is_result(dataset: xr.Dataset) -> bool:
-    return set(dataset.attrs) >= _MARKS
-
-
-def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    large = (name for name, v in dataset.data_vars.items() if v.size > _LARGE)
-    # Whole rows in chunks of about a megabyte, so that compression works on a part at a time.
-    return {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in large}
-
-
-def _save_zarr(dataset: xr.Dataset, target: Path) -> Path:
-    try:
-        import zarr  # noqa: F401, PLC0415 (an extra: only where it is asked for)
-    except ImportError:
-        raise InputError(
-            f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works"
-        ) from None
+    if target.suffix.lower() != ".zarr":
+        large = [name for name, values in dataset.data_vars.items() if values.size > _LARGE]
+        encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in large}
+        with whole_file(target, SUFFIXES) as part:
+            dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
+        return target
+    if importlib.util.find_spec("zarr") is None:
+        raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works")
     check_replaceable(target)
     with whole_folder(target) as part:
         dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
@@ -162,7 +143,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def _check_result(dataset: xr.Dataset, source: Path) -> None:
-    if not _is_result(dataset):
+    if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
     if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:

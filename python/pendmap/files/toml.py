@@ -12,76 +12,51 @@ import tomli_w
 from pendmap.errors import InputError
 from pendmap.files.atomic import read_whole
 
-_LONGEST: Final = 100
-"""Characters of a line of TOML that a table within a table may take."""
-
-_MOST_TOML: Final = 2**22
-"""Bytes of the largest TOML file that is read: a thousand runs take a tenth of it."""
+_LONGEST: Final = 100  # Characters of a line of TOML that a table within a table may take
+_MOST_TOML: Final = 2**22  # Bytes of a TOML file at most: a thousand runs take a tenth
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a TOML file, with the mark before it that editors on Windows put there.
-
-    Raises
-    ------
-    InputError
-        If it is no TOML, no regular file, or too large.
-    OSError
-        If it cannot be read.
-    """
+    """Read a TOML file, with or without a byte order mark; raise InputError for anything else."""
     data = read_whole(path, _MOST_TOML)
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # an integer of thousands of digits is a ValueError
+    except (ValueError, RecursionError) as error:  # too many digits are a ValueError
         raise InputError(f"{os.fspath(path)}: not a TOML file: {error}") from None
 
 
 def toml_text(content: Mapping[str, Any]) -> str:
     """Return TOML whose lists of tables are written ``[[name]]``, a line a key, as people do.
 
-    Parameters
-    ----------
-    content : mapping of str
-        Numbers, texts, lists and tables of TOML, tables in tables included.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If something in it is nothing that TOML has.
+    Raises TypeError or ValueError for values that TOML does not have.
     """
-    parts = {key: value for key, value in content.items() if _is_table(value) or _tables(value)}
-    head = {key: value for key, value in content.items() if key not in parts}
+    lists = {key for key, value in content.items() if _is_tables(value)}
+    tables = {key for key, value in content.items() if isinstance(value, Mapping)}
+    head = {key: value for key, value in content.items() if key not in lists | tables}
     blocks = [tomli_w.dumps(head)] if head else []
-    for key, value in parts.items():
-        if _tables(value):
+    for key, value in content.items():
+        if key in lists:
             blocks += [_entry(key, table) for table in value]
-        else:
+        elif key in tables:
             blocks.append(tomli_w.dumps({key: value}))
     return "\n".join(blocks)
 
 
-def _is_table(value: object) -> bool:
-    return isinstance(value, Mapping)
-
-
-def _tables(value: object) -> bool:
-    return isinstance(value, list) and bool(value) and all(map(_is_table, value))
+def _is_tables(value: object) -> bool:
+    """Return whether a value is a list of tables."""
+    return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) for v in value)
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> str:
-    """Return one ``[[name]]``; values too long for a line follow as tables of their own."""
-    lines = {key: f"{_value({key: value})[2:-2]}\n" for key, value in table.items()}
-    long = {
-        key: value
-        for key, value in table.items()
-        if _is_table(value) and len(lines[key]) > _LONGEST
-    }
-    head = "".join(line for key, line in lines.items() if key not in long)
-    further = (f"\n{tomli_w.dumps({name: {key: value}})}" for key, value in long.items())
-    return "".join([f"[[{name}]]\n", head, *further])
+    """Return one ``[[name]]``; tables too long for a line follow as separate tables."""
+    lines, further = [f"[[{name}]]\n"], []
+    for key, value in table.items():
+        line = f"{_value({key: value})[2:-2]}\n"
+        if isinstance(value, Mapping) and len(line) > _LONGEST:
+            further.append(f"\n{tomli_w.dumps({name: {key: value}})}")
+        else:
+            lines.append(line)
+    return "".join(lines + further)
 
 
 def _value(value: object) -> str:

@@ -1,4 +1,4 @@
-"""What the runs of an experiment show together: copied readings and unlike rigs.
+"""Checks across the runs of an experiment: copied readings and unlike rigs.
 
 Readings are copied where consecutive readings equal those of another run up to a factor and a zero,
 within the written digits. Two recordings of one motion differ by their noise.
@@ -22,60 +22,35 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.experiment import Run
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-ONE_RIG: Final = 0.05
-"""Relative difference of small-swing periods from which runs are of several rigs."""
-
-FEWEST_SHARED: Final = 50
-"""Readings: fewer shared readings are no copy, fewer remaining readings are no run."""
-
-LEAST_SHARE: Final = 0.1
-"""Share of the shorter run: fewer shared readings are no copy."""
-
-LEAST_LEVELS: Final = 20
-"""Sensor steps that shared readings span at least; fewer agree by chance."""
-
-AGREEING: Final = 0.99
-"""Share of shared readings that agree within half a step; 1 % may be edited."""
-
-FACTOR_ERROR: Final = 1e-6
-"""Relative error of a conversion factor between units as people write it."""
-
-OFF_STEP: Final = 1e-2
-"""Steps by which distances of readings may miss whole multiples of a step."""
-
-MOST_THINNED: Final = 10
-"""Readings of which a copy keeps one, at most, to be found."""
+ONE_RIG: Final = 0.05  # Relative difference of small-swing periods that shows several rigs
+FEWEST_SHARED: Final = 50  # Readings of a copy, and of a run without its copies, at least
+LEAST_SHARE: Final = 0.1  # Share of the shorter run: fewer shared readings are no copy
+LEAST_LEVELS: Final = 20  # Sensor steps that shared readings span at least; fewer agree by chance
+AGREEING: Final = 0.99  # Share of shared readings that agree within half a step; 1 % may be edited
+FACTOR_ERROR: Final = 1e-6  # Relative error of a conversion factor between units as people write it
+OFF_STEP: Final = 1e-2  # Steps by which distances of readings may miss whole multiples of a step
+MOST_THINNED: Final = 10  # Readings of which a copy keeps one, at most, to be found
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs in which each reading counts once, and the findings across runs."""
-    made = once_each(runs)
-    found = _unlike(made)
+    made, found = once_each(runs), list[Finding]()
+    swings = {
+        run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
+        for run in made
+        if run.kind == "free" and not run.peaks_only and run.moves
+    }
+    known = sorted((period, name) for name, period in swings.items() if math.isfinite(period))
+    if known and known[-1][0] > (1 + ONE_RIG) * known[0][0]:
+        short, long = (f"{period:.4g} s in {name}" for period, name in (known[0], known[-1]))
+        text = f"small swings take {short} and {long}: these are not runs of one pendulum"
+        found.append(Finding("rigs-differ", text))
     if runs and all(run.hold_out for run in runs):
         found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
     return tuple(made), tuple(found)
-
-
-def _unlike(runs: Sequence[Run]) -> list[Finding]:
-    """Return a finding if the periods of small swings differ between runs."""
-    swings = {
-        run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
-        for run in runs
-        if run.kind == "free" and not run.peaks_only and run.moves
-    }
-    known = {name: period for name, period in swings.items() if math.isfinite(period)}
-    if len(known) < 2 or max(known.values()) <= (1 + ONE_RIG) * min(known.values()):
-        return []
-    short, long = min(known, key=lambda n: known[n]), max(known, key=lambda n: known[n])
-    text = (
-        f"small swings take {known[short]:.4g} s in {short} and {known[long]:.4g} s in {long}: "
-        "these are not runs of one pendulum"
-    )
-    return [Finding("rigs-differ", text)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,9 +109,7 @@ def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
     """Return the first copied reading of ``other`` and their number; None without a copy."""
     size = min(one.theta.size, other.theta.size)
     least = max(FEWEST_SHARED, round(LEAST_SHARE * size))
-    if size < least:
-        return None
-    for mine, its in _ticks(one, other):
+    for mine, its in _ticks(one, other) if size >= least else ():
         lags = _lags(_spread(one.theta, mine), _spread(other.theta, its), least)
         for lag in lags | ({0} if one.theta.size == other.theta.size else set()):
             _, a, b = np.intersect1d(mine, its + lag, assume_unique=True, return_indices=True)
@@ -150,15 +123,12 @@ def _ticks(one: _Motion, other: _Motion) -> list[tuple[NDArray[np.int64], NDArra
     in_a_row = np.arange(one.theta.size), np.arange(other.theta.size)
     ratio = other.interval / one.interval
     times = round(max(ratio, 1 / ratio))
-    whole = abs(max(ratio, 1 / ratio) / times - 1) < OFF_STEP
-    by_time = (
-        one.tick * (times if whole and ratio < 1 else 1),
-        other.tick * (times if whole and ratio > 1 else 1),
-    )
+    if abs(max(ratio, 1 / ratio) / times - 1) >= OFF_STEP:
+        times = 1
+    by_time = one.tick * (times if ratio < 1 else 1), other.tick * (times if ratio > 1 else 1)
     wide = any(t.size and t[-1] >= MOST_THINNED * t.size for t in by_time)
-    if wide or all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True)):
-        return [in_a_row]
-    return [in_a_row, by_time]
+    same = all(np.array_equal(a, b) for a, b in zip(in_a_row, by_time, strict=True))
+    return [in_a_row] if wide or same else [in_a_row, by_time]
 
 
 def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
@@ -220,17 +190,15 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
     trusted[first : first + count] = False
     if int(trusted.sum()) < max(FEWEST_SHARED, LEAST_SHARE * before):
         trusted[:] = False
-    copied = before - int(trusted.sum())
     text = (
-        f"{run.name} is a copy of {other.name}: {copied} of its {counted(before, 'reading')} are "
-        "readings of that run, and count once"
+        f"{run.name} is a copy of {other.name}: {before - int(trusted.sum())} of its"
+        f" {counted(before, 'reading')} are readings of that run, and count once"
     )
-    if run.hold_out and not trusted.any():
-        text += ": held out, it would test nothing"
-    low, high = float(run.time[first]), float(run.time[first + count - 1])
-    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
     segments = run.segments
     if not trusted.any():
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
+        text += ": held out, it would test nothing" if run.hold_out else ""
+    low, high = float(run.time[first]), float(run.time[first + count - 1])
+    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
     findings = (*run.findings, found)
     return dataclasses.replace(run, trusted=trusted, segments=segments, findings=findings)

@@ -13,47 +13,22 @@ from pendmap.records.from_acceleration import angle_from
 from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_rate
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 TURN: Final = 2 * math.pi
-
-WRAPPED_SPAN: Final = 1.01
-"""Turns that wrapped readings span at most: one turn and some noise."""
-
-WRAP_JUMP: Final = 0.75
-"""Turns between neighbours from which a jump is a wrap."""
-
-LARGEST_ANGLE: Final = 1e5
-"""Largest number in rad that can be an angle: ten thousand turns."""
-
-MOST_HUGE: Final = 0.5
-"""Share of larger numbers from which the column is refused."""
-
-GAUSS_NEWTON_STEPS: Final = 50
-"""Most steps of the circle fit; five are enough from the algebraic circle."""
-
-RADIUS_DOUBT: Final = 0.02
-"""Relative standard error of the radius from which it is reported."""
-
-FEWEST_PEAKS: Final = 6
-"""Readings that show a pattern of turning points at least."""
-
-KEEP_PATTERN: Final = 0.9
-"""Share of the readings that must keep to the pattern."""
-
-PEAK_RISE: Final = 0.02
-"""Relative rise from one amplitude to the next that reading errors explain."""
-
-PERIOD_CHANGE: Final = 0.15
-"""Relative change from one interval to the next that periods show at most."""
-
-CLOCK_SPREAD: Final = 1e-4
-"""Relative spread of intervals below which they are those of a clock."""
+WRAPPED_SPAN: Final = 1.01  # Turns that wrapped readings span at most: one turn and some noise
+WRAP_JUMP: Final = 0.75  # Turns between neighbours from which a jump is a wrap
+LARGEST_ANGLE: Final = 1e5  # Largest number in rad that can be an angle: ten thousand turns
+MOST_HUGE: Final = 0.5  # Share of larger numbers from which the column is refused
+GAUSS_NEWTON_STEPS: Final = 50  # Steps of the circle fit at most; five are enough
+RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius from which it is reported
+FEWEST_PEAKS: Final = 6  # Readings that show a pattern of turning points at least
+KEEP_PATTERN: Final = 0.9  # Share of the readings that must keep to the pattern
+PEAK_RISE: Final = 0.02  # Relative rise from one amplitude to the next that reading errors explain
+PERIOD_CHANGE: Final = 0.15  # Relative change between neighbouring periods at most
+CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which they are those of a clock
 
 
 def make(work: Work) -> None:
@@ -61,41 +36,16 @@ def make(work: Work) -> None:
     if "peaks" in work.extra and "angle" not in work.columns:
         work.theta = work.extra.pop("peaks")
         work.peaks_only = True
-        _one_sign(work)
+        peaks = work.theta[np.isfinite(work.theta)]
+        if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
+            text = (
+                "the turning points have one sign: they are taken as one each half swing; if all"
+                " are of one side, w0 comes out half as large"
+            )
+            work.say("peaks-one-sign", text)
     elif "angle" not in work.columns:
         _derived(work)
     _finite(work, "angle", work.theta)
-    _sane(work)
-    if not work.peaks_only:
-        _unwrap(work)
-
-
-def _one_sign(work: Work) -> None:
-    """Report turning points of one sign: those of one side alone would halve ``w0``."""
-    peaks = work.theta[np.isfinite(work.theta)]
-    if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
-        text = (
-            "the turning points have one sign: taken for those of both sides, one each half swing;"
-            " with those of one side alone w0 comes out half as large"
-        )
-        work.say("peaks-one-sign", text)
-
-
-def _finite(work: Work, what: str, *values: Floats) -> None:
-    """Leave out rows in which a needed channel has no number."""
-    good = np.all([np.isfinite(v) for v in values], axis=0)
-    missing = np.flatnonzero(~good)
-    if missing.size and missing.size == good.size:
-        raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
-    if missing.size:
-        text = f"{counted(missing.size, 'row')} without a number for the {what} left out"
-        work.say("angle-missing", text, mended=True, at=missing)
-        work.keep(good)
-    work.refuse_short()
-
-
-def _sane(work: Work) -> None:
-    """Leave out numbers that are too large for an angle."""
     huge = np.abs(work.theta) > LARGEST_ANGLE
     if np.mean(huge) > MOST_HUGE:
         largest = float(np.max(np.abs(work.theta)))
@@ -103,22 +53,27 @@ def _sane(work: Work) -> None:
             f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
             " large for a pendulum; a scale may stand in [columns] of experiment.toml"
         )
-    if huge.any():
-        text = f"{counted(int(huge.sum()), 'number')} beyond {LARGEST_ANGLE:g} rad left out"
-        work.say("angle-huge", text, mended=True, at=np.flatnonzero(huge))
-        work.keep(~huge)
-        work.refuse_short()
+    work.leave_out(huge, "angle-huge", "number", f"beyond {LARGEST_ANGLE:g} rad left out")
+    work.refuse_short()
+    if not work.peaks_only:
+        _unwrap(work)
+
+
+def _finite(work: Work, what: str, *values: Floats) -> None:
+    """Leave out rows in which a needed channel has no number."""
+    good = np.all([np.isfinite(v) for v in values], axis=0)
+    if good.size and not good.any():
+        raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
+    work.leave_out(~good, "angle-missing", "row", f"without a number for the {what} left out")
+    work.refuse_short()
 
 
 def _derived(work: Work) -> None:
     """Make the angle from pixels, a velocity or an acceleration, in this order."""
     if "pixel_x" in work.extra:
-        x, y = work.extra["pixel_x"], work.extra["pixel_y"]
-        _finite(work, "position", x, y)
-        x, y = work.extra.pop("pixel_x"), work.extra.pop("pixel_y")
-        _circle_angle(work, x, y)
-        return
-    if "velocity" in work.extra:
+        _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
+        _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
+    elif "velocity" in work.extra:
         _finite(work, "velocity", work.extra["velocity"])
         rate = work.extra["velocity"]
         work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
@@ -128,38 +83,36 @@ def _derived(work: Work) -> None:
             " pictures and the methods of peaks; the trajectory method fits the velocity itself"
         )
         work.say("angle-integrated", text, mended=True)
-        return
-    _accelerated(work)
+    else:
+        _accelerated(work)
 
 
 def _accelerated(work: Work) -> None:
     """Make the angle from an acceleration alone; its place on the rod must be known."""
-    beside = "an angle, a velocity (gyroscope) or pixel_x and pixel_y beside it"
-    sensor = work.accelerometer
+    sensor, why = work.accelerometer, ""
     if sensor is None:
-        raise InputError(
-            f"{work.where}: an acceleration alone tells no angle, where the sensor sits is not"
-            f" known: {work.place_missing} missing in [columns] of experiment.toml: it must be like"
-            f" {PLACE_EXAMPLE}, or {beside}"
+        why = (
+            "an acceleration alone gives an angle only if the place of the sensor is known:"
+            f" {work.place_missing} missing in [columns] of experiment.toml: it must be like"
+            f" {PLACE_EXAMPLE}"
         )
-    if sensor.direction == "radial":
-        raise InputError(
-            f"{work.where}: a radial acceleration alone cannot tell left from right: it must be"
-            f" the tangential one, or {beside}"
+    elif sensor.direction == "radial":
+        why = (
+            "a radial acceleration alone cannot tell left from right: it must be the tangential one"
         )
-    if work.plan.kind == "forced":
+    elif work.plan.kind == "forced":
+        why = "an acceleration alone on a forced run holds the pivot's own: it must be a free decay"
+    if sensor is None or why:
         raise InputError(
-            f"{work.where}: an acceleration alone on a forced run holds the pivot's own: it must be"
-            f" a free decay, or {beside}"
+            f"{work.where}: {why}, or an angle, a velocity (gyroscope) or pixel_x and pixel_y"
+            " beside it"
         )
     _finite(work, "acceleration", work.extra["acceleration"])
     doubt = angle_from(work, sensor)
-    removed = ", gravity removed" if not sensor.gravity else f", g = {sensor.gravity:g} m/s^2"
-    place = (
-        "an angular acceleration"
-        if sensor.direction == "angular"
-        else f"a tangential acceleration {sensor.distance_m:g} m from the pivot{removed}"
-    )
+    place = "an angular acceleration"
+    if sensor.direction != "angular":
+        removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
+        place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
     text = (
         f"the angle is made of {place}, without the damping's part in it: roughly right, for"
         " pictures and the methods of peaks; the trajectory method fits the acceleration itself"
@@ -195,7 +148,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
     if not size or not math.isfinite(size):
         raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
-    a, b, radius = _algebraic(u, v)
+    # Kasa's circle, by least squares of u^2 + v^2, is the start.
+    columns = np.column_stack([u, v, np.ones(u.size)])
+    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
+    a, b = float(solution[0]) / 2, float(solution[1]) / 2
+    radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
     kept = np.ones(u.size, bool)
     for _ in range(2):
         a, b, radius, error, rms = _geometric(u[kept], v[kept], a, b, radius)
@@ -225,14 +182,6 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
         work.say("circle-uncertain", text)
 
 
-def _algebraic(u: Floats, v: Floats) -> tuple[float, float, float]:
-    """Return centre and radius of Kasa's circle: least squares of u^2 + v^2."""
-    columns = np.column_stack([u, v, np.ones(u.size)])
-    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
-    a, b = solution[0] / 2, solution[1] / 2
-    return float(a), float(b), math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
-
-
 def _geometric(
     u: Floats, v: Floats, a: float, b: float, radius: float
 ) -> tuple[float, float, float, float, float]:
@@ -260,40 +209,30 @@ def check_peaks(work: Work) -> None:
         return
     good = np.isfinite(work.theta)
     found = _pattern(work.time[good], work.theta[good])
-    if found is None:
+    if not found:
         return
     work.peaks_only = True
     work.trusted[:] = False
-    named = f'peaks = "{work.columns["angle"]}"'
     text = (
-        f"{found}: turning points alone? Then [columns] of experiment.toml says so, {named}, one"
-        " for each half swing"
+        f"{found}, ever smaller: turning points alone? Then [columns] of experiment.toml says so,"
+        f' peaks = "{work.columns["angle"]}", one for each half swing'
     )
     work.say("peaks-undeclared", text)
 
 
-def _pattern(time: Floats, theta: Floats) -> str | None:
-    """Return the pattern of turning points that readings show, in words; None for a motion."""
+def _pattern(time: Floats, theta: Floats) -> str:
+    """Return the pattern of turning points that readings show; empty for a motion."""
     if theta.size < FEWEST_PEAKS:
-        return None
-    steps = np.diff(time)
+        return ""
+    steps, size = np.diff(time), np.abs(theta)
     slowly = np.abs(np.diff(steps)) < PERIOD_CHANGE * np.minimum(steps[1:], steps[:-1])
-    size = np.abs(theta)
     falls = np.diff(size) < PEAK_RISE * float(size.max())
-    if (
-        np.mean(slowly) < KEEP_PATTERN
-        or np.mean(falls) < KEEP_PATTERN
-        or size[-1] > (1 - PEAK_RISE) * size[0]
-    ):
-        return None
+    kept = min(np.mean(slowly), np.mean(falls)) >= KEEP_PATTERN
+    if not kept or size[-1] > (1 - PEAK_RISE) * size[0]:
+        return ""
     other_side = theta[1:] * theta[:-1] < 0
     if np.mean(other_side) >= KEEP_PATTERN:
-        return "readings on one side and the other, ever smaller"
+        return "readings on one side and the other"
     regular = float(np.ptp(steps)) < CLOCK_SPREAD * float(np.mean(steps))
-    if (
-        np.any(other_side)
-        or regular
-        or np.mean(np.diff(theta) * np.sign(theta[0]) < 0) < KEEP_PATTERN
-    ):
-        return None
-    return "slow readings on one side, ever smaller"
+    inward = np.mean(np.diff(theta) * np.sign(theta[0]) < 0) >= KEEP_PATTERN
+    return "slow readings on one side" if inward and not regular and not other_side.any() else ""

@@ -17,53 +17,29 @@ from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, s
 from pendmap.records.work import Work
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
-    from numpy.typing import NDArray
+    from collections.abc import Collection, Mapping, Sequence
 
     from pendmap.records.description import Description, RunPlan
-    from pendmap.records.text import Table
+    from pendmap.records.tables import Table
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-_MOST_NAMED: Final = 8
-"""Columns that a message lists at most."""
-
+_MOST_NAMED: Final = 8  # Columns that a message lists at most
+# Channels from which an angle can be made
 ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-"""Channels from which an angle can be made."""
-
 POSITION_NAME: Final = "pos(ition)?"
-
-POSITION_AGREES: Final = 0.9
-"""Correlation, lines removed, from which a position is the integral of the velocity."""
-
+POSITION_AGREES: Final = 0.9  # Correlation that makes a position the integral of a velocity
 MOTOR_NAMES: Final = re.compile(
     r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
 )
-
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
-
 PIVOT_NAMES: Final = re.compile(
     r"\b(pivot|cart|carriage|trolley|slider?|shaker|stage|base|platform|support|suspension|wagen)\b"
 )
-
-ASKED_PIVOT_UNITS: Final = {
-    "m": "m",
-    "mm": "mm",
-    "cm": "cm",
-    "m/s": "m/s",
-    "m/s2": "m/s2",
-    "g": "g",
-}
-
+# Units of a pivot's column by words in its name
 PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
-"""Units of a pivot's column by words in its name."""
-
 ANGLE_NAMES: Final = re.compile(r"pos(ition)?|.*(angle|winkel|theta|encoder).*")
-
-MOST_UNUSED: Final = 12
-"""Names of unused columns that a message lists at most."""
+MOST_UNUSED: Final = 12  # Names of unused columns that a message lists at most
 
 
 def channels_of(  # noqa: C901 (a step each)
@@ -74,9 +50,9 @@ def channels_of(  # noqa: C901 (a step each)
     places: dict[str, int] = {}
     for channel, column in asked.items():
         name = column.name or CHANNELS[channel].default
-        if column.name is None and name not in table.names:
-            continue  # unit, scale or zero of a column that is to be found by its usual names
-        places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
+        # Without a name it is unit, scale or zero of a column that is found by its usual names.
+        if column.name is not None or name in table.names:
+            places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
     for channel, kind in CHANNELS.items():
         if channel in places or kind.default not in table.names:
             continue
@@ -84,7 +60,7 @@ def channels_of(  # noqa: C901 (a step each)
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
-    rate = description.rate_hz
+    rate, known = description.rate_hz, description.known
     findings = pictured(table, places, asked)
     findings += guess(table, places, timed=rate is None)
     values, heads = {}, {}
@@ -95,35 +71,31 @@ def channels_of(  # noqa: C901 (a step each)
         findings.append(Finding("rate-unused", text))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
-        given = asked.get(channel)
-        values[channel] = _in_si(channel, table, place, given, description, where)
+        column, counts = asked.get(channel, Column()), known.get("encoder_counts")
+        raw, head = table.values[:, place], table.names[place]
+        values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
-    if plan.pivot and "unit" not in plan.pivot:
-        text = 'the pivot has no unit: taken for an acceleration, unit = "m/s2"'
-        findings.append(Finding("pivot-unit", text))
     sensor, missing = None, ""
     if "acceleration" in places:
-        said = asked.get("acceleration", Column())
-        heading, read_in = name_and_unit(table.names[places["acceleration"]])
-        gravity = float(description.known.get("gravity", GRAVITY))
-        scaled = said.scale is not None
-        sensor, missing = accelerometer_of(
-            said.place, said.unit or read_in, heading, gravity, scaled=scaled
-        )
+        heading, unit = name_and_unit(table.names[places["acceleration"]])
+        gravity = float(known.get("gravity", GRAVITY))
+        column = asked.get("acceleration", Column())
+        sensor, missing = accelerometer_of(column, heading, unit, gravity)
     edges = asked.get("trigger", Column())
     time = values.pop("time")
-    return Work(
+    work = Work(
         where=where,
         plan=plan,
-        known=description.known,
+        known=known,
         declared=frozenset(c for c, column in asked.items() if column.unit or column.scale),
         time=time,
         theta=values.pop("angle", np.zeros(time.size)),
         rows=table.rows.copy(),
-        extra=values | pivot,
+        extra=values,
+        pivot=pivot,
         trusted=np.ones(time.size, bool),
         findings=[*table.findings, *findings],
         columns=heads,
@@ -134,6 +106,9 @@ def channels_of(  # noqa: C901 (a step each)
         phase=edges.phase,
         pivot_unit=pivot_unit,
     )
+    if plan.pivot and "unit" not in plan.pivot:
+        work.say("pivot-unit", 'the pivot has no unit: taken for an acceleration, unit = "m/s2"')
+    return work
 
 
 def _place(name: str, table: Table, where: str) -> int:
@@ -148,15 +123,19 @@ def _place(name: str, table: Table, where: str) -> int:
     near = difflib.get_close_matches(name, table.names, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
     raise InputError(
-        f"{where}: no column {short_repr(name)}{perhaps}: it must be one of {_listed(table)}"
+        f"{where}: no column {short_repr(name)}{perhaps}: it must be one of {_names(table)}"
     )
 
 
-def _listed(table: Table) -> str:
+def _names(table: Table) -> str:
     """Return the headings of a table for a message."""
-    names = [name[:40] or "(no name)" for name in table.names]
-    more = f", ... ({len(names)} in all)" if len(names) > _MOST_NAMED else ""
-    return ", ".join(map(repr, names[:_MOST_NAMED])) + more
+    return _listed([name[:40] or "(no name)" for name in table.names], _MOST_NAMED)
+
+
+def _listed(names: Sequence[str], most: int) -> str:
+    """Return the first of some names, and how many there are."""
+    more = f", ... ({len(names)} in all)" if len(names) > most else ""
+    return ", ".join(map(repr, names[:most])) + more
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
@@ -165,12 +144,12 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
     if "time" not in places and not timed:
         raise InputError(
             f"{where}: no column of times: there must be one like t_s, or a rate: --rate 1000 or"
-            f" rate_hz = 1000 in [columns] of experiment.toml (Hz); got columns {_listed(table)}"
+            f" rate_hz = 1000 in [columns] of experiment.toml (Hz); got columns {_names(table)}"
         )
     if not any(channel in places for channel in ANGLE_CHANNELS):
         raise InputError(
             f"{where}: no column of angles: there must be theta_rad or one like it; there are"
-            f" {_listed(table)}; {advice}"
+            f" {_names(table)}; {advice}"
         )
     for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
         if one in places and places[one] == places.get(other):
@@ -181,31 +160,21 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
 
 
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
-    channel: str,
-    table: Table,
-    place: int,
-    column: Column | None,
-    description: Description,
-    where: str,
+    channel: str, raw: Floats, head: str, column: Column, counts: int | None, where: str
 ) -> Floats:
     """Return the values of a column in SI: scaled as declared, or by its unit."""
-    raw = table.values[:, place]
-    kind = CHANNELS[channel]
-    where = f"{where}: {channel}"
-    zero = column.zero if column else 0.0
-    if column and column.scale is not None:
-        return np.asarray((raw - zero) * column.scale)
-    unit = column.unit if column else None
+    if column.scale is not None:
+        return (raw - column.zero) * column.scale
+    unit = column.unit
     if unit is None:
-        name, unit = name_and_unit(table.names[place])
+        name, unit = name_and_unit(head)
         # The name of a column "volts" or "counts" is its unit.
         unit = unit or (name if re.fullmatch("volts?|counts?|adc", plain(name)) else None)
     if unit is None:
-        return np.asarray(raw - zero)
-    counts = description.known.get("encoder_counts")
+        return raw - column.zero
     if counts and re.fullmatch("counts?|ticks?", plain(unit)):
-        return np.asarray((raw - zero) * 2 * np.pi / counts)
-    return np.asarray((raw - zero) * kind.factor(unit, where))
+        return (raw - column.zero) * 2 * np.pi / counts
+    return (raw - column.zero) * CHANNELS[channel].factor(unit, where)
 
 
 def _pivot(
@@ -215,13 +184,14 @@ def _pivot(
     if plan.pivot is None:
         return {}, None, []
     unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
-    ways = [way for way in ("vertical", "horizontal") if way in plan.pivot]
-    places = [_place(plan.pivot[way], table, f"{where}: pivot: {way}") for way in ways]
-    found = {
-        f"pivot:{way}": np.asarray(table.values[:, place] * factor * plan.pivot_scale)
-        for way, place in zip(ways, places, strict=True)
+    places = {
+        way: _place(plan.pivot[way], table, f"{where}: pivot: {way}")
+        for way in ("vertical", "horizontal")
+        if way in plan.pivot
     }
-    return found, unit, places
+    scale = plan.pivot_scale
+    found = {way: table.values[:, place] * factor * scale for way, place in places.items()}
+    return found, unit, list(places.values())
 
 
 def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
@@ -261,39 +231,36 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
         free = [k for k in range(table.values.shape[1]) if k not in guessed.values()]
         guessed |= {"angle": free[0]} if len(free) == 1 else {}
     places.update(guessed)
-    if not guessed:
-        return []
     said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {said}")]
+    return [Finding("columns-guessed", f"by their names {said}")] if guessed else []
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns for the channels that have none, by names like the usual ones."""
+    """Return columns for the channels that have none, by names like the usual ones.
+
+    Of the axes of a sensor it is the one that moves most, of all else the first.
+    """
     guessed: dict[str, int] = {}
-    split = [name_and_unit(head) for head in table.names]
     for channel, kind in CHANNELS.items():
-        if channel in places:
-            continue
         taken = {*places.values(), *guessed.values()}
-        fitting = [
-            k
-            for k, (name, unit) in enumerate(split)
-            if k not in taken
-            and (unit is None or kind.has(unit))
-            and re.fullmatch(kind.names, plain(name))
-        ]
-        if fitting:
-            guessed[channel] = _best(channel, fitting, table)
+        fitting = [k for k in _fitting(table, channel, kind.names) if k not in taken]
+        if channel in places or not fitting:
+            continue
+        columns = table.values[:, fitting]
+        spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
+        axes = channel in {"velocity", "acceleration"} and len(fitting) > 1
+        guessed[channel] = fitting[int(np.argmax(spread)) if axes else 0]
     return guessed
 
 
-def _best(channel: str, fitting: list[int], table: Table) -> int:
-    """Return the axis of a sensor that moves most; of all else the first column."""
-    if channel not in {"velocity", "acceleration"} or len(fitting) == 1:
-        return fitting[0]
-    columns = table.values[:, fitting]
-    spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
-    return fitting[int(np.argmax(spread))]
+def _fitting(table: Table, channel: str, names: str) -> list[int]:
+    """Return the columns with such a name and a unit of the channel, or none."""
+    split = [name_and_unit(head) for head in table.names]
+    return [
+        k
+        for k, (name, unit) in enumerate(split)
+        if (unit is None or CHANNELS[channel].has(unit)) and re.fullmatch(names, plain(name))
+    ]
 
 
 def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
@@ -333,31 +300,19 @@ def position_of(table: Table, places: Mapping[str, int]) -> int | None:
 
     A velocity beside it must be its slope: a cart has a position, too.
     """
-    split = [name_and_unit(head) for head in table.names]
-    found = [
-        k
-        for k, (name, unit) in enumerate(split)
-        if k not in places.values()
-        and re.fullmatch(POSITION_NAME, plain(name))
-        and (unit is None or CHANNELS["angle"].has(unit))
-    ]
-    if len(found) != 1:
-        return None
-    if "velocity" not in places:
-        return found[0]
+    from scipy.signal import detrend
+
+    taken = places.values()
+    found = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
+    if len(found) != 1 or "velocity" not in places:
+        return found[0] if len(found) == 1 else None
     both = table.values[:, [found[0], places["velocity"]]]
     both = both[np.isfinite(both).all(axis=1)]
     if both.shape[0] < 5:
         return None
-    one, other = _bent(both[:, 0]), _bent(np.cumsum(both[:, 1]))
+    one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     return found[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
-
-
-def _bent(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values less their least-squares line."""
-    place = np.arange(values.size)
-    return np.asarray(values - np.polyval(np.polyfit(place, values, 1), place))
 
 
 def head_of(table: Table, place: int) -> str:
@@ -365,7 +320,7 @@ def head_of(table: Table, place: int) -> str:
     return table.names[place] or f"column {place + 1}"
 
 
-def changes(values: NDArray[np.float64]) -> bool:
+def changes(values: Floats) -> bool:
     """Return whether a column has two different numbers."""
     seen = values[np.isfinite(values)]
     return bool(seen.size) and float(np.ptp(seen)) > 0
@@ -380,10 +335,7 @@ def _unused(
     names = tuple(head_of(table, k) for k in rest)
     if not rest:
         return (), []
-    more = f", ... ({len(names)} in all)" if len(names) > MOST_UNUSED else ""
-    findings = [
-        Finding("columns-unused", f"not used: {', '.join(map(repr, names[:MOST_UNUSED]))}{more}")
-    ]
+    findings = [Finding("columns-unused", f"not used: {_listed(names, MOST_UNUSED)}")]
     for k in rest:
         if changes(table.values[:, k]):
             findings += _asked(head_of(table, k), channels, plan)
@@ -405,7 +357,7 @@ def _asked(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]
         return [Finding("angle-column", f"{text} of experiment.toml takes it")]
     if PIVOT_NAMES.search(said) and plan.pivot is None:
         kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, said)), "m")
-        unit = ASKED_PIVOT_UNITS.get(unit, kind)
+        unit = unit if unit in PIVOT_UNITS else kind
         text = (
             f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'
             " (or vertical) in [[run]] of experiment.toml takes it"

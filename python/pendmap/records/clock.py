@@ -7,6 +7,7 @@ interval. A polynomial with a term ``d v`` from each sample on, fitted around it
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from bisect import bisect_left
 from typing import TYPE_CHECKING, Final
@@ -14,78 +15,44 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted, moment
+from pendmap.formatting import counted, listed, moment
 from pendmap.records.noise import fastest
 from pendmap.records.resolution import logs_edges, spread_stamps
 from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import intervals_of, normal_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices
 
-    Floats = NDArray[np.float64]
 
-
-RESTART: Final = 10
-"""Intervals that a restarted clock falls back by; samples that each part has."""
-
-REPORTED_JITTER: Final = 0.02
-"""Spread of the intervals over their median from which jitter is reported."""
-
-MOST_UNORDERED: Final = 0.3
-"""Share of unordered stamps from which the record is refused."""
-
-STOPPED_READINGS: Final = 50
-"""Readings with one stamp, besides ten times the usual, that stop a clock."""
-
-COARSE_STAMPS: Final = 0.2
-"""Share of repeated stamps from which the clock is coarser than the sampling."""
-
-SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))
-"""Findings about intervals."""
-
+RESTART: Final = 10  # Intervals that a restarted clock falls back by; samples that each part has
+REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals from which jitter is reported
+MOST_UNORDERED: Final = 0.3  # Share of unordered stamps from which the record is refused
+STOPPED_READINGS: Final = 50  # Readings with one stamp that stop a clock, and 10 times the usual
+COARSE_STAMPS: Final = 0.2  # Share of repeated stamps that makes a clock coarse
+SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
+# Seconds after which counters of 16 and 32 bits in us, ms or s wrap
 COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
-"""Seconds after which counters of 16 and 32 bits in us, ms or s wrap."""
-
-SLIP_DEGREE: Final = 7
-"""Degree of the polynomials that slips are seen with."""
-
-SLIP_PHASE: Final = 2.0
-"""Radians of phase to either side that such a polynomial follows within 6e-3."""
-
-SHORTEST_SIDE: Final = 8
-"""Samples to either side of a slip at least, to know both velocities."""
-
-LONGEST_SIDE: Final = 150
-"""Samples to either side of a slip at most."""
-
-FEWEST_SLIPS: Final = 3
-"""Slips of one size that make it a fault of the clock."""
-
-CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)
-"""Standard errors of a slip in each pass; large slips hide small ones beside them."""
-
-MOST_INTERVALS: Final = 4
-"""Intervals of the longest slip."""
-
-SLOW_POWER: Final = 1e-3
-"""Power over its median below which the motion is too slow to show a slip."""
-
-OFF_INTERVAL: Final = 0.25
-"""Intervals by which a slip may miss a whole number."""
-
-MOST_OTHER_JUMPS: Final = 0.2
-"""Share of the jumps that may be no slips."""
-
-_BLOCK: Final = 4000
-"""Windows that are solved at a time."""
+SLIP_DEGREE: Final = 7  # Degree of the polynomials that slips are seen with
+SLIP_PHASE: Final = 2.0  # Radians of phase to either side that it follows within 6e-3
+SHORTEST_SIDE: Final = 8  # Samples to either side of a slip at least, to know both velocities
+LONGEST_SIDE: Final = 150  # Samples to either side of a slip at most
+FEWEST_SLIPS: Final = 3  # Slips of one size that make it a fault of the clock
+CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)  # Standard errors of a slip in each pass
+MOST_INTERVALS: Final = 4  # Intervals of the longest slip
+SLOW_POWER: Final = 1e-3  # Power over its median below which the motion is too slow to show a slip
+OFF_INTERVAL: Final = 0.25  # Intervals by which a slip may miss a whole number
+MOST_OTHER_JUMPS: Final = 0.2  # Share of the jumps that may be no slips
+_BLOCK: Final = 4000  # Windows that are solved at a time
 
 
 def mend(work: Work) -> None:
     """Make the times strictly increasing and report it; raise InputError if none increase."""
-    _finite(work)
+    missing = ~np.isfinite(work.time)
+    if missing.all():
+        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
+    work.leave_out(missing, "time-missing", "row", "without a time left out")
     if work.time.size < 2:
         work.refuse_short()
     _stopped(work)
@@ -102,29 +69,19 @@ def cut_at_pauses(work: Work) -> None:
     """Keep the side with more samples of a pause longer than the rest of the record."""
     while work.time.size > 2:
         steps = np.diff(work.time)
-        pause = int(np.argmax(steps))
-        rest = float(work.time[-1] - work.time[0] - steps[pause])
-        if steps[pause] <= max(rest, RESTART * float(np.median(steps))):
+        at = int(np.argmax(steps)) + 1
+        pause = steps[at - 1]
+        rest = float(work.time[-1] - work.time[0] - pause)
+        if pause <= max(rest, RESTART * float(np.median(steps))):
             return
-        before = pause + 1 >= work.time.size - pause - 1
-        kept = np.arange(pause + 1) if before else np.arange(pause + 1, work.time.size)
+        places = np.arange(work.time.size)
+        side = "before" if at >= work.time.size - at else "after"
         text = (
-            f"nothing for {steps[pause]:.3g} s, longer than all the rest: what is"
-            f" {'before' if before else 'after'} is used; from_s and to_s choose another part"
+            f"a pause of {pause:.3g} s, longer than the rest of the record: the part {side} it is"
+            " used; from_s and to_s choose another"
         )
-        work.say("time-pause", text, at=np.array([pause + 1]))
-        work.keep(kept)
-
-
-def _finite(work: Work) -> None:
-    """Leave out rows without a time."""
-    missing = np.flatnonzero(~np.isfinite(work.time))
-    if missing.size == work.time.size:
-        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
-    if missing.size:
-        text = f"{counted(missing.size, 'row')} without a time left out"
-        work.say("time-missing", text, mended=True, at=missing)
-        work.keep(np.isfinite(work.time))
+        work.say("time-pause", text, at=np.array([at]))
+        work.keep(places < at if side == "before" else places >= at)
 
 
 def _stopped(work: Work) -> None:
@@ -139,10 +96,10 @@ def _stopped(work: Work) -> None:
     own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
     begin, end = edges[stops] + usual * own, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
-    times = ", ".join(moment(work.time[k]) for k in begin[:3]) + (", ..." if begin.size > 3 else "")
+    times = listed([moment(work.time[k]) for k in begin], 3)
     text = (
         f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
-        " without a time of their own left out"
+        " without own times left out"
     )
     work.say("time-stops", text, mended=True, at=begin)
     work.keep(np.delete(np.arange(work.time.size), out))
@@ -157,7 +114,7 @@ def _wrapped(work: Work) -> None:
         at = np.flatnonzero(np.abs(steps + wrap) < slack)
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
             work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
-            text = f"the clock's counter began again {counted(at.size, 'time')}, continued"
+            text = f"the counter of the clock wrapped {counted(at.size, 'time')}: continued"
             work.say("time-wrapped", text, mended=True, at=at + 1)
             return
 
@@ -165,63 +122,58 @@ def _wrapped(work: Work) -> None:
 def _restarted(work: Work) -> None:
     """Keep the longest stretch of a clock that starts again."""
     steps = np.diff(work.time)
-    rising = steps[steps > 0]
-    if not rising.size:
-        return
-    usual = float(np.median(rising))
-    falls = np.flatnonzero(steps < -RESTART * usual) + 1
-    edges = [0, *falls.tolist(), work.time.size]
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
+    falls = (np.flatnonzero(steps < -RESTART * usual) + 1).tolist()
     # A single false stamp is no restart: the stamps after it continue those before.
-    starts = [0]
-    for k, low in enumerate(edges[1:-1], 1):
-        part = work.time[low : edges[k + 1]]
-        before = work.time[starts[-1] : low]
+    edges = [0]
+    for low, high in itertools.pairwise([*falls, work.time.size]):
+        part, before = work.time[low:high], work.time[edges[-1] : low]
         again = part.size > RESTART and np.median(part[:RESTART]) < np.median(before[-RESTART:])
         if again and before.size > RESTART:
-            starts.append(low)
-    if len(starts) == 1:
+            edges.append(low)
+    if len(edges) == 1:
         return
-    edges = [*starts, work.time.size]
-    sizes = np.diff(edges)
-    best = int(np.argmax(sizes))
+    starts = np.array(edges[1:])
+    edges.append(work.time.size)
+    best = int(np.argmax(np.diff(edges)))
+    low, high = edges[best : best + 2]
     text = (
-        f"the clock starts again {counted(len(starts) - 1, 'time')}: of {len(starts)} parts the"
-        f" longest is used, rows {work.rows[edges[best]]} to {work.rows[edges[best + 1] - 1]}"
+        f"the clock starts again {counted(starts.size, 'time')}: of {starts.size + 1} parts the"
+        f" longest is used, rows {work.rows[low]} to {work.rows[high - 1]}"
     )
-    work.say("time-restarts", text, mended=False, at=np.asarray(starts[1:]))
-    work.keep(np.arange(edges[best], edges[best + 1]))
+    work.say("time-restarts", text, at=starts)
+    work.keep(np.arange(low, high))
 
 
 def _coarse(work: Work) -> None:
     """Spread stamps evenly where several samples share each of them."""
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
-    if 0 < same < 1 and np.all(steps >= 0) and logs_edges(work.theta):
+    if not 0 < same < 1 or np.any(steps < 0):
+        return
+    if logs_edges(work.theta):
         work.time = spread_stamps(work.time)
         text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
         work.say("time-coarse", text, mended=True)
         return
-    if same < COARSE_STAMPS or same == 1 or np.any(steps < 0):
+    rows = np.diff(np.stack([work.theta, *work.extra.values(), *work.pivot.values()]), axis=1)
+    repeated = np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9  # samples and stamps
+    if same < COARSE_STAMPS or repeated:
         return
-    rows = np.diff(np.stack([work.theta, *work.extra.values()]), axis=1)
-    if np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9:
-        return  # the samples are repeated with their stamps
     place = np.arange(work.time.size)
     slope, start = np.polyfit(place, work.time - work.time[0], 1)
     tick = float(np.median(steps[steps > 0]))
     away = work.time - work.time[0] - (start + slope * place)
-    if slope <= 0 or np.max(np.abs(away)) > 1.5 * tick:
-        return  # samples are lost besides: left to the rest
-    work.time = work.time[0] + start + slope * place
-    text = (
-        f"{100 * same:.0f} % of the stamps repeat the one before: spread evenly, {1 / slope:.6g} Hz"
-    )
-    work.say("time-coarse", text, mended=True)
+    if slope > 0 and np.max(np.abs(away)) <= 1.5 * tick:  # no samples are lost besides
+        work.time = work.time[0] + start + slope * place
+        share = f"{100 * same:.0f} % of the stamps repeat the one before"
+        text = f"{share}: spread evenly, {1 / slope:.6g} Hz"
+        work.say("time-coarse", text, mended=True)
 
 
 def _ordered(work: Work) -> None:
-    # Stamps that differ by rounding alone are equal.
     """Reverse, sort or leave out rows whose times do not increase."""
+    # Stamps that differ by rounding alone are equal.
     near = 2 * float(np.spacing(np.max(np.abs(work.time))))
     steps = np.diff(work.time)
     if np.all(steps > near):
@@ -230,15 +182,10 @@ def _ordered(work: Work) -> None:
         work.keep(np.arange(work.time.size)[::-1])
         work.say("time-backwards", "the rows run backwards in time: turned round", mended=True)
         return
-    repeated = np.flatnonzero(np.abs(steps) <= near) + 1
-    if repeated.size:
-        alike = np.sum(work.theta[repeated] == work.theta[repeated - 1])
-        text = (
-            f"{counted(repeated.size, 'time stamp')} twice ({alike} with the same reading): the"
-            " first of each kept"
-        )
-        work.say("time-duplicate", text, mended=True, at=repeated)
-        work.keep(np.delete(np.arange(work.time.size), repeated))
+    again = np.append(False, np.abs(steps) <= near)
+    alike = np.sum(np.diff(work.theta, prepend=np.nan)[again] == 0)
+    why = f"twice ({alike} with the same reading): the first of each kept"
+    work.leave_out(again, "time-duplicate", "time stamp", why)
     kept = _longest_rising(work.time)
     out = np.setdiff1d(np.arange(work.time.size), kept)
     if not out.size:
@@ -246,26 +193,20 @@ def _ordered(work: Work) -> None:
     order = np.argsort(work.time, kind="stable")
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
         text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
-        work.say("time-backwards", text, mended=True, at=out)
-        _keep_apart(work, order, near)
-        return
-    if out.size > MOST_UNORDERED * work.time.size:
+        kept = order
+    elif out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
             f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
             " of order, and in order the angles make no motion"
         )
-    text = f"{counted(out.size, 'time stamp')} out of order, left out"
+    else:
+        text = f"{counted(out.size, 'time stamp')} out of order, left out"
     work.say("time-backwards", text, mended=True, at=out)
-    _keep_apart(work, kept, near)
+    work.keep(kept)
+    work.keep(np.append(True, np.diff(work.time) > near))
 
 
-def _keep_apart(work: Work, places: NDArray[np.intp], near: float) -> None:
-    """Keep the rows at these places, and the first of each stamp."""
-    work.keep(places)
-    work.keep(np.concatenate([[True], np.diff(work.time) > near]))
-
-
-def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
+def _smoother(theta: Floats, at: Indices) -> bool:
     """Return whether moved samples fit between their new neighbours as all others do."""
     if theta.size < 5 or not np.all(np.isfinite(theta)):
         return False
@@ -273,11 +214,10 @@ def _smoother(theta: Floats, at: NDArray[np.intp]) -> bool:
     usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
     if not usual:  # most were moved: a motion has bends that are small against its way
         return bool(np.median(bend) < 0.1 * np.ptp(theta))
-    moved = bend[np.clip(at - 1, 0, bend.size - 1)]
-    return bool(np.all(moved <= 3 * usual))
+    return bool(np.all(bend[np.clip(at - 1, 0, bend.size - 1)] <= 3 * usual))
 
 
-def _longest_rising(time: Floats) -> NDArray[np.intp]:
+def _longest_rising(time: Floats) -> Indices:
     """Return the places of the longest strictly rising subsequence."""
     tails: list[float] = []
     ends: list[int] = []
@@ -309,14 +249,13 @@ def _spacing(work: Work) -> None:
         return
     if gaps.size:
         worst = gaps[int(np.argmax(steps[gaps]))]
+        low, high = work.time[worst : worst + 2].tolist()
         text = (
             f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
-            f" longest {steps[worst]:.3g} s at {moment(work.time[worst])} s"
+            f" longest {steps[worst]:.3g} s at {moment(low)} s"
         )
-        span = (float(work.time[worst]), float(work.time[worst + 1]))
-        work.say("time-gap", text, at=gaps, span=span)
-    even = np.delete(steps, gaps)
-    spread = math.sqrt(float(np.mean((even - usual) ** 2)))
+        work.say("time-gap", text, at=gaps, span=(low, high))
+    spread = math.sqrt(float(np.mean((np.delete(steps, gaps) - usual) ** 2)))
     if spread > REPORTED_JITTER * usual:
         share = 100 * spread / usual
         text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
@@ -328,7 +267,7 @@ class Slips:
     """Where a clock slipped, the corrected times, and the mean slip of one interval."""
 
     time: Floats  # corrected, s
-    places: NDArray[np.intp]  # first sample after each slip
+    places: Indices  # first sample after each slip
     slip: float  # s
     stderr: float  # s
 
@@ -341,7 +280,10 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
     reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
     if reach < SHORTEST_SIDE or time.size < 20 * reach:
         return None
-    shown = _shown(reach)
+    # Apparent sizes of slips of 1, 2, ... intervals: a jump spoils the velocity.
+    place = np.arange(-3 * reach, 3 * reach + 1)
+    tried = [_tried(place + k * (place >= 0.0), reach) for k in range(1, MOST_INTERVALS + 1)]
+    shown = np.array([gain[3 * reach] / power[3 * reach] for gain, power in tried])
     mended, places = time.copy(), list[int]()
     slip = stderr = 0.0
     for limit in CERTAIN_SLIP:
@@ -357,22 +299,14 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
             stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))
         if not good.any():
             break
-        starts = np.searchsorted(mended, grid[at[good]] - interval / 2)
-        for k, count in zip(starts.tolist(), number[good].tolist(), strict=True):
+        starts = np.searchsorted(mended, grid[at[good]] - interval / 2).tolist()
+        for k, count in zip(starts, number[good].tolist(), strict=True):
             mended[k:] += count * interval
-            places.append(int(k))
+        places += starts
     return Slips(mended, np.unique(places), slip, stderr)
 
 
-def _shown(reach: int) -> Floats:
-    """Return the apparent sizes of slips of 1, 2, ... intervals; a jump spoils the velocity."""
-    place = np.arange(-3 * reach, 3 * reach + 1)
-    lines = [place + number * (place >= 0.0) for number in range(1, MOST_INTERVALS + 1)]
-    lags = [gain / power for gain, power in (_tried(line, reach) for line in lines)]
-    return np.array([lag[3 * reach] for lag in lags])
-
-
-def _found(values: Floats, reach: int, limit: float) -> tuple[NDArray[np.intp], Floats]:
+def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
     """Return the first samples after slips, and the apparent slips in intervals."""
     from scipy.ndimage import maximum_filter1d
 

@@ -8,6 +8,7 @@ A swing alone does not tell the distance of a tangential sensor from the sense o
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -17,52 +18,28 @@ from pendmap.formatting import counted
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.resolution import step_of
 from pendmap.records.rod_sensors import Accelerometer
-from pendmap.records.units import PIVOT_UNITS
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-SAME_MOTION: Final = 0.8
-"""Correlation from which two channels show the same motion."""
-
-GAIN_OFF: Final = 0.1
-"""Relative error that a gain of 1 may have: filtered channels miss a few per cent."""
-
-CERTAIN_SIGN: Final = 8.0
-"""Standard errors from which a coefficient has the wrong sign."""
-
-FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}
-"""Largest span of a pivot in a laboratory, by unit."""
-
-DERIVATIVE_SPAN: Final = 0.12
-"""Periods over which derivatives are taken."""
-
+SAME_MOTION: Final = 0.8  # Correlation from which two channels show the same motion
+GAIN_OFF: Final = 0.1  # Relative error of a gain that the filter of a channel may cause
+CERTAIN_SIGN: Final = 8.0  # Standard errors from which a coefficient has the wrong sign
+FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Largest span
+DERIVATIVE_SPAN: Final = 0.12  # Periods over which derivatives are taken
+# Why an acceleration beside an angle is not used
 CHECK_ONLY: Final = "a check, not fitted: the angle is"
-"""Why an acceleration beside an angle is not used."""
-
-PIVOT_ORDER: Final = {"m": 2, "m/s": 1}
-"""Derivatives from a unit of the pivot to an acceleration."""
-
-NOISE_SHARE: Final = 0.05
-"""Noise of the pivot's acceleration over its largest value, at most."""
-
-STEPS_PASSED: Final = 4.0
-"""Steps that a moving pivot passes within a window at least."""
-
-LONGEST_WINDOW: Final = 0.2
-"""Seconds that a window spans at most, unless it then holds only five readings."""
-
-MOVING_SHARE: Final = 0.2
-"""Speed over the largest from which the pivot moves."""
+PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Derivatives from a unit of the pivot to an acceleration
+NOISE_SHARE: Final = 0.05  # Noise of the pivot's acceleration over its largest value, at most
+STEPS_PASSED: Final = 4.0  # Steps that a moving pivot passes within a window at least
+LONGEST_WINDOW: Final = 0.2  # Seconds of a window of more than five readings at most
+MOVING_SHARE: Final = 0.2  # Speed over the largest from which the pivot moves
 
 
 def check(work: Work) -> None:
@@ -71,28 +48,23 @@ def check(work: Work) -> None:
         _velocity(work)
     if "acceleration" in work.extra:
         _acceleration(work)
-    if work.plan.kind == "forced":
-        _far(work)
-        _drive_sign(work)
-
-
-def _far(work: Work) -> None:
-    """Report a pivot whose span shows another unit."""
-    unit, _ = PIVOT_UNITS[(work.plan.pivot or {}).get("unit", "m/s2")]
-    for way, values in (work.pivot() or {}).items():
+    if work.plan.kind != "forced":
+        return
+    for way, values in work.pivot.items():
         good = values[np.isfinite(values)]
         span = float(np.ptp(good)) if good.size else 0.0
-        if span > FARTHEST_PIVOT[unit]:
-            text = f"the pivot's {way} motion spans {span:.4g} {unit}: its unit is another"
-            work.say("pivot-unit", text)
+        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
+            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
+            work.say("pivot-unit", f"{text}: its unit is another")
+    _drive_sign(work)
 
 
 def _velocity(work: Work) -> None:
     """Compare a velocity with the slope of the angle: turn it, rescale it or leave it out."""
     velocity = work.extra["velocity"]
-    missing = ~np.isfinite(velocity)
-    if missing.any():
-        text = f"{counted(int(missing.sum()), 'sample')} without velocity: the channel is left out"
+    missing = int(np.count_nonzero(~np.isfinite(velocity)))
+    if missing:
+        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
         work.say("velocity-missing", text)
         del work.extra["velocity"]
         return
@@ -111,18 +83,22 @@ def _velocity(work: Work) -> None:
         work.say("velocity-unlike", text)
         del work.extra["velocity"]
         return
-    gain = float(np.dot(slope, seen) / np.dot(slope, slope)) * scale
+    gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
     if alike < 0:
-        work.extra["velocity"] = -velocity
-        text = "the velocity has the other sign than the angle: turned round, the angle counts"
-        work.say("sign-turned", text, mended=True)
-    gain = abs(gain)
+        _turn(work, "velocity")
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
         text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
         work.say("velocity-unit", text, mended=True)
     elif abs(gain - 1) > GAIN_OFF:
         work.say("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+
+
+def _turn(work: Work, channel: str) -> None:
+    """Change the sign of a channel that runs against the angle."""
+    work.extra[channel] = -work.extra[channel]
+    text = f"the {channel} has the other sign than the angle: turned round, the angle counts"
+    work.say("sign-turned", text, mended=True)
 
 
 def _drive_sign(work: Work) -> None:
@@ -143,27 +119,22 @@ def _drive_sign(work: Work) -> None:
     if window > count // 4:
         return
 
-    def smooth(values: Floats, derivative: int = 0) -> Floats:
-        smoothed: Floats = savgol_filter(values, window, 3, deriv=derivative, delta=interval)
-        return smoothed
-
-    sine, cosine = np.sin(theta), np.cos(theta)
-    columns, names = [smooth(sine)], [""]
-    for name, accelerating in _pushes(work, even, smooth).items():
-        columns.append(smooth(accelerating * (cosine if name == "horizontal" else sine)))
-        names.append(name)
-    table = np.column_stack(columns)
-    if len(names) == 1 or np.linalg.matrix_rank(table) < len(names):
+    smooth = functools.partial(savgol_filter, window_length=window, polyorder=3, delta=interval)
+    pushes = _pushes(work, even, smooth)
+    arms = {name: np.cos if name == "horizontal" else np.sin for name in pushes}
+    columns = [smooth(push * arms[name](theta)) for name, push in pushes.items()]
+    table = np.column_stack([smooth(np.sin(theta)), *columns])
+    if not pushes or np.linalg.matrix_rank(table) < table.shape[1]:
         return
-    target = smooth(theta, 2)
+    target = smooth(theta, deriv=2)
     answer = np.linalg.lstsq(table, target, rcond=None)[0]
     rest = target - table @ answer
-    worth = max(count / window, len(names) + 1.0)
+    worth = max(count / window, table.shape[1] + 1.0)
     variance = float(np.sum(rest**2)) / count * (count / worth)
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
     if answer[0] > 0:
         return  # no pendulum about 0: nothing to tell a sign by
-    for name, value, error in zip(names[1:], answer[1:], errors[1:], strict=True):
+    for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
             said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
             text = f"{said} acts with the other sign than the angle shows: turned by 180 degrees?"
@@ -174,20 +145,18 @@ def _drive_sign(work: Work) -> None:
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
     """Return the accelerations of the pivot, or a(t) of the drive, at even times."""
     found: dict[str, Floats] = {}
-    plan = work.plan
-    if plan.drive is not None and plan.drive["phi"] is not None:
-        p, omega = plan.drive["p"] or 0.0, plan.drive["Omega"] or 0.0
-        if p:
-            found["drive"] = p * np.cos(omega * even + plan.drive["phi"])
-    unit, _ = PIVOT_UNITS[(plan.pivot or {}).get("unit", "m/s2")]
-    order = {"m/s": 1, "m": 2}.get(unit, 0)
-    for way, values in (work.pivot() or {}).items():
+    drive = work.plan.drive or {}
+    p, phi = drive.get("p"), drive.get("phi")
+    if p and phi is not None:
+        found["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
+    order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
+    for way, values in work.pivot.items():
         good = np.isfinite(values)
         if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
             continue
         if np.max(np.abs(values[good])) < 1e6:
             motion = np.interp(even, work.time[good], values[good])
-            found[way] = smooth(motion, order) if order else motion
+            found[way] = smooth(motion, deriv=order) if order else motion
     return found
 
 
@@ -213,14 +182,12 @@ def _acceleration(work: Work) -> None:
     """Compare an acceleration with the angle beside it; turn it if its sign is the other."""
     if work.made_of is not None:
         return
-    if work.plan.kind == "forced":
-        text = "the acceleration is not used: on a forced run it holds the pivot's own"
-        work.say("acceleration-unused", text)
-        return
-    motion = _motion(work)
+    motion = None if work.plan.kind == "forced" else _motion(work)
     if motion is None:
-        text = "the acceleration is not used: too few samples beside the angle to compare it"
-        work.say("acceleration-unused", text)
+        forced = "on a forced run it holds the pivot's own"
+        short = "too few samples beside the angle to compare it"
+        why = forced if work.plan.kind == "forced" else short
+        work.say("acceleration-unused", f"the acceleration is not used: {why}")
     elif work.accelerometer is None:
         _unplaced(work, motion)
     else:
@@ -279,9 +246,8 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
     """Report how an acceleration compares with the readings expected at its place."""
     expected = motion.expected(sensor)
     alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
-    where = (
-        "" if sensor.direction == "angular" else f", {sensor.direction} at {sensor.distance_m:g} m"
-    )
+    angular = sensor.direction == "angular"
+    where = "" if angular else f", {sensor.direction} at {sensor.distance_m:g} m"
     if abs(alike) < SAME_MOTION:
         text = (
             f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
@@ -290,40 +256,27 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
         work.say("acceleration-unlike", text)
         return
     if gain < 0:
-        work.extra["acceleration"] = -work.extra["acceleration"]
-        text = "the acceleration has the other sign than the angle: turned round, the angle counts"
-        work.say("sign-turned", text, mended=True)
-    gain = abs(gain)
-    if abs(gain - 1) > GAIN_OFF:
-        text = (
-            f"the acceleration is {gain:.3g} times what the angle says{where}:"
-            f" {_other(motion, sensor)}; not used"
-        )
-        work.say("acceleration-scale", text)
+        _turn(work, "acceleration")
+    text = f"the acceleration is {abs(gain):.3g} times what the angle says{where}"
+    if abs(abs(gain) - 1) <= GAIN_OFF:
+        work.say("acceleration-agrees", f"{text}: {CHECK_ONLY}")
         return
-    text = f"the acceleration is {gain:.3g} times what the angle says{where}: {CHECK_ONLY}"
-    work.say("acceleration-agrees", text)
+    other = "its unit, or a distance"
+    if not angular:
+        distance = _distance(motion, math.copysign(1.0, alike), sensor)
+        other = (
+            f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
+        )
+        other += " or gravity_removed is wrong"
+    work.say("acceleration-scale", f"{text}: {other}; not used")
 
 
-def _other(motion: _Motion, sensor: Accelerometer) -> str:
-    """Return other places or units that would explain the readings."""
-    if sensor.direction == "angular":
-        return "its unit, or a distance"
-    measured = motion.measured * math.copysign(
-        1.0, _alike(motion.expected(sensor), motion.measured)
-    )
-    distance = _distance(dataclasses.replace(motion, measured=measured), sensor)
-    found = f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
-    return f"{found} or gravity_removed is wrong"
-
-
-def _distance(motion: _Motion, sensor: Accelerometer) -> float:
+def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
     """Return the distance that the readings show, m, for the given gravity and direction."""
+    measured = sign * motion.measured
     if sensor.direction == "radial":
-        rest = motion.measured - sensor.gravity * np.cos(motion.theta)
-        return _slope(motion.velocity**2, rest)
-    gain = _slope(np.sin(motion.theta), motion.measured)
-    return (sensor.gravity - gain) / motion.w0**2
+        return _slope(motion.velocity**2, measured - sensor.gravity * np.cos(motion.theta))
+    return (sensor.gravity - _slope(np.sin(motion.theta), measured)) / motion.w0**2
 
 
 def _unplaced(work: Work, motion: _Motion) -> None:
@@ -336,9 +289,9 @@ def _unplaced(work: Work, motion: _Motion) -> None:
         work.say("acceleration-unlike", text)
         return
     if abs(radial) > abs(sine):
-        turned = dataclasses.replace(motion, measured=math.copysign(1.0, radial) * motion.measured)
-        distance = _distance(turned, Accelerometer("radial", 1.0, gravity))
-        without = _distance(turned, Accelerometer("radial", 1.0, 0.0))
+        sign = math.copysign(1.0, radial)
+        distance = _distance(motion, sign, Accelerometer("radial", 1.0, gravity))
+        without = _distance(motion, sign, Accelerometer("radial", 1.0, 0.0))
         said = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
     else:
         gain = abs(_slope(np.sin(motion.theta), motion.measured))
@@ -349,26 +302,23 @@ def _unplaced(work: Work, motion: _Motion) -> None:
             f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
             f" {without:.3g} if gravity is removed"
         )
-    text = (
-        f"the acceleration looks {said}; {work.place_missing} in [columns] would make it"
-        f" {CHECK_ONLY}"
-    )
-    work.say("acceleration-unused", text)
+    use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
+    work.say("acceleration-unused", f"the acceleration looks {said}; {use}")
 
 
 def smooth_pivot(work: Work) -> None:
     """Replace places or speeds of the pivot that come in steps by smooth accelerations."""
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
-    motion = work.pivot() or {}
-    if not order or work.time.size < 20 or not all(np.isfinite(v).all() for v in motion.values()):
+    known = all(np.isfinite(values).all() for values in work.pivot.values())
+    if not order or work.time.size < 20 or not known:
         return
     interval, even = even_times(work.time)
     if not even.size:
         return
-    places = {way: np.interp(even, work.time, values) for way, values in motion.items()}
+    places = {way: np.interp(even, work.time, values) for way, values in work.pivot.items()}
     windows = [
         _cubic_window(places[way], step_of(values), order, interval)
-        for way, values in motion.items()
+        for way, values in work.pivot.items()
         if np.ptp(values) > 0
     ]
     if not windows or max(windows) < 7:
@@ -377,7 +327,7 @@ def smooth_pivot(work: Work) -> None:
 
     for way, values in places.items():
         pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
-        work.extra[f"pivot:{way}"] = np.interp(work.time, even, pushed)
+        work.pivot[way] = np.interp(work.time, even, pushed)
     what = "places" if order == 2 else "speeds"
     text = (
         f"the pivot's {what} come in steps: its acceleration is that of cubics through"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
@@ -12,17 +12,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from pendmap.records.description import Kind
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
-
-Kind = Literal["free", "forced"]
-
+# Findings of runs without anything to fit
 NOTHING_TO_FIT: Final = frozenset(("no-motion", "peaks-undeclared"))
-"""Findings of runs without anything to fit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,7 +126,7 @@ class Run:
     kind: Kind
     time: Floats
     theta: Floats
-    trusted: NDArray[np.bool_]
+    trusted: Mask
     lab_time_s: float = 0.0
     hold_out: bool = False
     velocity: Floats | None = None

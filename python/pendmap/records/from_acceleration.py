@@ -19,45 +19,21 @@ from pendmap.records.swinging import LEAST_SWING, middle_over, swinging
 from pendmap.signal.half_cycles import swings
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.rod_sensors import Accelerometer
-    from pendmap.records.swinging import Swinging
     from pendmap.records.work import Work
-
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
+    from pendmap.signal import Floats, Stretch
 
 
-FEWEST_HALF_SWINGS: Final = 4
-"""Half swings from which a period is taken."""
-
-CERTAIN_DIP: Final = 0.3
-"""Relative dip that noise cannot cause."""
-
-LARGEST_READING: Final = 1.15
-"""Reading over the largest of a swing from which place or unit are wrong."""
-
-ONE_SIDED: Final = 0.15
-"""Smaller over larger side of the readings below which the axis is radial."""
-
-BLIND_SPOT: Final = 0.05
-"""Relative distance from the centre of oscillation at which no swing is seen."""
-
-WEAK_SPOT: Final = 0.2
-"""Relative distance from it within which a swing is seen weakly."""
-
-QUARTER_TURN_PERIOD: Final = 1.18
-"""Period of a swing of a quarter turn over that of a small one."""
-
-LEAST_DIP: Final = 0.01
-"""Relative dip between two humps at least."""
-
-DIP_NOISE: Final = 4.0
-"""Standard errors of a dip at least."""
-
-LEAST_HUMP: Final = 0.75
-"""Hump over the largest reading of a swing beside a dip: there the sine is 1."""
+FEWEST_HALF_SWINGS: Final = 4  # Half swings from which a period is taken
+CERTAIN_DIP: Final = 0.3  # Relative dip that noise cannot cause
+LARGEST_READING: Final = 1.15  # Reading over the largest of a swing: place or unit is wrong
+ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
+BLIND_SPOT: Final = 0.05  # Relative distance from the centre of oscillation that shows no swing
+WEAK_SPOT: Final = 0.2  # Relative distance from it within which a swing is seen weakly
+QUARTER_TURN_PERIOD: Final = 1.18  # Period of a swing of a quarter turn over that of a small one
+LEAST_DIP: Final = 0.01  # Relative dip between two humps at least
+DIP_NOISE: Final = 4.0  # Standard errors of a dip at least
+LEAST_HUMP: Final = 0.75  # Hump beside a dip over the largest reading, there the sine is 1
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:
@@ -69,14 +45,14 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     time, reading, where = work.time, work.extra["acceleration"], work.where
     noise = noise_of(time, reading).sigma
     noise = noise if math.isfinite(noise) else 0.0
-    moves = swinging(time, reading, noise)
+    free, held = swinging(time, reading, noise)
     least = max(LEAST_SWING * noise, 1e-12)
-    middles = [middle_over(time[a:b], reading[a:b], least) for a, b in moves.free]
-    middle = float(np.average(middles, weights=[b - a for a, b in moves.free]))
-    free = np.concatenate([reading[a:b] for a, b in moves.free])
-    _refuse_radial(free, middle, accelerometer, where)
+    middles = [middle_over(time[a:b], reading[a:b], least) for a, b in free]
+    middle = float(np.average(middles, weights=[b - a for a, b in free]))
+    swung = np.concatenate([reading[a:b] for a, b in free])
+    _refuse_radial(swung, middle, accelerometer, where)
     values = reading - middle
-    each = [waves_of(time, values, part, noise) for part in moves.free]
+    each = [waves_of(time, values, part, noise) for part in free]
     waves = [wave for part in each for wave in part]
     if len(waves) < FEWEST_HALF_SWINGS:
         raise InputError(
@@ -89,10 +65,20 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     weak = signal < 4 * LEAST_SWING
     doubt = _refuse_blind(found, waves, where, weak=weak)
     _refuse_large(each, found, where)
-    _refuse_held(values, moves, found, where)
+    for low, high in held:
+        level = abs(float(np.median(values[low:high])))
+        if found.gravity and level > LARGEST_READING * found.gravity:
+            raise InputError(
+                f"{where}: the acceleration is {level:.3g} {found.unit} while the pendulum is"
+                f" held, and gravity gives at most {found.gravity:.3g}: unit is wrong"
+            )
     if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
-    work.theta, work.accelerometer = _unfolded(values, each, moves, found, noise), found
+    work.theta, work.accelerometer = _unfolded(values, each, free, found, noise), found
+    for low, high in held:
+        # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
+        pull = values[low:high] / found.gravity if found.gravity else np.zeros(high - low)
+        work.theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
     return doubt
 
 
@@ -146,8 +132,8 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
         # Weak readings give an uncertain frequency, and with it an uncertain centre of oscillation.
         raise InputError(
             f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
-            " g/w0^2 from the pivot, where gravity and the swing cancel: nothing but damping is"
-            " felt there; it must be another place on the rod, or have an angle beside it"
+            " g/w0^2 from the pivot, where gravity and the swing cancel: only damping is"
+            " measured there; it must be another place on the rod, or have an angle beside it"
         )
     if away > WEAK_SPOT:
         return ""
@@ -164,9 +150,10 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
     top = float(np.quantile([wave.top for waves in each for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > LARGEST_READING * most:
-        removed = "" if sensor.gravity else ", gravity removed"
-        place = f" at distance_m = {sensor.distance_m:g}{removed}"
-        place = "" if sensor.direction == "angular" else place
+        place = ""
+        if sensor.direction != "angular":
+            removed = "" if sensor.gravity else ", gravity removed"
+            place = f" at distance_m = {sensor.distance_m:g}{removed}"
         raise InputError(
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}{place}: unit, distance_m, direction or gravity_removed is wrong"
@@ -174,62 +161,38 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
     for waves in each:
         folds = [k for k, wave in enumerate(waves) if wave.dip > CERTAIN_DIP]
         before = waves[: folds[-1]] if folds else []
-        if not any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
-            continue
-        raise InputError(
-            f"{where}: the pendulum turns over the top, which an acceleration alone does not show:"
-            " it must have an angle or a velocity beside it, or a later from_s"
-        )
-
-
-def _refuse_held(values: Floats, moves: Swinging, sensor: Accelerometer, where: str) -> None:
-    """Refuse holds that read more than gravity."""
-    for low, high in moves.held:
-        level = abs(float(np.median(values[low:high])))
-        if sensor.gravity and level > LARGEST_READING * sensor.gravity:
+        if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
             raise InputError(
-                f"{where}: the acceleration is {level:.3g} {sensor.unit} while the pendulum is"
-                f" held, and gravity gives at most {sensor.gravity:.3g}: unit is wrong"
+                f"{where}: the pendulum turns over the top, which an acceleration alone does not"
+                " show: it must have an angle or a velocity beside it, or a later from_s"
             )
 
 
 def _unfolded(
     values: Floats,
     each: list[list[Wave]],
-    moves: Swinging,
+    free: list[Stretch],
     sensor: Accelerometer,
     noise: float,
 ) -> Floats:
-    """Return the angle of each sample, rad."""
-    most = abs(sensor.gain)
-    theta = np.arcsin(np.clip(values / most, -1, 1)) * math.copysign(1.0, sensor.gain)
-    for (begin, _), waves in zip(moves.free, each, strict=True):
-        for wave in _from_start(values, begin, waves, most, noise):
+    """Return the angle of each sample of free swings, rad."""
+    most, sense = abs(sensor.gain), math.copysign(1.0, sensor.gain)
+    theta = np.arcsin(np.clip(values / most, -1, 1)) * sense
+    for (begin, _), whole in zip(free, each, strict=True):
+        waves = list(whole)
+        if waves and waves[0].low > begin + 2:
+            # A swing released beyond a quarter turn begins in a dip.
+            start = wave_of(values, begin, waves[0].low, noise)
+            if not start.folded(most) and waves[0].folded(most):
+                start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=waves[0].dip)
+            waves.insert(0, start)
+        for wave in waves:
             if wave.folded(most):
                 low, high = wave.humps
                 inside = values[low : high + 1]
                 folded = np.arcsin(np.clip(np.abs(inside) / wave.top, 0, 1))
-                sign = np.sign(inside) * math.copysign(1.0, sensor.gain)
-                theta[low : high + 1] = sign * (math.pi - folded)
-    for low, high in moves.held:
-        # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
-        pull = values[low:high] / sensor.gravity if sensor.gravity else np.zeros(high - low)
-        theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
+                theta[low : high + 1] = np.sign(inside) * sense * (math.pi - folded)
     return np.asarray(theta)
-
-
-def _from_start(
-    values: Floats, begin: int, waves: list[Wave], most: float, noise: float
-) -> list[Wave]:
-    """Return the half swings and the part of one before the first crossing."""
-    if not waves or waves[0].low <= begin + 2:
-        return waves
-    first = waves[0]
-    # A swing released beyond a quarter turn begins in a dip.
-    start = wave_of(values, begin, first.low, noise)
-    if not start.folded(most) and first.folded(most):
-        start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=first.dip)
-    return [start, *waves]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,7 +217,7 @@ class Wave:
         return math.asin(min(self.top / abs(gain), 1.0))
 
 
-def waves_of(time: Floats, values: Floats, part: Places, noise: float) -> list[Wave]:
+def waves_of(time: Floats, values: Floats, part: Stretch, noise: float) -> list[Wave]:
     """Return the half swings of a free stretch between crossings of the middle."""
     stretch = slice(*part)
     found = swings(time[stretch], values[stretch], least=max(LEAST_SWING * noise, 1e-12))

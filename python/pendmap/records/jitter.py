@@ -16,33 +16,18 @@ from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from pendmap.signal import Floats
+    from pendmap.signal.local_polynomial import LocalFit
 
-    Floats = NDArray[np.float64]
 
-
-SPEED_REACH: Final = 0.7
-"""Radians of phase to either side from which a speed is taken."""
-
-FALSE_READING: Final = 8.0
-"""Standard deviations from the median of five from which it replaces a reading."""
-
-CERTAIN_GROWTH: Final = 4.0
-"""Standard errors of ``tau^2`` from which it is reported."""
-
-LEAST_GROWTH: Final = 0.1
-"""``(tau v)^2`` at the quickest over ``still^2`` from which it is reported."""
-
-DITHERED: Final = 0.55
-"""Noise over count below which slow readings do not show the noise."""
-
-FEWEST_RESIDUALS: Final = 200
-"""Residuals from which two numbers are fitted."""
-
+SPEED_REACH: Final = 0.7  # Radians of phase to either side from which a speed is taken
+FALSE_READING: Final = 8.0  # Standard deviations from the median of five that replace a reading
+CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` from which it is reported
+LEAST_GROWTH: Final = 0.1  # Reported ``(tau v)^2`` at the quickest over ``still^2``
+DITHERED: Final = 0.55  # Noise over count below which slow readings do not show the noise
+FEWEST_RESIDUALS: Final = 200  # Residuals from which two numbers are fitted
 ROUNDS: Final = 30
-
-BEND_REACH: Final = 0.5
-"""Radians of phase to either side from which a second derivative is taken."""
+BEND_REACH: Final = 0.5  # Radians of phase to either side from which a second derivative is taken
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,24 +104,18 @@ def _lag(time: Floats, seconds: float) -> int:
     return max(int(seconds / float(np.median(np.diff(time)))), 1)
 
 
-def law_of(  # noqa: PLR0913 (residuals, and what is known of them)
-    residual: Floats,
-    square: Floats,
-    *,
-    worth: float,
-    fastest: float,
-    count: float = 0.0,
-    interval: float = 0.0,
+def law_of(
+    fit: LocalFit, square: Floats, *, fastest: float, count: float = 0.0, interval: float = 0.0
 ) -> SpeedLaw | None:
-    """Return how noise grows with speed; None where that does not show.
+    """Return how the noise of a fit grows with speed; None where that does not show.
 
-    ``square`` holds squared speeds, (rad/s)^2; ``worth`` residuals count as one independent one.
+    ``square`` holds the squared speed of each residual, (rad/s)^2.
     """
-    found = _adapted(residual, square, worth, count)
+    found = _adapted(fit.residual, square, fit.sum_of_squares, count)
     if found is not None and count and found[0] < DITHERED * count:
         # Slow readings that share a count have one error, which residuals do not show.
         quick = square >= (count / interval) ** 2
-        found = _adapted(residual[quick], square[quick], worth, count)
+        found = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
     return None if found is None else SpeedLaw(*found, fastest)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted, moment
+from pendmap.formatting import counted, listed, moment
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.noise import noise_of
@@ -19,28 +19,17 @@ from pendmap.records.scale import middle_of, periods_of
 from pendmap.records.swinging import let_go, swinging
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import normal_scale, stretches
+from pendmap.signal.robust import between, normal_scale, stretches
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
+    from pendmap.signal import Stretch
 
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
-
-STILL_SPAN: Final = 8.0
-"""Standard deviations of noise within which a whole period shows no motion."""
-
-NOISE_SPAN: Final = 0.1
-"""Radians within which readings as rough as noise show no motion."""
-
-MOST_LISTED: Final = 6
-"""Releases whose times a message lists at most."""
-
-CERTAIN_OFFSET: Final = 4.0
-"""Standard errors from which an offset is reported."""
+STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
+NOISE_SPAN: Final = 0.1  # Radians within which readings as rough as noise show no motion
+MOST_LISTED: Final = 6  # Releases whose times a message lists at most
+CERTAIN_OFFSET: Final = 4.0  # Standard errors from which an offset is reported
 
 
 def moves(work: Work) -> bool:
@@ -49,24 +38,30 @@ def moves(work: Work) -> bool:
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
         raise InputError(f"{work.where}: must be a motion, the angle never changes")
-    noise, limit = _limits(work)
+    _measure_noise(work)
     good = work.theta[work.trusted]
-    still = good.size < 4 or (noise > 0.7 * float(np.std(good)) and np.ptp(good) < NOISE_SPAN)
-    if not still and np.ptp(good) > limit:
-        return True
     spread = float(np.ptp(good)) if good.size else 0.0
+    still = good.size < 4 or (work.noise > 0.7 * float(np.std(good)) and spread < NOISE_SPAN)
+    if not still and spread > work.limit:
+        return True
     work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
     work.segments = [Segment("rest", low, high, used=False)]
     work.trusted[:] = False
     return False
 
 
-def _limits(work: Work) -> tuple[float, float]:
-    """Return the noise, and the span within which nothing moves, rad."""
-    noise = _noise(work)
+def _measure_noise(work: Work) -> None:
+    """Set the noise of an angle; of an integrated one, its random walk over a period."""
+    if work.integrated:
+        rate = work.extra["velocity"]
+        seen = gyroscope_of(work.time, work.theta, rate)
+        walk = math.sqrt(float(np.median(np.diff(work.time))) * 2 * math.pi / seen.w0)
+        work.noise = normal_scale(local_fit(work.time, rate).residual) * walk
+    else:
+        work.noise = normal_scale(local_fit(work.time, work.theta).residual)
     # The residuals of slow sampling contain motion, which must not count as noise.
     reach = 0.4 * float(np.ptp(work.theta))
-    return noise, min(reach, max(STILL_SPAN * noise, 2.5 * work.count))
+    work.limit = min(reach, max(STILL_SPAN * work.noise, 2.5 * work.count))
 
 
 def check(work: Work) -> None:
@@ -75,36 +70,34 @@ def check(work: Work) -> None:
         return
     # An angle made of an acceleration folds: its readings over the gain are used instead.
     told = work if work.made_of is None else _felt(work, work.made_of)
-    noise, limit = _limits(told)
+    _measure_noise(told)
     good = told.theta[told.trusted]
     middle = middle_of(told.time[told.trusted], good)
-    middle = float(np.median(good)) if middle is None else middle
+    told.middle = float(np.median(good)) if middle is None else middle
     ends = np.flatnonzero(work.trusted)
     span = (int(ends[0]), int(ends[-1]) + 1)
-    period = _period(work, middle)
+    period = _period(work, told.middle)
     if period is None:
-        work.say("no-swing", "fewer than a handful of whole swings: little can be checked")
+        work.say("no-swing", "too few whole swings: little can be checked")
         return
+    work.period, work.middle = period, told.middle
     if work.made_of is not None:
-        parts = _let_swing(told, middle, limit, span)
+        parts = _let_swing(told, span)
     else:
-        still = _still(work, period, limit, span)
-        edges = [span[0], *(place for stretch in still for place in stretch), span[1]]
-        pairs = zip(edges[::2], edges[1::2], strict=True)
-        parts = [(a, b) for a, b in pairs if b - a > 5]
-        parts = releases(work, parts, middle, limit, period, noise)
+        parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
+        parts = releases(work, parts)
+        held = held_short(work, parts[0]) if parts else None
+        if held is not None:
+            parts[0] = (held, parts[0][1])
     if not parts:
         return
-    held = None if work.made_of else held_short(work, parts[0], middle, period, noise)
-    if held is not None:
-        parts[0] = (held, parts[0][1])
     parts = trigger.begun(work, parts, period)
-    used = [enough(told, part, middle, limit) for part in parts]
-    if sum(used) == 0:
+    used = [enough(told, part) for part in parts]
+    if not any(used):
         longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
         used[longest] = True
     work.releases = [part for part, use in zip(parts, used, strict=True) if use]
-    _settle(work, parts, used, middle, span)
+    _settle(work, parts, used, span)
 
 
 def _felt(work: Work, sensor: Accelerometer) -> Work:
@@ -115,17 +108,14 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
     return dataclasses.replace(work, theta=readings / sensor.gain)
 
 
-def _let_swing(told: Work, middle: float, limit: float, span: Places) -> list[Places]:
+def _let_swing(told: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches of free swings that an accelerometer shows."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
-    pieces = [
-        piece
-        for low, high in swinging(time, readings, noise).free
-        for piece in grown(told, (span[0] + low, span[0] + high), middle, limit)
-    ]
+    free, _ = swinging(time, readings, noise)
+    pieces = [piece for low, high in free for piece in grown(told, (span[0] + low, span[0] + high))]
     return [
-        (low + let_go(told.time[low:high], told.theta[low:high] - middle, noise), high)
+        (low + let_go(told.time[low:high], told.theta[low:high] - told.middle, noise), high)
         for low, high in pieces
     ]
 
@@ -142,131 +132,102 @@ def _period(work: Work, middle: float) -> float | None:
     return 2 * math.pi / w0 if w0 else None
 
 
-def _noise(work: Work) -> float:
-    """Return the noise of an angle; of an integrated one, its random walk over a period."""
-    if work.integrated:
-        rate = work.extra["velocity"]
-        seen = gyroscope_of(work.time, work.theta, rate)
-        interval = float(np.median(np.diff(work.time)))
-        walk = math.sqrt(interval * 2 * math.pi / seen.w0)
-        return normal_scale(local_fit(work.time, rate).residual) * walk
-    fit = local_fit(work.time, work.theta)
-    return normal_scale(fit.residual)
-
-
-def _still(work: Work, period: float, limit: float, span: Places) -> list[Places]:
+def _still(work: Work, span: Stretch) -> list[Stretch]:
     """Return stretches within ``span`` of a period and more in which nothing moves."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
     bad = ~work.trusted[slice(*span)]
-    if bad.any():
-        theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
-    width = max(round(period / float(np.median(np.diff(work.time)))), 5) | 1
+    theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
+    width = max(round(work.period / float(np.median(np.diff(work.time)))), 5) | 1
     if width >= theta.size:
         return []
     highest = maximum_filter1d(theta, width, mode="nearest")
     spread = highest - minimum_filter1d(theta, width, mode="nearest")
-    still = np.asarray(spread <= limit, bool)
+    still = np.asarray(spread <= work.limit, bool)
     half = width // 2
     still[:half], still[-half:] = still[half], still[-half - 1]
-    return [
-        (span[0] + max(a - half, 0), span[0] + min(b + half, theta.size))
-        for a, b in stretches(still)
-    ]
+    wide = [(max(a - half, 0), min(b + half, theta.size)) for a, b in stretches(still)]
+    return [(span[0] + a, span[0] + b) for a, b in wide]
 
 
-def _settle(work: Work, parts: list[Places], used: list[bool], middle: float, span: Places) -> None:
+def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -> None:
     """Set the segments, trust the used releases, and report both."""
     trusted = np.zeros(work.time.size, bool)
-    segments = []
-    if span[0] > 0:
-        segments.append(_segment(work, "motion", 0, span[0], used=False))
-    at = span[0]
-    for k, (low, high) in enumerate(parts):
-        if low > at:
-            segments.append(_between(work, at, low, middle, first=k == 0))
-        segments.append(_segment(work, "motion", low, high, used=used[k]))
-        trusted[low:high] = used[k]
-        at = high
-    if at < span[1]:
-        segments.append(_between(work, at, span[1], middle, first=False))
+    beside = between(parts, *span)
+    segments = [] if not span[0] else [_segment(work, "motion", (0, span[0]), used=False)]
+    for k, (part, use) in enumerate(zip(parts, used, strict=True)):
+        segments += _between(work, beside[k], first=k == 0)
+        segments.append(_segment(work, "motion", part, used=use))
+        trusted[slice(*part)] = use
+    segments += _between(work, beside[-1], first=False)
     if span[1] < work.time.size:
-        segments.append(_segment(work, "motion", span[1], work.time.size, used=False))
+        segments.append(_segment(work, "motion", (span[1], work.time.size), used=False))
     work.segments = segments
     work.trusted &= trusted
     if len(parts) > 1:
         _say_releases(work, parts, used)
     first, last = segments[0], segments[-1]
     if first.what == "held":
-        begin = segments[1].from_s
-        text = (
-            f"held at first: used from {moment(begin)} s, where the angle has clearly left the hold"
-        )
+        begin = moment(segments[1].from_s)
+        text = f"held at first: used from {begin} s, where the angle has clearly left the hold"
         work.say("held-start", text, span=(first.from_s, first.to_s))
     if last.what == "rest" and len(segments) > 1:
         text = f"at rest from {moment(last.from_s)} s, not for fitting"
         work.say("rest-tail", text, span=(last.from_s, last.to_s))
 
 
-def _say_releases(work: Work, parts: list[Places], used: list[bool]) -> None:
+def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
     """Report which releases are used, and which are too short."""
-
-    def listed(which: list[Places]) -> str:
-        spans = [
-            f"{moment(work.time[low])} to {moment(work.time[high - 1])} s" for low, high in which
-        ]
-        return ", ".join(spans[:MOST_LISTED]) + (", ..." if len(spans) > MOST_LISTED else "")
-
-    taken = [part for part, use in zip(parts, used, strict=True) if use]
-    short = [part for part, use in zip(parts, used, strict=True) if not use]
+    spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in parts]
+    taken = [span for span, use in zip(spans, used, strict=True) if use]
+    short = [span for span, use in zip(spans, used, strict=True) if not use]
     each = "each taken as a run" if len(taken) > 1 else "one is used"
     # The times are those of the used samples; holds end late rather than early.
-    text = f"{counted(len(parts), 'release')}, used from {listed(taken)}: {each}"
+    text = f"{counted(len(parts), 'release')}, used from {listed(taken, MOST_LISTED)}: {each}"
     if short:
-        text += f"; {len(short)} of fewer than three swings left out: {listed(short)}"
-    span = float(work.time[taken[0][0]]), float(work.time[taken[-1][1] - 1])
-    work.say("several-releases", text, span=span)
+        text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
+    low, high = work.releases[0][0], work.releases[-1][1] - 1
+    work.say("several-releases", text, span=(float(work.time[low]), float(work.time[high])))
 
 
-def _between(work: Work, low: int, high: int, middle: float, *, first: bool) -> Segment:
-    """Return the segment of a stretch without a swing: rest, held or handled."""
-    reach = float(np.max(np.abs(work.theta[work.trusted] - middle)))
-    level = work.theta[low:high]
-    far = abs(float(np.median(level)) - middle) > 0.1 * reach
+def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
+    """Return the segment of a stretch without a swing, if it has samples: rest, held, handled."""
+    level = work.theta[slice(*part)]
+    if not level.size:
+        return []
+    reach = float(np.max(np.abs(work.theta[work.trusted] - work.middle)))
+    far = abs(float(np.median(level)) - work.middle) > 0.1 * reach
     moved = float(np.ptp(level)) > 0.2 * reach
     what = "handled" if moved and not first else "held" if far or first else "rest"
-    return _segment(work, what, low, high, used=False)
+    return [_segment(work, what, part, used=False)]
 
 
-def _segment(work: Work, what: str, low: int, high: int, *, used: bool) -> Segment:
+def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
     """Return the segment of a range of samples."""
-    return Segment(what, float(work.time[low]), float(work.time[high - 1]), used)
+    return Segment(what, float(work.time[part[0]]), float(work.time[part[1] - 1]), used)
 
 
 def check_zero(work: Work) -> None:
     """Report the rest of a free run, or the middle of its swing, if it is not 0."""
     if work.plan.kind != "free" or not work.releases or work.made_of is not None or work.integrated:
         return  # of a sensor on the rod: the middle was taken for 0 as the angle was made
-    _, limit = _limits(work)
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]
         value = float(np.mean(tail))
-        error = float(np.std(tail)) / math.sqrt(tail.size)
-        error = max(error, work.count / math.sqrt(12))
+        error = max(float(np.std(tail)) / math.sqrt(tail.size), work.count / math.sqrt(12))
         said = f"it rests at {_folded(value):+.3g} rad: an offset, or what friction holds"
     else:
-        good = np.flatnonzero(work.trusted)
-        theta = work.theta[good]
-        middle = middle_of(work.time[good], theta)
+        _measure_noise(work)
+        time, theta = work.time[work.trusted], work.theta[work.trusted]
+        middle = middle_of(time, theta)
         middle = float(np.median(theta[theta.size // 2 :])) if middle is None else middle
         theta = theta - 2 * math.pi * round(middle / (2 * math.pi))
         start = after_turns(theta)
-        peaks = swings(work.time[good][start:], theta[start:], least=limit).peak
-        if peaks.size < 8:
+        middles = swings(time[start:], theta[start:], least=work.limit).middle
+        if middles.size < 6:
             return
-        middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
         middles = middles[middles.size // 2 :]  # small swings: no friction's asymmetry, no turns
         value = float(np.median(middles))
         error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)

@@ -28,56 +28,28 @@ from pendmap.signal.local_polynomial import LocalFit, local_fit
 from pendmap.signal.robust import broad_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Callable
 
     from pendmap.records.experiment import Run
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
 
-    Floats = NDArray[np.float64]
 
-
-SLOW_SAMPLING: Final = 0.06
-"""Radians of phase between samples from which quartics leave some motion."""
-
-WAY_PHASE: Final = 0.25
-"""Radians of phase over which a way is measured, if longer than an interval."""
-
-DITHERED: Final = 0.55
-"""Noise over count above which neighbouring readings err independently."""
-
-CLEAR_WAY: Final = 4
-"""Counts of way from which a speed is taken."""
-
-TOO_FEW: Final = 0.3
-"""Radians of phase between samples from which all polynomials leave some motion."""
-
-SPEED_RANGES: Final = 4
-"""Ranges of speed with equally many samples."""
-
-OUTLIER: Final = 8.0
-"""Standard deviations from which a residual is an outlier."""
-
-FEWEST_RESIDUALS: Final = 40
-"""Residuals from which a standard deviation is taken."""
-
-OUTLIER_RANGES: Final = 16
-"""Ranges of speed, with equally many samples, with outliers of their own."""
-
-CLEARLY_LESS: Final = 1.02
-"""Ratio of two noise readings from which one is less."""
-
-DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))
-"""Degree and samples of the polynomials in the order in which they are tried."""
-
-FARTHEST: Final = 0.25
-"""Radians of phase between samples that coarse counts move apart, at most."""
-
-MORE_STRIDES: Final = 4
-"""Strides beyond the shortest that are read too."""
-
-STIFF_STRIDE: Final = 2.0
-"""Factor by which samples of the highest degree may be farther apart."""
+SLOW_SAMPLING: Final = 0.06  # Radians of phase between samples that quartics do not follow
+WAY_PHASE: Final = 0.25  # Radians of phase over which a way is measured, if longer than an interval
+DITHERED: Final = 0.55  # Noise over count above which neighbouring readings err independently
+CLEAR_WAY: Final = 4  # Counts of way from which a speed is taken
+TOO_FEW: Final = 0.3  # Radians of phase between samples that no polynomial follows
+SPEED_RANGES: Final = 4  # Ranges of speed with equally many samples
+OUTLIER: Final = 8.0  # Standard deviations from which a residual is an outlier
+FEWEST_RESIDUALS: Final = 40  # Residuals from which a standard deviation is taken
+OUTLIER_RANGES: Final = 16  # Ranges of speed with equally many samples and own outliers
+CLEARLY_LESS: Final = 1.02  # Ratio of two noise readings from which one is less
+DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))  # Degrees and samples, as tried
+FARTHEST: Final = 0.25  # Radians of phase between samples that coarse counts move apart, at most
+MORE_STRIDES: Final = 4  # Strides beyond the shortest that are read too
+STIFF_STRIDE: Final = 2.0  # Factor by which samples of the highest degree may be farther apart
 
 
 @dataclasses.dataclass(frozen=True)
@@ -168,7 +140,7 @@ def noise_of(
     time: Floats,
     theta: Floats,
     *,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: Mask | None = None,
     count: float = 0.0,
 ) -> NoiseFloor:
     """Return the noise of readings, shape (N,), of any smooth motion.
@@ -183,53 +155,51 @@ def noise_of(
     return found or NoiseFloor(math.nan, math.nan)
 
 
-def _noise(time: Floats, theta: Floats, bad: NDArray[np.bool_], count: float) -> NoiseFloor | None:
+def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor | None:
     """Return the noise from the windows without bad samples; None if there are too few."""
     if time.size < FEWEST_RESIDUALS:
         return None
     interval = float(np.median(np.diff(time)))
     swing, phase = fastest(time, theta, count)
+    slow = swing * interval > SLOW_SAMPLING
     speed = speed_of(time, theta, phase)
-    first = clean(local_fit(time, theta), bad, speed)
+
+    def fitted(degree: int = 4, points: int = 9, stride: int = 1) -> LocalFit:
+        fit = local_fit(time, theta, degree=degree, points=points, stride=stride)
+        return clean(fit, bad, speed)
+
+    first = fitted()
     if first.middle.size < FEWEST_RESIDUALS:
         return None
-    fit = first
-    if swing * interval > SLOW_SAMPLING:
-        fit = followed(time, theta, bad, speed, first)
-    next_fit = clean(local_fit(time, theta, degree=6, points=11), bad, speed)
-    colour = (
-        rms(first) / max(rms(next_fit), 1e-300) if next_fit.middle.size >= FEWEST_RESIDUALS else 1.0
-    )
-    least = count / math.sqrt(12)
-    slowest = 0.0
-    if count and rms(fit) < DITHERED * count:
-        nearest = fit if swing * interval > SLOW_SAMPLING else None
-        far = apart(time, theta, bad, speed, count, interval, swing, nearest)
+    fit = followed(fitted, first) if slow else first
+    next_fit = fitted(degree=6, points=11)
+    enough = next_fit.middle.size >= FEWEST_RESIDUALS
+    colour = first.rms / max(next_fit.rms, 1e-300) if enough else 1.0
+    least, slowest, law = count / math.sqrt(12), 0.0, None
+    if count and fit.rms < DITHERED * count:
+        far = apart(fitted, count, interval, swing, fit if slow else None)
         if far is None:
             still = still_noise(theta if bad.all() else theta[~bad], count)
             if still is not None:
                 return NoiseFloor(*still, colour=colour, samples=int(theta.size))
-            return NoiseFloor(max(least, rms(fit)), least / 10, (), True, colour)  # noqa: FBT003
+            sigma = max(least, fit.rms)
+            return NoiseFloor(sigma, least / 10, limited_by_count=True, colour=colour)
         fit, slowest = far
-        law = None
     else:
         # A residual has the noise of all samples of its window, each with its own speed.
         square = np.convolve(speed**2, fit.shares, "same")[fit.middle]
-        law = law_of(
-            fit.residual,
-            square,
-            worth=fit.sum_of_squares,
-            fastest=phase,
-            count=count,
-            interval=interval,
-        )
+        law = law_of(fit, square, fastest=phase, count=count, interval=interval)
     few = phase * interval > TOO_FEW
-    sigma, error = rms(fit), stderr(fit)
-    limited = sigma < least
-    sigma = max(sigma, least)
-    ranges = tuple(_ranges(fit, least, slowest))
-    law = None if few else law
-    return NoiseFloor(sigma, error, ranges, limited, colour, fit.middle.size, law, few)
+    return NoiseFloor(
+        sigma=max(fit.rms, least),
+        stderr=fit.stderr,
+        by_speed=tuple(_ranges(fit, least, slowest)),
+        limited_by_count=fit.rms < least,
+        colour=colour,
+        samples=fit.middle.size,
+        law=None if few else law,
+        bound=few,
+    )
 
 
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
@@ -267,11 +237,11 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     if slowest > 0:
         found.append(SpeedRange(0.0, slowest, least, least / 10, 0))
         edges[0] = slowest
-    for low, high in itertools.pairwise(edges):
-        part = only(fit, (speed >= low) & (speed <= high))
+    for low, high in itertools.pairwise(edges.tolist()):
+        part = fit.only((speed >= low) & (speed <= high))
         if part.middle.size:
-            sigma = max(rms(part), least)
-            found.append(SpeedRange(float(low), float(high), sigma, stderr(part), part.middle.size))
+            sigma = max(part.rms, least)
+            found.append(SpeedRange(low, high, sigma, part.stderr, part.middle.size))
     return found
 
 
@@ -279,88 +249,56 @@ def check(work: Work) -> None:
     """Report noise that grows with speed."""
     if work.integrated:
         return  # a late reading of a rate errs with the acceleration
-    floor = noise_of(
-        work.time, work.theta, trusted=work.trusted, count=0.0 if work.edges else work.count
-    )
-    if floor.law is not None:
-        interval = float(np.median(np.diff(work.time)))
-        part = f"{100 * floor.law.tau / interval:.0f} % of the interval"
-        work.say("noise-grows-with-speed", f"{floor.law} ({part})")
+    count = 0.0 if work.edges else work.count
+    law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
+    if law is not None:
+        share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
+        work.say("noise-grows-with-speed", f"{law} ({share} of the interval)")
 
 
-def clean(fit: LocalFit, bad: NDArray[np.bool_], speed: Floats) -> LocalFit:
-    """Leave out windows with bad samples, then those with outliers."""
-    fit = only(fit, ~_near(bad, fit.neighbours)[fit.middle])
-    return only(fit, ~_outlying(fit, speed)[fit.middle])
-
-
-def _outlying(fit: LocalFit, speed: Floats) -> NDArray[np.bool_]:
-    """Return which samples share a window with an outlier among similar speeds."""
+def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
+    """Leave out windows with bad samples, then those with outliers among similar speeds."""
+    fit = fit.only(~_near(bad, fit.neighbours)[fit.middle])
     false = np.zeros(speed.size, bool)
     sizes = np.abs(fit.residual)
     whole = broad_scale(sizes)
     order = np.argsort(speed[fit.middle], kind="stable")
-    for part in np.array_split(
-        order, max(min(OUTLIER_RANGES, order.size // (5 * FEWEST_RESIDUALS)), 1)
-    ):
+    ranges = max(min(OUTLIER_RANGES, order.size // (5 * FEWEST_RESIDUALS)), 1)
+    for part in np.array_split(order, ranges):
         # Noise that grows with speed is largest among the quickest samples.
         scale = max(whole, broad_scale(sizes[part]))
         false[fit.middle[part[sizes[part] > OUTLIER * scale]]] = scale > 0
-    return _near(false, fit.neighbours)
+    return fit.only(~_near(false, fit.neighbours)[fit.middle])
 
 
-def _near(marked: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+def _near(marked: Mask, reach: int) -> Mask:
     """Return which places are within ``reach`` of a marked one."""
     sums = np.concatenate([[0], np.cumsum(marked)])
     place = np.arange(marked.size)
     low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
-    near: NDArray[np.bool_] = sums[high] > sums[low]
-    return near
+    return np.asarray(sums[high] > sums[low], bool)
 
 
 def less(fit: LocalFit, other: LocalFit) -> bool:
     """Return whether a fit's residual is significantly less than another's."""
-    enough = CLEARLY_LESS + 2 * stderr(fit) / max(rms(fit), 1e-300)
-    return fit.middle.size >= FEWEST_RESIDUALS and rms(other) > enough * rms(fit)
+    if fit.middle.size < FEWEST_RESIDUALS:
+        return False
+    return other.rms > (CLEARLY_LESS + 2 * fit.stderr / max(fit.rms, 1e-300)) * fit.rms
 
 
-def only(fit: LocalFit, which: NDArray[np.bool_]) -> LocalFit:
-    """Return a fit with some of its residuals."""
-    return dataclasses.replace(
-        fit, middle=fit.middle[which], residual=fit.residual[which], slope=fit.slope[which]
-    )
-
-
-def rms(fit: LocalFit) -> float:
-    """Return the root mean square of the residuals, rad."""
-    return float(np.sqrt(np.mean(fit.residual**2)))
-
-
-def stderr(fit: LocalFit) -> float:
-    """Return the standard error of the root mean square of residuals that share samples."""
-    return rms(fit) * math.sqrt(fit.sum_of_squares / (2 * fit.middle.size))
-
-
-def followed(
-    time: Floats, theta: Floats, bad: NDArray[np.bool_], speed: Floats, first: LocalFit
-) -> LocalFit:
+def followed(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
     """Return the fit of the lowest degree above which no degree leaves less."""
     chosen = first
     for degree, points in DEGREES[1:]:
-        higher = clean(local_fit(time, theta, degree=degree, points=points), bad, speed)
-        if higher.middle.size < FEWEST_RESIDUALS:
-            break
+        higher = fitted(degree=degree, points=points)
         if not less(higher, chosen):
             break
         chosen = higher
     return chosen
 
 
-def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
-    time: Floats,
-    theta: Floats,
-    bad: NDArray[np.bool_],
-    speed: Floats,
+def apart(
+    fitted: Callable[..., LocalFit],
     count: float,
     interval: float,
     swing: float,
@@ -375,7 +313,7 @@ def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
     while True:
         # Neighbours of slower motion are within a count and have equal errors.
         slowest = count / (stride * interval)
-        fit = clean(local_fit(time, theta, degree=6, points=11, stride=stride), bad, speed)
+        fit = fitted(degree=6, points=11, stride=stride)
         if stride == 1 and nearest is not None and less(nearest, fit):
             fit = nearest
         quick = np.abs(fit.slope) >= slowest
@@ -384,23 +322,19 @@ def apart(  # noqa: PLR0913, PLR0917 (what is known of the record)
         stride = min(2 * stride, most)
     if np.count_nonzero(quick) < FEWEST_RESIDUALS:
         return None
-    found = [only(fit, quick)]
+    found = [fit.only(quick)]
     farthest = max(int(STIFF_STRIDE * FARTHEST / (swing * interval)), 1)
     for longer in range(stride + 1, min(stride + MORE_STRIDES, farthest) + 1):
         degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
-        more = local_fit(time, theta, degree=degree, points=points, stride=longer)
-        more = clean(more, bad, speed)
-        found.append(only(more, np.abs(more.slope) >= slowest))
-    return _pooled(found), slowest
-
-
-def _pooled(fits: list[LocalFit]) -> LocalFit:
-    """Return the residuals of several fits to the same samples, worth those of the first."""
+        more = fitted(degree=degree, points=points, stride=longer)
+        found.append(more.only(np.abs(more.slope) >= slowest))
     middle, residual, slope = (
-        np.concatenate([getattr(fit, name) for fit in fits])
+        np.concatenate([getattr(each, name) for each in found])
         for name in ("middle", "residual", "slope")
     )
-    worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
-    return dataclasses.replace(
-        fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
+    # All residuals together are worth those of the first fit.
+    worth = found[0].sum_of_squares * middle.size / found[0].middle.size
+    pooled = dataclasses.replace(
+        found[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
     )
+    return pooled, slowest

@@ -20,64 +20,32 @@ from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pendmap.records.work import Work
-
-    Floats = NDArray[np.float64]
-    _Group = slice | NDArray[np.intp]
     from collections.abc import Sequence
 
+    from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices, Mask, Stretch
+    from pendmap.signal.local_polynomial import LocalFit
 
-SUSPECT: Final = 10.0
-"""Local standard deviations of a residual from which it is examined."""
+    _Group = slice | Indices
 
-SCALE_SAMPLES: Final = 151
-"""Samples from which the local standard deviation is taken."""
 
-PASSES: Final = 8
-"""Searches for false samples; each may uncover one beside another."""
-
-MOST_OUTLIERS: Final = 0.1
-"""Share of samples above which they are no outliers."""
-
-SIDE: Final = 10
-"""Samples on each side by which a sample is judged."""
-
-MOST_TOGETHER: Final = 6
-"""Neighbouring false samples that can be told from the motion."""
-
-WEIGHT_STEPS: Final = 10
-"""Iterations of the weights of least absolute distances."""
-
-CERTAIN_JUMP: Final = 7.0
-"""Standard errors from which a step is a jump."""
-
-OFF_COUNT: Final = 0.25
-"""Counts by which a jump may miss a whole number and be corrected."""
-
-MOST_JUMPS: Final = 20
-"""Jumps above which no counts were missed."""
-
+SUSPECT: Final = 10.0  # Local standard deviations of a residual from which it is examined
+SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is taken
+PASSES: Final = 8  # Searches for false samples; each may uncover one beside another
+MOST_OUTLIERS: Final = 0.1  # Share of samples above which they are no outliers
+SIDE: Final = 10  # Samples on each side by which a sample is judged
+MOST_TOGETHER: Final = 6  # Neighbouring false samples that can be told from the motion
+WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute distances
+CERTAIN_JUMP: Final = 7.0  # Standard errors from which a step is a jump
+OFF_COUNT: Final = 0.25  # Counts by which a jump may miss a whole number and be corrected
+MOST_JUMPS: Final = 20  # Jumps above which no counts were missed
 TURN: Final = 2 * math.pi
-
-OFF_TURN: Final = 0.1
-"""Radians by which a jump may miss whole turns."""
-
-OTHER_RECORD: Final = 0.5
-"""Radians of a jump from which two recordings may stand in one file."""
-
-END_SAMPLES: Final = 10
-"""Samples of each end that are judged by prediction."""
-
-END_GAP: Final = POINTS // 2
-"""Intervals without a sample that no window crosses."""
-
-PREDICTIONS: Final = 40
-"""Predictions further in that show the usual error."""
-
-END_DEGREES: Final = (2, 3)
-"""Degrees of the predicting polynomials."""
+OFF_TURN: Final = 0.1  # Radians by which a jump may miss whole turns
+OTHER_RECORD: Final = 0.5  # Radians of a jump from which two recordings may stand in one file
+END_SAMPLES: Final = 10  # Samples of each end that are judged by prediction
+END_GAP: Final = POINTS // 2  # Intervals without a sample that no window crosses
+PREDICTIONS: Final = 40  # Predictions further in that show the usual error
+END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,11 +59,8 @@ class _Jump:
 
 def find(work: Work) -> None:
     """Mark outliers; correct jumps by whole counts, of others keep the longest part."""
-    if work.time.size < 2 * POINTS:
-        return
-    theta = work.theta.copy()
-    bad = ~work.trusted
-    if bad.all():
+    theta, bad = work.theta.copy(), ~work.trusted
+    if theta.size < 2 * POINTS or bad.all():
         return
     _bridge(work.time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[_Jump]()
@@ -107,10 +72,8 @@ def find(work: Work) -> None:
         at, scale = _suspects(work, theta)
         at, scale = at[~seen[at]], scale[~seen[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
-            text = (
-                f"more than {100 * MOST_OUTLIERS:.0f} % of the samples contradict their neighbours"
-            )
-            work.say("not-smooth", text)
+            share = f"{100 * MOST_OUTLIERS:.0f} %"
+            work.say("not-smooth", f"more than {share} of the samples contradict their neighbours")
             return
         told = _told(work, theta, at, scale)
         if not told:
@@ -124,19 +87,29 @@ def find(work: Work) -> None:
         _bridge(work.time, theta, false)
     false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
     _bridge(work.time, theta, false)
-    _outliers(work, theta, false, jumps)
-    jumps = _of_time(work, theta, sorted(jumps, key=lambda jump: jump.at))
-    _moved(work, jumps)
+    jumps.sort(key=lambda jump: jump.at)
+    moved = np.zeros(theta.size)
+    for jump in jumps:
+        moved[jump.at :] += jump.size
+    _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
+    _moved(work, _of_time(work, theta + moved, jumps))
 
 
-def _bridge(time: Floats, theta: Floats, false: NDArray[np.bool_]) -> None:
+def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> None:
+    """Mark outliers and report how far they are away."""
+    worst = float(np.max(np.abs(away[at]), initial=0.0))
+    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
+    work.distrust(at, "outliers", text)
+
+
+def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
     """Replace false samples by straight lines."""
     if not false.all():
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
 
 def _told(
-    work: Work, theta: Floats, at: NDArray[np.intp], scale: Floats
+    work: Work, theta: Floats, at: Indices, scale: Floats
 ) -> list[tuple[int, _Group, _Jump | None]]:
     """Return the suspects that can be judged, with their false samples.
 
@@ -154,31 +127,34 @@ def _told(
     ]
 
 
-def _suspects(work: Work, theta: Floats) -> tuple[NDArray[np.intp], Floats]:
+def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
-    from scipy.ndimage import maximum_filter1d, median_filter
+    from scipy.ndimage import median_filter
 
-    degree, points = _degree(work.time, theta)
-    fit = local_fit(work.time, theta, degree=degree, points=points)
-    size = np.abs(fit.residual)
+    best, *others = (
+        local_fit(work.time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
+    )
+    for other in others:
+        if normal_scale(other.residual) < 0.7 * normal_scale(best.residual):
+            best = other
+    size = np.abs(best.residual)
     if size.size < POINTS:
         return np.empty(0, np.intp), np.empty(0)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
-    # A false reading changes every window that contains it, its own the most.
-    highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
-    which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
-    return fit.middle[which], scale[which]
+    which = (size > SUSPECT * scale + 2 * work.count) & _highest(best)
+    return best.middle[which], scale[which]
 
 
-def _degree(time: Floats, theta: Floats) -> tuple[int, int]:
-    """Return degree and points of the polynomial that leaves least."""
-    best, least = DEGREES[0], math.inf
-    for degree, points in DEGREES[:3]:
-        scale = normal_scale(local_fit(time, theta, degree=degree, points=points).residual)
-        if scale < 0.7 * least:
-            best, least = (degree, points), scale
-    return best
+def _highest(fit: LocalFit) -> Mask:
+    """Return which residuals are the largest of all windows that share a sample with them.
+
+    A false reading changes every window that contains it, its own the most.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    size = np.abs(fit.residual)
+    return np.asarray(size >= maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest"), bool)
 
 
 def _judge(
@@ -249,35 +225,15 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
     return answer
 
 
-def _outliers(work: Work, theta: Floats, false: NDArray[np.bool_], jumps: list[_Jump]) -> None:
-    """Mark false samples and report them."""
-    at = np.flatnonzero(false & work.trusted)
-    if not at.size:
-        return
-    moved = np.zeros(theta.size)
-    for jump in jumps:
-        moved[jump.at :] += jump.size
-    worst = float(np.max(np.abs(work.theta - moved - theta)[at]))
-    work.trusted[at] = False
-    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} rad: not for fitting"
-    work.say("outliers", text, at=at)
-
-
-def _of_time(work: Work, smooth: Floats, jumps: list[_Jump]) -> list[_Jump]:
+def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
     """Correct the clock where jumps are its slips; return the other jumps."""
-    if not jumps:
-        return []
-    moved = np.zeros(smooth.size)
-    for jump in jumps:
-        moved[jump.at :] += jump.size
-    found = slips_of(work.time, smooth + moved)
+    found = slips_of(work.time, theta) if jumps else None
     if found is None:
         return jumps
-    many = counted(found.places.size, "slip")
     text = (
-        f"{many} of time: the readings jump by their velocity times {1e3 * found.slip:.4g} +-"
-        f" {1e3 * found.stderr:.1g} ms, an interval, and not by counts: the times after each are"
-        " moved by whole intervals"
+        f"{counted(found.places.size, 'slip')} of time: the readings jump by their velocity times"
+        f" {1e3 * found.slip:.4g} +- {1e3 * found.stderr:.1g} ms, an interval, and not by counts:"
+        " the times after each are moved by whole intervals"
     )
     work.say("time-slips", text, mended=True, at=found.places)
     work.time = found.time
@@ -289,39 +245,32 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
     if not jumps:
         return
     places = np.asarray([jump.at for jump in jumps], np.intp)
+    many = f"{counted(len(jumps), 'jump')} of the reading"
     if len(jumps) > MOST_JUMPS:
-        text = f"{counted(len(jumps), 'jump')} of the reading that stay: the zero wanders"
-        work.say("missed-counts", text, at=places)
+        work.say("missed-counts", f"{many} that stay: the zero wanders", at=places)
         return
     turns = [round(jump.size / TURN) for jump in jumps]
     off = [abs(j.size - n * TURN) for j, n in zip(jumps, turns, strict=True)]
+    counts = [_whole(jump, work.count) for jump in jumps]
     if all(turns) and max(off) < OFF_TURN:
-        for at, number in zip(places, turns, strict=True):
-            work.theta[at:] -= number * TURN
-        text = f"{counted(len(jumps), 'jump')} of the reading by whole turns, taken back"
-        work.say("turns-slipped", text, mended=True, at=places)
-        return
-    whole = [_whole(jump, work.count) for jump in jumps]
-    if all(whole):
-        for at, count in zip(places, whole, strict=True):
-            work.theta[at:] -= count * work.count
-        said = ", ".join(f"{count:+d}" for count in whole[:4])
-        text = f"{counted(len(jumps), 'jump')} of the reading by {said} counts, taken back"
-        work.say("missed-counts", text, mended=True, at=places)
+        step, numbers, what, said = TURN, turns, "turns-slipped", "whole turns"
+    else:
+        said = f"{', '.join(f'{count:+d}' for count in counts[:4])} counts"
+        step, numbers, what = work.count, counts, "missed-counts"
+    if all(numbers):
+        for at, number in zip(places, numbers, strict=True):
+            work.theta[at:] -= number * step
+        work.say(what, f"{many} by {said}, taken back", mended=True, at=places)
         return
     edges = [0, *places.tolist(), work.time.size]
     longest = int(np.argmax(np.diff(edges)))
-    keep = np.zeros(work.time.size, bool)
-    keep[edges[longest] : edges[longest + 1]] = True
-    work.trusted &= keep
+    low, high = edges[longest : longest + 2]
+    work.trusted[:low] = work.trusted[high:] = False
     said = ", ".join(f"{jump.size:+.3g}" for jump in jumps[:4])
-    or_else = ""
-    if max(abs(jump.size) for jump in jumps) > OTHER_RECORD:
-        or_else = ", or another recording begins"
+    other = max(abs(jump.size) for jump in jumps) > OTHER_RECORD
     text = (
-        f"{counted(len(jumps), 'jump')} of the reading ({said} rad) that stay{or_else}:"
-        f" {moment(work.time[edges[longest]])} to {moment(work.time[edges[longest + 1] - 1])} s is"
-        " for fitting"
+        f"{many} ({said} rad) that stay{', or another recording begins' if other else ''}:"
+        f" {moment(work.time[low])} to {moment(work.time[high - 1])} s is for fitting"
     )
     work.say("missed-counts", text, at=places)
 
@@ -334,40 +283,32 @@ def _whole(jump: _Jump, count: float) -> int:
     return number if abs(jump.size / count - number) < OFF_COUNT else 0
 
 
-def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[tuple[int, int]]) -> None:
+def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[Stretch]) -> None:
     """Mark readings of an accelerometer or gyroscope far from their neighbours.
 
-    Jumps that stay are ignored: friction causes them, and a hand at the ends of the ``free`` swings
-    (first place and the one after the last). Nothing outside of these is fitted.
+    Jumps that stay are ignored: friction causes them, and a hand at the ends of the ``free``
+    swings. Nothing outside of these is fitted.
     """
-    from scipy.ndimage import maximum_filter1d
-
     if work.time.size < 2 * POINTS:
         return
     fit = local_fit(work.time, values)
     size = np.abs(fit.residual)
     if size.size < POINTS:
         return
-    # A false reading changes every window that contains it, its own the most.
-    highest = maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest")
-    at = fit.middle[(size > 2 * SUSPECT * broad_scale(size)) & (size >= highest)]
+    at = fit.middle[(size > 2 * SUSPECT * broad_scale(size)) & _highest(fit)]
     inside = np.zeros(values.size, bool)
     for low, high in free:
         begin = low + POINTS if low else 0
         inside[begin : high if high == values.size else high - POINTS] = True
     at = at[inside[at]]
-    if not at.size or at.size > MOST_OUTLIERS * values.size:
+    if at.size > MOST_OUTLIERS * values.size:
         return
-    near = np.array([np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at])
-    worst = float(np.max(np.abs(values[at] - near)))
-    work.trusted[at] = False
-    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
-    work.say("outliers", text, at=at)
+    away = np.zeros(values.size)
+    away[at] = [values[k] - np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at]
+    _distrust(work, at, away, unit)
 
 
-def false_ends(
-    time: Floats, theta: Floats, trusted: NDArray[np.bool_], limit: float, count: float
-) -> NDArray[np.bool_]:
+def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: float) -> Mask:
     """Return which readings at the ends of a record and of its gaps are outliers, shape (N,).
 
     ``limit`` is in usual errors of prediction; ``count`` is the step of the readings, rad.
@@ -388,7 +329,7 @@ def false_ends(
     return false
 
 
-def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> NDArray[np.bool_]:
+def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
     """Judge the first readings, inner ones first; outliers are replaced by predictions."""
     inner = np.arange(END_SAMPLES, lag.size - POINTS)
     tried = {
@@ -405,7 +346,7 @@ def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> ND
     return missed
 
 
-def _before(lag: Floats, theta: Floats, places: NDArray[np.intp], degree: int) -> Floats:
+def _before(lag: Floats, theta: Floats, places: Indices, degree: int) -> Floats:
     """Return the predictions from polynomials through the nine samples behind each place."""
     behind = places[:, None] + np.arange(1, POINTS + 1)
     x = lag[behind] - lag[places, None]

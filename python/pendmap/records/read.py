@@ -22,7 +22,7 @@ from pendmap.records import (
 )
 from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
-from pendmap.records.description import ALONE, NAME, RunPlan, read_description
+from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.tables import read_table
@@ -30,17 +30,14 @@ from pendmap.records.tables import read_table
 if TYPE_CHECKING:
     import os
 
-    from pendmap.records.description import Description
-    from pendmap.records.text import Table
+    from pendmap.records.tables import Table
     from pendmap.records.work import Work
 
 
+# Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
-"""Suffixes of the files that are records in a folder without a description."""
-
-LEAST_RATE: Final = 1e-3
-MOST_RATE: Final = 1e9
-"""Range of a sampling rate, Hz."""
+LEAST_RATE: Final = 1e-3  # Sampling rate at least, Hz
+MOST_RATE: Final = 1e9  # Sampling rate at most, Hz
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
@@ -76,7 +73,7 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
 
     A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
     decay. A folder is an experiment with an ``experiment.toml``; without it each file is a free
-    decay. Each free release of a file is a run of its own, named ``decay 1/3``. Nothing is written.
+    decay. Each free release of a file is one run, named ``decay 1/3``. Nothing is written.
     Each fault is a finding under a stable key. Data are corrected only where the correction is
     unambiguous: wrapped turns are unwrapped, milliseconds become seconds. ``Run.trusted`` marks the
     samples for fitting.
@@ -113,28 +110,21 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     2000
     """
     place = Path(path)
-    alone = ALONE if rate_hz is None else dataclasses.replace(ALONE, rate_hz=_rate(rate_hz))
-    description = alone
+    rate = None if rate_hz is None else check_number("rate_hz", rate_hz)
+    if rate is not None and not LEAST_RATE <= rate <= MOST_RATE:
+        raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
+    description = Description(rate_hz=rate)
     if not place.is_dir():
-        runs, findings = _runs(place, RunPlan(place.name), alone, {}, place.stem)
+        runs, findings = _runs(place, RunPlan(place.name), description, {}, place.stem)
     elif not (place / NAME).is_file():
-        runs, findings = _plain(place, alone)
+        runs, findings = _plain(place, description)
     else:
         description = read_description(place / NAME)
-        if rate_hz is not None:
-            description = dataclasses.replace(description, rate_hz=alone.rate_hz)
+        description = dataclasses.replace(description, rate_hz=rate or description.rate_hz)
         runs, findings = _described(place, description)
     digests = {run.file: run.sha256 for run in runs}
     checked, together = checked_together(runs)
     return Experiment(place, checked, description.known, (*findings, *together), digests)
-
-
-def _rate(value: float) -> float:
-    """Return a sampling rate in Hz, within its range."""
-    rate = check_number("rate_hz", value)
-    if not LEAST_RATE <= rate <= MOST_RATE:
-        raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
-    return rate
 
 
 def _tables(folder: Path) -> list[Path]:
@@ -155,9 +145,9 @@ def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Find
         except InputError as error:
             refused.append(str(error))
             findings.append(Finding("file-left-out", f"left out: {error}"))
-            continue
-        runs += found
-        findings += shared
+        else:
+            runs += found
+            findings += shared
     if not runs:
         first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
         count = counted(len(refused), "file")
@@ -231,7 +221,6 @@ def _runs(  # noqa: C901 (a step each)
     if moves and work.made_of is None:
         scale.check(work)
     samples.say_steps(work)
-    resolution.say_edges(work)
     if moves:
         motion.check(work)
         trigger.check_drive(work)
@@ -270,7 +259,7 @@ def _run(work: Work, name: str, digest: str) -> Run:
         accelerometer=work.made_of,
         gyroscope=gyroscope,
         drive=plan.drive,
-        pivot=work.pivot(),
+        pivot=work.pivot or None,
         pivot_unit=work.pivot_unit,
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),
         peaks_only=work.peaks_only,

@@ -9,109 +9,56 @@ import numpy as np
 
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import even_times, normal_scale, stretches
+from pendmap.signal.robust import between, even_times, normal_scale, stretches
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
-
-    Places = tuple[int, int]
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask, Stretch
 
 
-RELEASE_RISE: Final = 0.1
-"""Growth of a swing over the largest that only a hand causes."""
-
-HELD_LONGER: Final = 1.5
-"""Delay over that of a release from rest from which a hold is seen."""
-
-NEAR_UPRIGHT: Final = 0.05
-"""Sine of an angle below which a pendulum leaves too slowly to show a hold."""
-
-HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))
-"""Periods before a motion between which a hold is searched."""
-
-FEWEST_HELD: Final = 10
-"""Samples of a hold from which quiet is judged."""
-
-FEWEST_HALF_CYCLES: Final = 5
-"""Half cycles from which a release is a run: three swings from a hand."""
-
-HAND_SHARE: Final = 0.3
-"""Torque over the greatest restoring torque nearby that only a hand adds."""
-
-DERIVATIVE_SPAN: Final = 0.2
-"""Periods over which a second derivative is taken."""
-
-CERTAIN_HAND: Final = 6.0
-"""Standard deviations of the second derivative from which it is no noise."""
-
-USUAL_REMAINDER: Final = 4.0
-"""Median remainders from which a hand acts."""
-
-FEWEST_A_PERIOD: Final = 20.0
-"""Samples a period from which a second derivative is taken."""
-
-FREE_SHARE: Final = 0.6
-"""Share of the samples that least trimmed squares keep."""
-
-CONCENTRATIONS: Final = 12
-"""Concentration steps; half as many are enough."""
-
-SHORTEST_HOLD: Final = 0.5
-"""Periods that a hand holds at least."""
+RELEASE_RISE: Final = 0.1  # Growth of a swing over the largest that only a hand causes
+HELD_LONGER: Final = 1.5  # Delay over that of a release from rest from which a hold is seen
+NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to see
+HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))  # Periods before a motion
+FEWEST_HELD: Final = 10  # Samples of a hold from which quiet is judged
+FEWEST_HALF_CYCLES: Final = 5  # Half cycles from which a release is a run: three swings from a hand
+HAND_SHARE: Final = 0.3  # Torque over the greatest restoring torque nearby that only a hand adds
+DERIVATIVE_SPAN: Final = 0.2  # Periods over which a second derivative is taken
+CERTAIN_HAND: Final = 6.0  # Standard deviations of the second derivative from which it is no noise
+USUAL_REMAINDER: Final = 4.0  # Median remainders from which a hand acts
+FEWEST_A_PERIOD: Final = 20.0  # Samples a period from which a second derivative is taken
+FREE_SHARE: Final = 0.6  # Share of the samples that least trimmed squares keep
+CONCENTRATIONS: Final = 12  # Concentration steps; half as many are enough
+SHORTEST_HOLD: Final = 0.5  # Periods that a hand holds at least
 
 
-def releases(  # noqa: PLR0913, PLR0917 (a record and what is known of its motion)
-    work: Work,
-    parts: list[Places],
-    middle: float,
-    limit: float,
-    period: float,
-    noise: float,
-) -> list[Places]:
-    """Return the stretches of motions that nobody touches, in order.
-
-    ``parts`` are the motions, ``middle`` (rad) is the middle of the swing, ``limit`` (rad) the span
-    within which nothing moves, ``period`` (s) that of small swings, ``noise`` (rad) that of a
-    reading.
-    """
-    hand = touched(work, period, parts)
-    free = [
-        (_let_go(work, part, hand, middle, period, noise), part[1])
-        for part in without_hand(work.time, parts, hand, period)
-    ]
-    return [piece for part in free for piece in grown(work, part, middle, limit)]
+def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
+    """Return the stretches of motions ``parts`` that nobody touches, in order."""
+    hand = touched(work, parts)
+    free = without_hand(work.time, parts, hand, work.period)
+    free = [(_let_go(work, part, hand), part[1]) for part in free]
+    return [piece for part in free for piece in grown(work, part)]
 
 
-def _let_go(  # noqa: PLR0913, PLR0917 (a motion, and what is known of it)
-    work: Work,
-    part: Places,
-    hand: NDArray[np.bool_],
-    middle: float,
-    period: float,
-    noise: float,
-) -> int:
+def _let_go(work: Work, part: Stretch, hand: Mask) -> int:
     """Return where a motion that begins with a quiet hold has clearly left it."""
     low, high = part
     for shares in HOLD_WINDOWS:
-        before, sure = (
-            int(np.searchsorted(work.time, work.time[low] - share * period)) for share in shares
-        )
-        level = _quiet(work, before, sure, noise)
-        left = None if level is None else _left(work, (sure, high), level, noise)
+        times = work.time[low] - np.array(shares) * work.period
+        before, sure = np.searchsorted(work.time, times).tolist()
+        level = _quiet(work, before, sure)
+        left = None if level is None else _left(work, (sure, high), level)
         if left is None:
             continue
-        if hand[before:low].all():
-            # The hand holds the pendulum until the motion begins.
-            found = held_short(work, (before, high), middle, period, noise)
-            return low if found is None else min(low, found)
-        return max(low, left)
+        if not hand[before:low].all():
+            return max(low, left)
+        # The hand holds the pendulum until the motion begins.
+        found = held_short(work, (before, high))
+        return low if found is None else min(low, found)
     return low
 
 
-def _quiet(work: Work, low: int, high: int, noise: float) -> float | None:
+def _quiet(work: Work, low: int, high: int) -> float | None:
     """Return the level of quiet readings; None if they are not quiet."""
     hold = work.theta[low:high][work.trusted[low:high]]
     if hold.size < FEWEST_HELD:
@@ -120,54 +67,52 @@ def _quiet(work: Work, low: int, high: int, noise: float) -> float | None:
     early, late = np.array_split(hold, 2)
     drift = abs(float(np.mean(early) - np.mean(late)))
     spread = float(np.diff(np.quantile(hold, [0.05, 0.95]))[0])
-    still = spread <= max(4 * noise, 2 * work.count)
-    calm = drift <= max(4 * noise / math.sqrt(hold.size), work.count / 4)
+    still = spread <= max(4 * work.noise, 2 * work.count)
+    calm = drift <= max(4 * work.noise / math.sqrt(hold.size), work.count / 4)
     return float(np.median(hold)) if still and calm else None
 
 
-def _seen(work: Work, noise: float) -> float:
+def _seen(work: Work) -> float:
     """Return the distance from a hold that none of its readings has, rad."""
-    return max(6 * noise, 1.5 * work.count, 1e-4)
+    return max(6 * work.noise, 1.5 * work.count, 1e-4)
 
 
-def _left(work: Work, part: Places, level: float, noise: float) -> int | None:
+def _left(work: Work, part: Stretch, level: float) -> int | None:
     """Return where three readings in a row begin to be off a level, on one side."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
-    off = work.theta[good] - level
-    seen = _seen(work, noise)
+    off, seen = work.theta[good] - level, _seen(work)
     away = np.where(off > seen, 1, np.where(off < -seen, -1, 0))
     runs = np.flatnonzero((away[:-2] != 0) & (away[:-2] == away[1:-1]) & (away[1:-1] == away[2:]))
     return int(good[runs[0]]) if runs.size else None
 
 
-def enough(work: Work, part: Places, middle: float, limit: float) -> bool:
+def enough(work: Work, part: Stretch) -> bool:
     """Return whether a release has enough half cycles for a run."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     if not good.size:
         return False
-    theta = work.theta[good] - middle
+    theta = work.theta[good] - work.middle
     theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # carried round once
     start = after_turns(theta)
-    return (
-        swings(work.time[good][start:], theta[start:], least=limit).peak.size >= FEWEST_HALF_CYCLES
-    )
+    half = swings(work.time[good][start:], theta[start:], least=work.limit)
+    return half.peak.size >= FEWEST_HALF_CYCLES
 
 
-def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]:
+def grown(work: Work, part: Stretch) -> list[Stretch]:
     """Divide a motion where the swing grows: a hand took the pendulum and released it again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
     if good.size < 5:
         return []
-    good = good[after_turns(work.theta[good] - middle) :]
-    half = swings(work.time[good], work.theta[good] - middle, least=limit)
+    good = good[after_turns(work.theta[good] - work.middle) :]
+    half = swings(work.time[good], work.theta[good] - work.middle, least=work.limit)
     size = np.abs(half.peak)
     if size.size < 4:
         return [part]
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
-    rise = max(RELEASE_RISE * float(size.max()), 2 * limit)
-    cuts: list[Places] = []
+    rise = max(RELEASE_RISE * float(size.max()), 2 * work.limit)
+    cuts: list[Stretch] = []
     least, at = pairs[0], 0
     k = 1
     while k < pairs.size:
@@ -177,18 +122,15 @@ def grown(work: Work, part: Places, middle: float, limit: float) -> list[Places]
             top = k
             while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
                 top += 1
-            peak = top + int(size[top + 1] > size[top]) if top + 1 < size.size else top
-            stop = int(np.searchsorted(work.time, half.peak_time[min(at + 1, size.size - 1)]))
-            go = int(np.searchsorted(work.time, half.peak_time[peak]))
-            cuts.append((stop, go))
+            ends = (min(at + 1, size.size - 1), top + int(np.argmax(size[top : top + 2])))
+            stop, go = np.searchsorted(work.time, half.peak_time[list(ends)])
+            cuts.append((int(stop), int(go)))
             least, at, k = pairs[top], top, top
         k += 1
-    edges = [low, *(place for cut in cuts for place in cut), high]
-    pieces = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pieces if b - a > 5]
+    return [(a, b) for a, b in between(cuts, low, high) if b - a > 5]
 
 
-def held_short(work: Work, part: Places, middle: float, period: float, noise: float) -> int | None:
+def held_short(work: Work, part: Stretch) -> int | None:
     """Return where a motion left a level at which it was held for less than a period.
 
     Returns None where it leaves as soon as a release from rest does.
@@ -197,35 +139,33 @@ def held_short(work: Work, part: Places, middle: float, period: float, noise: fl
     if not work.trusted[low : low + 5].all():
         return None
     # The first readings give the level of the hold, then all readings near it.
-    level = float(np.median(work.theta[low : low + 5]))
-    left = _left(work, part, level, noise)
-    if left is None:
+    left = low
+    for _ in range(2):
+        level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
+        found = _left(work, part, level)
+        if found is None:
+            return None
+        left = found
+    pull = abs(math.sin(level - work.middle))
+    if pull < NEAR_UPRIGHT:
         return None
-    level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
-    left = _left(work, part, level, noise)
-    pull = abs(math.sin(level - middle))
-    if left is None or pull < NEAR_UPRIGHT:
-        return None
-    w0 = 2 * math.pi / period
-    usual = math.sqrt(2 * _seen(work, noise) / (w0**2 * pull))
+    usual = math.sqrt(2 * _seen(work) / pull) * work.period / (2 * math.pi)
     interval = float(np.median(np.diff(work.time)))
-    if work.time[left] - work.time[low] <= HELD_LONGER * usual + 4 * interval:
-        return None
-    return left
+    held = work.time[left] - work.time[low] > HELD_LONGER * usual + 4 * interval
+    return left if held else None
 
 
-def touched(work: Work, period: float, parts: list[Places]) -> NDArray[np.bool_]:
+def touched(work: Work, parts: list[Stretch]) -> Mask:
     """Return which samples of a free record a hand moves, shape (N,).
 
     The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there; the
-    coefficients are least trimmed squares over the moving ``parts``. ``period`` (s) is that of
-    small swings.
+    coefficients are least trimmed squares over the moving ``parts``.
     """
     from scipy.ndimage import binary_dilation, maximum_filter1d
     from scipy.signal import savgol_filter
 
     none = np.zeros(work.time.size, bool)
-    good = work.trusted
+    good, period = work.trusted, work.period
     interval, even = even_times(work.time)
     count, window = even.size, max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
     if period / interval < FEWEST_A_PERIOD or count < 4 * window:
@@ -283,17 +223,14 @@ def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
     return answer
 
 
-def without_hand(
-    time: NDArray[np.float64], parts: list[Places], hand: NDArray[np.bool_], period: float
-) -> list[Places]:
+def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) -> list[Stretch]:
     """Return the stretches of motions in which no hand holds the pendulum."""
-    touches: list[Places] = []
+    touches: list[Stretch] = []
     for a, b in stretches(hand):
         # A trembling hand lets go for a moment.
         if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:
-            touches[-1] = (touches[-1][0], b)
-        else:
-            touches.append((a, b))
+            a, _ = touches.pop()  # noqa: PLW2901 (joined)
+        touches.append((a, b))
     held = np.zeros(time.size, bool)
     for a, b in touches:
         if time[b - 1] - time[a] >= SHORTEST_HOLD * period:
@@ -302,7 +239,5 @@ def without_hand(
                 t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
             ]
             held[near[0][0] : near[-1][1]] = True
-    free = []
-    for low, high in parts:
-        free += [(low + a, low + b) for a, b in stretches(~held[low:high])]
+    free = [(low + a, low + b) for low, high in parts for a, b in stretches(~held[low:high])]
     return [(a, b) for a, b in free if b - a > 5 and time[b - 1] - time[a] > SHORTEST_HOLD * period]

@@ -19,60 +19,26 @@ from pendmap.formatting import counted
 from pendmap.records.scale import gain_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
-
-NYQUIST: Final = 2.0
-"""Readings in a period of the drive that resolve it at least."""
-
-GAIN_KNOWN: Final = 0.1
-"""Half of the 95 % interval of the gain from which it is reported."""
-
-LEAST_USED: Final = 0.1
-"""Share of the readings in motion that a fit uses without a warning."""
-
-RESTING: Final = ("held", "rest")
-"""Segments without motion."""
-
-ON_STEPS: Final = 0.12
-"""Root mean square distance from multiples of a step that shows it; 0.29 is chance."""
-
-SPREADS: Final = np.geomspace(0.02, 1.0, 80)
-"""Standard deviations of noise before the rounding, in counts."""
-
-PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5
-"""Places of the angle between the edges of its count, in counts."""
-
-MOST_COUNTS: Final = 9
-"""Counts that readings at rest show at most."""
-
-REST_PARTS: Final = 4
-"""Parts of a record at rest whose means agree."""
-
-REST_DRIFT: Final = 4.0
-"""Standard errors by which such means may differ."""
-
-EDGE_SHARE: Final = 0.95
-"""Share of the lines that are one count from the line before, at edges."""
-
-FEWEST_EDGES: Final = 50
-"""Readings from which edges are recognised."""
+NYQUIST: Final = 2.0  # Readings in a period of the drive that resolve it at least
+GAIN_KNOWN: Final = 0.1  # Half of the 95 % interval of the gain from which it is reported
+LEAST_USED: Final = 0.1  # Share of the readings in motion that a fit uses without a warning
+RESTING: Final = ("held", "rest")  # Segments without motion
+ON_STEPS: Final = 0.12  # Root mean square distance from multiples of a step; chance gives 0.29
+SPREADS: Final = np.geomspace(0.02, 1.0, 80)  # Noise before rounding, in counts
+PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5  # Places of the angle in a count
+MOST_COUNTS: Final = 9  # Counts that readings at rest show at most
+REST_PARTS: Final = 4  # Parts of a record at rest whose means agree
+REST_DRIFT: Final = 4.0  # Standard errors by which such means may differ
+EDGE_SHARE: Final = 0.95  # Share of the lines that are one count from the line before, at edges
+FEWEST_EDGES: Final = 50  # Readings from which edges are recognised
 
 
 def check(work: Work) -> None:
     """Report too few readings for a fit or the drive, and swings too small for the gain."""
-    _few(work)
-    _drive(work)
-    if work.plan.kind == "free" and work.made_of is None and not work.integrated:
-        _gain(work)
-
-
-def _few(work: Work) -> None:
-    """Report a run of which a fit uses few readings in motion."""
     moving = np.ones(work.time.size, bool)
     for part in work.segments:
         if part.what in RESTING:
@@ -84,40 +50,25 @@ def _few(work: Work) -> None:
             "says little about the others"
         )
         work.say("few-used", text)
-
-
-def _drive(work: Work) -> None:
-    """Report a sampling rate that does not resolve the drive."""
-    omega = (work.plan.drive or {}).get("Omega")
-    if not omega:
-        return
     rate = 1 / float(np.median(np.diff(work.time)))
-    drive = float(omega) / math.tau
-    if rate >= NYQUIST * drive:
-        return
-    slow = abs(drive - rate * round(drive / rate))
-    text = (
-        f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a "
-        f"period do not resolve it, {NYQUIST:g} and more would; it looks like one of "
-        f"{slow:.3g} Hz"
-    )
-    work.say("drive-unresolved", text)
-
-
-def _gain(work: Work) -> None:
-    """Report small swings that do not show the gain of the sensor."""
-    gain = gain_of(work)
-    if gain is None:
-        return
-    low, high = gain
-    if high - low <= 2 * GAIN_KNOWN:
-        return
-    between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
-    text = (
-        f"swings so small hardly show the gain of the sensor: the readings are {between} times the "
-        "angle (95 %), by how the period grows with the swing; friction is as uncertain"
-    )
-    work.say("gain-unknown", text)
+    drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
+    if rate < NYQUIST * drive:
+        text = (
+            f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a"
+            f" period do not resolve it, {NYQUIST:g} and more would; it looks like one of"
+            f" {abs(drive - rate * round(drive / rate)):.3g} Hz"
+        )
+        work.say("drive-unresolved", text)
+    free = work.plan.kind == "free" and work.made_of is None and not work.integrated
+    gain = gain_of(work) if free else None
+    if gain is not None and gain[1] - gain[0] > 2 * GAIN_KNOWN:
+        low, high = gain
+        between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
+        text = (
+            f"swings so small hardly show the gain of the sensor: the readings are {between} times"
+            " the angle (95 %), by how the period grows with the swing; friction is as uncertain"
+        )
+        work.say("gain-unknown", text)
 
 
 def step_of(theta: Floats) -> float:
@@ -156,7 +107,7 @@ def levels_shared(theta: Floats, step: float) -> float:
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
 
 
-def still_noise(theta: NDArray[np.float64], count: float) -> tuple[float, float] | None:
+def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
     """Return the noise of readings at rest, rounding included, and its standard error, rad.
 
     These are mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None where one
@@ -211,22 +162,9 @@ def put_on_edges(work: Work) -> None:
     """Put the readings of a log of edges on the edges."""
     if work.plan.pivot is not None or not logs_edges(work.theta):
         return
-    step = step_of(work.theta)
-    way = np.sign(np.round(np.diff(work.theta) / step))
-    work.edges, work.seen = True, step
+    work.edges, work.seen = True, step_of(work.theta)
+    way = np.sign(np.round(np.diff(work.theta) / work.seen))
     # A log of the edges themselves shows an edge twice at a turning point.
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
-        work.theta[1:] -= 0.5 * step * way
-        work.theta[0] -= 0.5 * step * way[0]
+        work.theta -= 0.5 * work.seen * np.append(way[0], way)
         work.trusted[0] = False  # it may be what stood there as the log began
-
-
-def say_edges(work: Work) -> None:
-    """Report that the readings are edges, once their unit is certain."""
-    if work.edges:
-        text = (
-            f"an encoder of {2 * math.pi / work.seen:.5g} counts a turn writes a line at each edge:"
-            f" the angles are those of {counted(work.theta.size, 'edge')}, their errors those of"
-            " the stamps; none is missing between two of them"
-        )
-        work.say("edges-logged", text, mended=True)

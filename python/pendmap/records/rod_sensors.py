@@ -14,46 +14,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError, check_flag, check_number, short_repr
 from pendmap.records.units import ANGULAR_ACCELERATIONS, plain, spelling
-from pendmap.signal.half_cycles import Swings, swings
+from pendmap.signal.half_cycles import swings
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.records.description import Column, Direction
+    from pendmap.signal import Floats, Mask
 
 
+# Example of a place in [columns]
 PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
-"""Example of a place in [columns]."""
 
-DIRECTIONS: Final = ("tangential", "radial", "angular")
-_FARTHEST: Final = 100.0
-"""Distance of a sensor from the pivot at most, m."""
-
-Direction = Literal["tangential", "radial", "angular"]
-
-OVER_THE_TOP: Final = 4 * math.pi
-"""Radians from the middle from which a record turns over the top."""
-
-FEWEST_PEAKS: Final = 4
-"""Turning points from which a drift is taken."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Place:
-    """Place of an accelerometer as [columns] gives it."""
-
-    direction: Direction | None = None
-    distance_m: float | None = None
-    gravity_removed: bool | None = None
+OVER_THE_TOP: Final = 4 * math.pi  # Radians from the middle from which a record turns over the top
+FEWEST_PEAKS: Final = 4  # Turning points from which a drift is taken
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,58 +53,24 @@ class Accelerometer:
         return "rad/s2" if self.direction == "angular" else "m/s2"
 
 
-def place_of(table: Mapping[str, object], where: str) -> Place:
-    """Return the place in a table of [columns]; raise InputError for values not allowed."""
-    direction, distance = table.get("direction"), table.get("distance_m")
-    removed = table.get("gravity_removed")
-    if direction is not None and direction not in DIRECTIONS:
-        known = ", ".join(f'"{name}"' for name in DIRECTIONS)
-        shown = short_repr(direction)
-        raise InputError(f"{where}: direction must be one of {known}, got {shown}")
-    if distance is not None:
-        distance = check_number(f"{where}: distance_m", distance)
-        if not 0 < distance <= _FARTHEST:
-            raise InputError(
-                f"{where}: distance_m must be more than 0, up to {_FARTHEST:g}, from the pivot to"
-                f" the sensor in m, got {distance:g}"
-            )
-    if removed is not None:
-        removed = check_flag(f"{where}: gravity_removed", removed)
-    unit = table.get("unit")
-    if isinstance(unit, str) and "scale" not in table:
-        angular = spelling(unit) in ANGULAR_ACCELERATIONS
-        if angular and direction in {"tangential", "radial"}:
-            raise InputError(
-                f"{where}: unit must be m/s2 or g with direction {direction!r}, got {unit!r}, which"
-                ' needs direction = "angular"'
-            )
-        if direction == "angular" and not angular:
-            raise InputError(
-                f"{where}: unit must be rad/s2 or deg/s2 with direction 'angular', got {unit!r}"
-            )
-    return Place(direction, distance, removed)
-
-
 def accelerometer_of(
-    place: Place, unit: str | None, heading: str, gravity: float, *, scaled: bool
+    column: Column, heading: str, unit: str | None, gravity: float
 ) -> tuple[Accelerometer | None, str]:
     """Return the accelerometer of a column, or the keys that its place lacks.
 
     ``heading`` may say "linear acceleration", without gravity; ``gravity`` is in m/s^2.
     """
-    direction = place.direction
-    if direction is None and not scaled and unit and spelling(unit) in ANGULAR_ACCELERATIONS:
-        direction = "angular"
+    angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
+    direction = column.direction or ("angular" if angular else None)
     if direction == "angular":
         return Accelerometer("angular", 1.0, 0.0), ""
-    keys = {"direction": direction, "distance_m": place.distance_m}
-    missing = [key for key, value in keys.items() if value is None]
-    if direction is None or place.distance_m is None:
-        return None, " and ".join(missing)
-    removed = place.gravity_removed
+    if direction is None or column.distance_m is None:
+        keys = {"direction": direction, "distance_m": column.distance_m}
+        return None, " and ".join(key for key, value in keys.items() if value is None)
+    removed = column.gravity_removed
     if removed is None:
-        removed = re.match("linear", plain(heading)) is not None
-    return Accelerometer(direction, place.distance_m, 0.0 if removed else gravity), ""
+        removed = plain(heading).startswith("linear")
+    return Accelerometer(direction, column.distance_m, 0.0 if removed else gravity), ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,19 +91,28 @@ class Gyroscope:
         return "rad/s"
 
 
-def angle_of_rate(time: Floats, rate: Floats, good: NDArray[np.bool_] | None = None) -> Floats:
+def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:
     """Return the integral of a rate, rad, shape (N,); 0 is the middle of the swing.
 
     The line that the bias adds is removed. Of a record over the top the last angle is 0. A spline
     replaces readings that are not ``good``.
     """
-    theta = _integral(time, rate, good)
+    from scipy.interpolate import CubicSpline
+
+    if good is None or np.count_nonzero(good) < 2:
+        good = np.ones(time.size, bool)
+    inside = np.clip(time, time[good][0], time[good][-1])
+    theta = CubicSpline(time[good], rate[good]).antiderivative()(inside)
     if np.ptp(theta - np.median(theta)) > OVER_THE_TOP:
         return np.asarray(theta - theta[-1])
-    middle = _middles(time, theta)
-    if middle is None:
+    # Turning points about the straight line through all angles give the middles of the swings.
+    trend = np.polyval(np.polyfit(time, theta, 1), time)
+    found = swings(time, theta - trend)
+    if found.peak_time.size < FEWEST_PEAKS:
         return np.asarray(theta - np.median(theta))
-    line = np.polyfit(*middle, 1)
+    peaks = found.peak + np.interp(found.peak_time, time, trend)
+    middle = dataclasses.replace(found, peak=peaks).middle
+    line = np.polyfit(found.peak_time[1:-1], middle, 1)
     return np.asarray(theta - np.polyval(line, time))
 
 
@@ -171,39 +123,13 @@ def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
     if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and found.peak_time.size >= FEWEST_PEAKS:
         # The removed line has the slope of the bias; the median ignores false readings.
         bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
-    return Gyroscope(_frequency(found, time, np.abs(rate - np.nan_to_num(bias))), bias)
-
-
-def _integral(time: Floats, rate: Floats, good: NDArray[np.bool_] | None) -> Floats:
-    """Return the integral of a rate by a cubic spline."""
-    from scipy.interpolate import CubicSpline
-
-    if good is not None and np.count_nonzero(good) > 1:
-        spline = CubicSpline(time[good], rate[good])
-        inside = np.clip(time, time[good][0], time[good][-1])
-        return np.asarray(spline.antiderivative()(inside))
-    return np.asarray(CubicSpline(time, rate).antiderivative()(time))
-
-
-def _middles(time: Floats, theta: Floats) -> tuple[Floats, Floats] | None:
-    """Return times and values halfway between turning points of either side."""
-    trend = np.polyval(np.polyfit(time, theta, 1), time)
-    found = swings(time, theta - trend)
-    if found.peak_time.size < FEWEST_PEAKS:
-        return None
-    peaks = found.peak + np.interp(found.peak_time, time, trend)
-    # Weights (1, 2, 1) cancel the bias that the decay gives to a mean of two turns.
-    value = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
-    return found.peak_time[1:-1], value
-
-
-def _frequency(found: Swings, time: Floats, speed: Floats) -> float:
-    """Return ``w0`` from the energy of swings: th' = 2 w0 sin(A/2) in the middle."""
-    size = np.abs(found.peak)
-    middle = (size[:-1] + size[1:]) / 2
+    speed, size = np.abs(rate - np.nan_to_num(bias)), np.abs(found.peak)
     swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
-    if np.any(swung):
-        passing = np.interp(found.crossing[1:-1], time, speed)[swung]
-        return float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
-    fastest = float(np.max(speed))  # it turns over the top from 2 w0 on
-    return fastest / 2 if fastest > 0 else 1.0
+    if not np.any(swung):
+        # A pendulum turns over the top from a speed of 2 w0 on.
+        return Gyroscope(float(np.max(speed)) / 2 or 1.0, bias)
+    # The energy of a swing gives th' = 2 w0 sin(A/2) in the middle.
+    middle = (size[:-1] + size[1:]) / 2
+    passing = np.interp(found.crossing[1:-1], time, speed)[swung]
+    w0 = float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
+    return Gyroscope(w0, bias)

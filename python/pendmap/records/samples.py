@@ -23,54 +23,25 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import equal_runs, normal_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices
 
-    Floats = NDArray[np.float64]
 
-
-EQUAL_READINGS: Final = 5
-"""Equal readings in a row that may be clipped or frozen."""
-
-FINEST: Final = 3e-5
-"""Steps in rad below which they are written digits."""
-
-BEYOND_FIT: Final = 3.0
-"""Residuals of a parabola by which a motion exceeds a clipped plateau."""
-
-CLEARLY_CUT: Final = 0.05
-"""Share of the span from which a motion beyond a plateau is clipped."""
-
+EQUAL_READINGS: Final = 5  # Equal readings in a row that may be clipped or frozen
+FINEST: Final = 3e-5  # Steps in rad below which they are written digits
+BEYOND_FIT: Final = 3.0  # Residuals of a parabola by which a motion exceeds a clipped plateau
+CLEARLY_CUT: Final = 0.05  # Share of the span from which a motion beyond a plateau is clipped
+# Order of the differences that vanish between readings, by kind of interpolation
 VANISHING_ORDER: Final = {"held": 1, "straight lines": 2, "cubics": 4}
-"""Order of the differences that vanish between readings, by kind of interpolation."""
-
-VANISHED: Final = 0.1
-"""Differences between readings over those across from which they vanish."""
-
-FEWEST_SAMPLES: Final = 200
-"""Samples from which interpolation is searched."""
-
-INTERVALS: Final = 60
-"""Intervals between readings that are examined."""
-
-READINGS_A_PERIOD: Final = 5.0
-"""Readings a period at least; fewer confuse phases with places."""
-
-SMOOTH_NEIGHBOURS: Final = 0.3
-"""Noise of neighbours over the most at any spacing that interpolation leaves."""
-
-INDEPENDENT: Final = 0.7
-"""Noise over the most at any spacing from which readings are independent."""
-
-DIGITS: Final = 3e-6
-"""Noise over the span below which it is that of digits."""
-
-FOLLOWED: Final = 1.3
-"""Residual of a quartic over that of a sextic from which motion is left."""
-
-_EVEN: Final = 1e-3
-"""Relative error of an even interval."""
+VANISHED: Final = 0.1  # Differences between readings over those across from which they vanish
+FEWEST_SAMPLES: Final = 200  # Samples from which interpolation is searched
+INTERVALS: Final = 60  # Intervals between readings that are examined
+READINGS_A_PERIOD: Final = 5.0  # Readings a period at least; fewer confuse phases with places
+SMOOTH_NEIGHBOURS: Final = 0.3  # Noise of neighbours over the most that interpolation leaves
+INDEPENDENT: Final = 0.7  # Noise over the most at any spacing from which readings are independent
+DIGITS: Final = 3e-6  # Noise over the span below which it is that of digits
+FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic from which motion is left
+_EVEN: Final = 1e-3  # Relative error of an even interval
 
 
 def check(work: Work) -> None:
@@ -78,21 +49,20 @@ def check(work: Work) -> None:
     if work.made_of is not None:
         # The acceleration is checked: the angle made of it has corners.
         readings = work.extra["acceleration"]
-        moves = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        find_spikes(work, readings, work.made_of.unit, moves.free)
-        return
-    if work.integrated:
+        free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
+        find_spikes(work, readings, work.made_of.unit, free)
+    elif work.integrated:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))
         _clipped(read, "rad/s")
         find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
-        return
-    work.seen = work.seen if work.edges else step_of(work.theta)
-    work.count = _count(work)
-    _clipped(work, "rad")
-    _frozen(work)
-    outliers.find(work)
+    else:
+        work.seen = work.seen if work.edges else step_of(work.theta)
+        work.count = _count(work)
+        _clipped(work, "rad")
+        _frozen(work)
+        outliers.find(work)
 
 
 def _count(work: Work) -> float:
@@ -105,30 +75,33 @@ def _count(work: Work) -> float:
 
 
 def say_steps(work: Work) -> None:
-    """Report the step of the readings, once their unit is certain."""
-    if work.integrated or work.edges:
-        return  # an integral has none; of edges they are said already
+    """Report the step of the readings, or that they are edges, once their unit is certain."""
+    if work.integrated:
+        return  # an integral has no steps
+    turn = f"{2 * math.pi / (work.seen or math.inf):.5g}"
+    if work.edges:
+        text = (
+            f"an encoder of {turn} counts a turn writes a line at each edge: the angles are those"
+            f" of {counted(work.theta.size, 'edge')}, their errors those of the stamps; none is"
+            " missing between two of them"
+        )
+        work.say("edges-logged", text, mended=True)
+        return
     counts, seen = work.known.get("encoder_counts"), work.seen
     work.count = _count(work)
-    if counts is None:
-        if seen > FINEST:
-            turn = 2 * math.pi / seen
-            text = f"the readings come in steps of {seen:.4g} rad ({turn:.5g} a turn)"
-            work.say("counts-seen", text)
-    elif work.count == seen > 0 and seen > 3 * math.pi / float(counts):
-        text = (
-            f"the readings come in steps of {seen:.4g} rad, {2 * math.pi / seen:.5g} a turn:"
-            f" encoder_counts says {counts}"
-        )
-        work.say("counts-differ", text)
+    text = f"the readings come in steps of {seen:.4g} rad"
+    if counts is None and seen > FINEST:
+        work.say("counts-seen", f"{text} ({turn} a turn)")
+    elif counts is not None and work.count == seen > 3 * math.pi / float(counts):
+        work.say("counts-differ", f"{text}, {turn} a turn: encoder_counts says {counts}")
 
 
 def _clipped(work: Work, unit: str) -> None:
     """Mark plateaus at the ends of the range that the motion reaches at speed."""
     marked = np.zeros(work.theta.size, bool)
     ends = []
-    for end in (float(work.theta.max()), float(work.theta.min())):
-        low, high = equal_runs(work.theta, EQUAL_READINGS)
+    low, high = equal_runs(work.theta, EQUAL_READINGS)
+    for end in (float(work.theta.min()), float(work.theta.max())):
         ended = np.abs(work.theta - end) <= 1e-9 * max(abs(end), 1.0)
         hits = [
             (a, b)
@@ -139,31 +112,25 @@ def _clipped(work: Work, unit: str) -> None:
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * EQUAL_READINGS):
             ends.append(f"{end:.4g}")
             marked |= ended  # the shorter ones, too
-    if marked.any():
-        at = np.flatnonzero(marked)
-        work.trusted[at] = False
-        text = (
-            f"the sensor ends at {' and '.join(ends[::-1])} {unit}:"
-            f" {counted(at.size, 'clipped sample')} not for fitting"
-        )
-        work.say("clipped", text, at=at)
+    at = np.flatnonzero(marked)
+    text = f"the sensor ends at {' and '.join(ends)} {unit}: {counted(at.size, 'clipped sample')}"
+    work.distrust(at, "clipped", f"{text} not for fitting")
 
 
 def _cut_off(work: Work, low: int, high: int) -> bool:
     """Return whether a parabola through both sides exceeds a plateau."""
-    if low < 3 or work.theta.size - high < 3:
+    theta, count = work.theta, work.theta.size
+    if low < 3 or count - high < 3:
         return False
-    if _missed(work, low, high) > CLEARLY_CUT * float(np.ptp(work.theta)):
+    if _missed(work, low, high) > CLEARLY_CUT * float(np.ptp(theta)):
         return True
-    begin, end = equal_runs(work.theta, EQUAL_READINGS)
+    begin, end = equal_runs(theta, EQUAL_READINGS)
     reach = max(high - low, 4)
     first = max(low - reach, int(np.max(end[end < low], initial=0)))
-    last = min(high + reach, int(np.min(begin[begin > high], initial=work.theta.size)))
-    places = np.r_[min(first, max(low - 4, 0)) : low, high : max(last, high + 4)]
-    places = places[places < work.theta.size]
-    level = float(work.theta[low])
+    last = min(high + reach, int(np.min(begin[begin > high], initial=count)))
+    places = np.r_[min(first, max(low - 4, 0)) : low, high : min(max(last, high + 4), count)]
     time = work.time[places] - (work.time[low] + work.time[high - 1]) / 2
-    away = work.theta[places] - level
+    away = theta[places] - float(theta[low])
     answer = np.polyfit(time, away, 2)
     noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
     beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
@@ -174,19 +141,17 @@ def _frozen(work: Work) -> None:
     """Mark stretches without change in the middle of a motion."""
     low, high = equal_runs(work.theta, EQUAL_READINGS)
     marked = np.zeros(work.theta.size, bool)
+    change = np.diff(work.theta)
     for a, b in zip(low, high, strict=True):
         if a < 3 or b > work.theta.size - 3 or not work.trusted[a]:
             continue
-        jump = abs(work.theta[b] - work.theta[b - 1])
-        before = abs(work.theta[a] - work.theta[a - 1])
-        passing = (work.theta[b] - work.theta[b - 1]) * (work.theta[a] - work.theta[a - 1]) > 0
-        if passing and jump > 3 * max(before, work.count) and _abrupt(work, a, b):
+        before, jump = change[a - 1], change[b - 1]
+        quick = abs(jump) > 3 * max(abs(before), work.count)
+        if jump * before > 0 and quick and _abrupt(work, a, b):
             marked[a:b] = True
-    if marked.any():
-        at = np.flatnonzero(marked)
-        work.trusted[at] = False
-        text = f"the reading stands still while the pendulum moves: {counted(at.size, 'sample')}"
-        work.say("frozen", f"{text} not for fitting", at=at)
+    at = np.flatnonzero(marked)
+    text = f"the reading stands still while the pendulum moves: {counted(at.size, 'sample')}"
+    work.distrust(at, "frozen", f"{text} not for fitting")
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
@@ -200,17 +165,13 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
 
 def _missed(work: Work, low: int, high: int) -> float:
     """Return how far the motion goes during a plateau, by its speed beside it, rad."""
-    before = slice(max(low - 4, 0), low)
-    after = slice(high, high + 4)
+    sides = (slice(max(low - 4, 0), low), slice(high, high + 4))
     slopes = [
-        float(np.ptp(work.theta[part]) / np.ptp(work.time[part]))
-        for part in (before, after)
-        if work.theta[part].size > 1
+        float(np.ptp(work.theta[side]) / np.ptp(work.time[side]))
+        for side in sides
+        if work.theta[side].size > 1
     ]
-    if not slopes:
-        return -1.0
-    half = float(work.time[high - 1] - work.time[low]) / 2
-    return min(slopes) * half / 2
+    return min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,7 +180,7 @@ class Resampled:
 
     made: str  # a key of VANISHING_ORDER; empty where only the noise shows it
     ratio: int  # samples a reading
-    places: NDArray[np.intp]
+    places: Indices
 
 
 def measured(time: Floats, theta: Floats) -> Resampled | None:
@@ -297,9 +258,9 @@ def keep_readings(work: Work) -> None:
         return
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
-    how = "each held" if found.made == "held" else f"{found.made} between"
-    text = f"the record repeats {_hertz(rate / found.ratio)} at {_hertz(rate)}, {how}"
-    if work.pivot() is not None:
+    how = "each reading held" if found.made == "held" else f"{found.made} between readings"
+    text = f"read at {_hertz(rate / found.ratio)} and written at {_hertz(rate)}, {how}"
+    if work.pivot:
         # The pivot may have been read at every sample.
         work.say("interpolated", f"{text}: errors that count samples are too small")
         return

@@ -19,56 +19,25 @@ from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices
 
 
 DEGREE: Final = math.pi / 180
-
-LONGEST_PERIOD: Final = 60.0
-"""Seconds of a pendulum period at most in a laboratory."""
-
-SHORTEST_PERIOD: Final = 0.02
-"""Seconds of a pendulum period at least: 0.1 mm of length."""
-
-SAMPLES_A_PERIOD: Final = 8.0
-"""Samples a period below which sampling is slow."""
-
-UNLIKE_RIG: Final = 0.25
-"""Relative difference of the period from that of [rig] that is reported."""
-
-FEWEST_PERIODS: Final = 6
-"""Periods from which a relation is taken."""
-
-LARGEST_SWING: Final = 3.0
-"""Swings in rad up to which the growth of the period is used."""
-
-LEAST_ERROR: Final = 1e-3
-"""Relative error of a factor at least."""
-
-Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
-
-FAR_ZERO: Final = 0.15
-"""Radians from 0 at which friction alone (Tr/w0^2) holds no pendulum."""
-
-OFF_QUARTER: Final = 0.1
-"""Radians by which a turned gauge may miss a multiple of 90 degrees."""
-
-CERTAIN_MIDDLE: Final = 10
-"""Half cycles about one middle that make it certain."""
-
-AT_REST: Final = 0.02
-"""Span of the last tenth over the whole, at rest."""
-
-BEFORE_REST: Final = 4
-"""Half cycles before a rest that is not a hold."""
-
-MIDDLES_AGREE: Final = 0.1
-"""Share of the swing within which its middles agree."""
+LONGEST_PERIOD: Final = 60.0  # Seconds of a pendulum period at most in a laboratory
+SHORTEST_PERIOD: Final = 0.02  # Seconds of a pendulum period at least: 0.1 mm of length
+SAMPLES_A_PERIOD: Final = 8.0  # Samples a period below which sampling is slow
+UNLIKE_RIG: Final = 0.25  # Relative difference of the period from that of [rig] that is reported
+FEWEST_PERIODS: Final = 6  # Periods from which a relation is taken
+LARGEST_SWING: Final = 3.0  # Swings in rad up to which the growth of the period is used
+LEAST_ERROR: Final = 1e-3  # Relative error of a factor at least
+Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
+FAR_ZERO: Final = 0.15  # Radians from 0 at which friction alone (Tr/w0^2) holds no pendulum
+OFF_QUARTER: Final = 0.1  # Radians by which a turned gauge may miss a multiple of 90 degrees
+CERTAIN_MIDDLE: Final = 10  # Half cycles about one middle that make it certain
+AT_REST: Final = 0.02  # Span of the last tenth over the whole, at rest
+BEFORE_REST: Final = 4  # Half cycles before a rest that is not a hold
+MIDDLES_AGREE: Final = 0.1  # Share of the swing within which its middles agree
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,26 +50,35 @@ class Periods:
     @property
     def small(self) -> float:
         """The median period of the smallest third of the swings, s."""
-        third = np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
-        return float(np.median(self.period[third]))
+        return float(np.median(self.period[self._smallest]))
+
+    @property
+    def smallest(self) -> float:
+        """The period of vanishing swings, s: ``small`` less its growth, below half a turn."""
+        if float(np.min(self.amplitude)) >= math.pi:
+            return self.small
+        growth = _growth(np.minimum(self.amplitude[self._smallest], 3.0))
+        return self.small / float(np.median(growth))
+
+    @property
+    def _smallest(self) -> Indices:
+        return np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
 
 
 def check(work: Work) -> None:
     """Correct milliseconds and degrees where nothing else is possible; report disagreements."""
-    if work.plan.kind != "free":
-        _slow_sampling(work, None)
-        return
-    good = work.trusted
-    middle = middle_of(work.time[good], work.theta[good])
-    if middle is None:
-        middle = float(np.median(work.theta[work.theta.size // 2 :]))
-    found = periods_of(work, middle)
+    found = None
+    if work.plan.kind == "free":
+        middle = middle_of(work.time[work.trusted], work.theta[work.trusted])
+        if middle is None:
+            middle = float(np.median(work.theta[work.theta.size // 2 :]))
+        found = periods_of(work, middle)
     if found is not None:
-        found = _seconds(work, found)
-        found = _radians(work, found)
+        found = _radians(work, _seconds(work, found))
         _known(work, found)
     _slow_sampling(work, found)
-    turn_to_rest(work)
+    if work.plan.kind == "free":
+        turn_to_rest(work)
 
 
 def periods_of(work: Work, middle: float) -> Periods | None:
@@ -114,19 +92,10 @@ def small_period(time: Floats, theta: Floats, count: float) -> float:
 
     Returns NaN where there are too few swings, or none below half a turn.
     """
-    middle = middle_of(time, theta)
-    found = _periods(time, theta - (0.0 if middle is None else middle), count)
+    found = _periods(time, theta - (middle_of(time, theta) or 0.0), count)
     if found is None or float(np.min(found.amplitude)) >= math.pi:
         return math.nan
-    return _small(found)
-
-
-def _small(found: Periods) -> float:
-    """Return the period of small swings, s, from the smallest ones and their growth."""
-    if float(np.min(found.amplitude)) >= math.pi:
-        return found.small
-    smallest = found.amplitude[np.argsort(found.amplitude)[: max(found.period.size // 3, 1)]]
-    return found.small / float(np.median(_growth(np.minimum(smallest, 3.0))))
+    return found.smallest
 
 
 def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
@@ -164,10 +133,10 @@ def _seconds(work: Work, found: Periods) -> Periods:
             text = f"a period of {small:.4g} s: times look like {name}, [columns] says otherwise"
             work.say("time-unit", text)
             return found
-        work.time *= factor
         text = f"the times are {name}: as seconds the period would be {small:.4g} s"
         work.say("time-unit", text, mended=True)
         size = factor if work.integrated else 1.0
+        work.time *= factor
         work.theta *= size
         return Periods(found.amplitude * size, found.period * factor)
     if not SHORTEST_PERIOD < small < LONGEST_PERIOD:
@@ -178,24 +147,22 @@ def _seconds(work: Work, found: Periods) -> Periods:
 def _radians(work: Work, found: Periods) -> Periods:
     """Convert degrees to radians; report the scale that the periods show."""
     largest = float(np.max(found.amplitude))
-    about = float(np.median(found.amplitude))
-    if largest > math.pi and about > 0:
-        degrees = largest * DEGREE <= math.pi
-        declared = ("velocity" if work.integrated else "angle") in work.declared
-        text = f"swings of {largest:.4g} rad are no pendulum's"
-        if not degrees or declared:
-            work.say("angle-unit", f"{text}: the unit or the scale is wrong")
-            return found
-        work.theta *= DEGREE
-        if work.integrated:
-            work.extra["velocity"] = work.extra["velocity"] * DEGREE
-        work.count *= DEGREE
-        work.seen *= DEGREE
-        read = "velocities are degrees a second" if work.integrated else "angles are degrees"
-        work.say("angle-unit", f"the {read}: {text}", mended=True)
-        return Periods(found.amplitude * DEGREE, found.period)
-    _curvature(work, found, largest)
-    return found
+    if largest <= math.pi or float(np.median(found.amplitude)) <= 0:
+        _curvature(work, found, largest)
+        return found
+    channel = "velocity" if work.integrated else "angle"
+    text = f"swings of {largest:.4g} rad are no pendulum's"
+    if largest * DEGREE > math.pi or channel in work.declared:
+        work.say("angle-unit", f"{text}: the unit or the scale is wrong")
+        return found
+    work.theta *= DEGREE
+    if work.integrated:
+        work.extra["velocity"] = work.extra["velocity"] * DEGREE
+    work.count *= DEGREE
+    work.seen *= DEGREE
+    read = "velocities are degrees a second" if work.integrated else "angles are degrees"
+    work.say("angle-unit", f"the {read}: {text}", mended=True)
+    return Periods(found.amplitude * DEGREE, found.period)
 
 
 def _curvature(work: Work, found: Periods, largest: float) -> None:
@@ -204,20 +171,20 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
     if largest > LARGEST_SWING or np.ptp(grown) < 2e-3 or found.period.size < FEWEST_PERIODS + 2:
         return
     share, error = _share(found, grown)
-    if error < 0.1 and abs(share - 1) > 0.3 + 5 * error:
-        factor, spread = _factor(found)
-        flat = share < 0.1
-        degrees = " (degrees?)" if flat else ""
+    if error >= 0.1 or abs(share - 1) <= 0.3 + 5 * error:
+        return
+    factor, spread = _factor(found)
+    flat = share < 0.1
+    text = (
+        f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
+        f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is"
+        f" {factor:.4g} +- {spread:.1g} times the reading{' (degrees?)' if flat else ''}, or"
+        " another force acts"
+    )
+    if not flat:
         channel = "velocity" if work.integrated else "angle"
-        mended = f"--effect encoder_gain fits it, or scale the {channel} in [columns]"
-        taken = "" if flat else f"; {mended}"
-        text = (
-            f"from {found.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
-            f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is"
-            f" {factor:.4g} +- {spread:.1g} times the reading{degrees}, or another force"
-            f" acts{taken}"
-        )
-        work.say("angle-unit" if flat else "angle-scale", text)
+        text += f"; --effect encoder_gain fits it, or scale the {channel} in [columns]"
+    work.say("angle-unit" if flat else "angle-scale", text)
 
 
 def _share(found: Periods, grown: Floats) -> tuple[float, float]:
@@ -236,15 +203,13 @@ def gain_of(work: Work) -> tuple[float, float] | None:
     The period alone depends on the scale: it grows with the square of the angle.
     """
     good = work.trusted
-    middle = middle_of(work.time[good], work.theta[good])
-    found = periods_of(work, 0.0 if middle is None else middle)
+    found = periods_of(work, middle_of(work.time[good], work.theta[good]) or 0.0)
     if found is None or float(np.max(found.amplitude)) > LARGEST_SWING:
         return None
     share, error = _share(found, _growth(found.amplitude))
     least, most = share - Z95 * error, share + Z95 * error
-    if most <= 0:
-        return 0.0, math.inf
-    return 1 / math.sqrt(most), 1 / math.sqrt(least) if least > 0 else math.inf
+    low = 1 / math.sqrt(most) if most > 0 else 0.0
+    return low, 1 / math.sqrt(least) if least > 0 else math.inf
 
 
 def _factor(found: Periods) -> tuple[float, float]:
@@ -289,13 +254,13 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def _known(work: Work, found: Periods) -> None:
     """Compare the period of small swings with that of [rig]."""
-    expected = {}
-    if "w0" in work.known:
-        expected[f"w0 = {work.known['w0']:g} rad/s"] = 2 * math.pi / work.known["w0"]
-    if "length_m" in work.known:
-        length, gravity = work.known["length_m"], work.known.get("gravity", GRAVITY)
-        expected[f"length_m = {length:g} m"] = 2 * math.pi * math.sqrt(length / gravity)
-    seen = _small(found)
+    known, expected = work.known, {}
+    if "w0" in known:
+        expected[f"w0 = {known['w0']:g} rad/s"] = 2 * math.pi / known["w0"]
+    if "length_m" in known:
+        root = math.sqrt(known["length_m"] / known.get("gravity", GRAVITY))
+        expected[f"length_m = {known['length_m']:g} m"] = 2 * math.pi * root
+    seen = found.smallest
     for said, period in expected.items():
         if abs(seen / period - 1) > UNLIKE_RIG:
             text = f"small swings take {seen:.4g} s, by {said} {period:.4g} s: one of them is wrong"
@@ -304,56 +269,50 @@ def _known(work: Work, found: Periods) -> None:
 
 def _slow_sampling(work: Work, found: Periods | None) -> None:
     """Report sampling that is slow against the motion."""
-    interval = float(np.median(np.diff(work.time)))
-    if found is not None and found.small / interval < SAMPLES_A_PERIOD:
-        text = f"{found.small / interval:.1f} samples a period: the shape of the swing is lost"
-        work.say("sampling-slow", text)
-        return
+    number = found.small / float(np.median(np.diff(work.time))) if found else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
-    if fastest > 1.0:
+    if number < SAMPLES_A_PERIOD:
+        text = f"{number:.1f} samples a period: the shape of the swing is lost"
+        work.say("sampling-slow", text)
+    elif fastest > 1.0:
         text = f"up to {fastest:.2g} rad from sample to sample: too slow for this motion"
         work.say("sampling-slow", text)
 
 
 def middle_of(time: Floats, theta: Floats) -> float | None:
     """Return the middle of the last quarter of a free swing, rad; None for larger swings."""
-    start = time[0] + 0.75 * (time[-1] - time[0])
-    late = theta[time >= start]
+    late = theta[time >= time[0] + 0.75 * (time[-1] - time[0])]
     if late.size < 20:
         return None
-    middle = (float(np.quantile(late, 0.02)) + float(np.quantile(late, 0.98))) / 2
-    swing = float(np.quantile(late, 0.98) - np.quantile(late, 0.02)) / 2
-    return middle if swing < math.pi else None
+    low, high = (float(np.quantile(late, part)) for part in (0.02, 0.98))
+    return (low + high) / 2 if (high - low) / 2 < math.pi else None
 
 
 def turn_to_rest(work: Work) -> None:
     """Move a zero that is far from the rest of a free pendulum to it."""
     good = work.trusted
     middle = middle_of(work.time[good], work.theta[good])
-    if middle is None:
-        return
     # Whole turns are those of a pendulum that went over the top.
-    turns = 2 * math.pi * round(middle / (2 * math.pi))
-    off = middle - turns
-    if abs(off) < FAR_ZERO:
+    turns = 2 * math.pi * round((middle or 0.0) / (2 * math.pi))
+    off = (middle or 0.0) - turns
+    if middle is None or abs(off) < FAR_ZERO:
         return
+    text = f"it swings about {off:.4g} rad"
+    quarters = round(off / (math.pi / 2))
+    gauge = quarters * math.pi / 2
     if not _certain(work.time[good], work.theta[good] - middle):
         text = "too few whole swings to tell what it swings about: the zero is left to the fit"
         work.say("zero-uncertain", text)
-        return
-    if "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
-        work.say("zero-offset", f"it swings about {off:.4g} rad: the zero that is given is off")
-        return
-    quarters = round(off / (math.pi / 2))
-    gauge = quarters * math.pi / 2
-    if quarters and abs(off - gauge) < OFF_QUARTER:
+    elif "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
+        work.say("zero-offset", f"{text}: the zero that is given is off")
+    elif quarters and abs(off - gauge) < OFF_QUARTER:
         work.theta -= turns + gauge
-        text = f"the gauge is turned by {90 * quarters} degrees: it swings about {off:.4g} rad"
-        work.say("gauge-turned", f"{text}, turned back", mended=True)
-        return
-    work.theta -= turns + off
-    text = f"it swings about {off:.4g} rad, the rest is elsewhere than the zero: taken off"
-    work.say("zero-offset", text, mended=True)
+        text = f"the gauge is turned by {90 * quarters} degrees: {text}, turned back"
+        work.say("gauge-turned", text, mended=True)
+    else:
+        work.theta -= turns + off
+        text = f"{text}, not about its zero: subtracted"
+        work.say("zero-offset", text, mended=True)
 
 
 def _certain(time: Floats, theta: Floats) -> bool:
@@ -362,14 +321,14 @@ def _certain(time: Floats, theta: Floats) -> bool:
     time, theta = time[start:], theta[start:]
     if theta.size < 20:
         return False
-    reach = float(np.max(np.abs(theta)))
-    peaks = swings(time, theta, least=AT_REST * reach).peak
+    still = AT_REST * float(np.max(np.abs(theta)))
+    half = swings(time, theta, least=still)
     tail = theta[-max(theta.size // 10, 10) :]
-    if float(np.ptp(tail)) < AT_REST * reach and float(np.abs(tail).max()) < AT_REST * reach:
-        return peaks.size >= BEFORE_REST
-    if peaks.size < CERTAIN_MIDDLE:
+    if float(np.ptp(tail)) < still and float(np.abs(tail).max()) < still:
+        return half.peak.size >= BEFORE_REST
+    if half.peak.size < CERTAIN_MIDDLE:
         return False
-    peaks = peaks[-2 * CERTAIN_MIDDLE :]
-    middles = (peaks[:-2] + 2 * peaks[1:-1] + peaks[2:]) / 4
-    size = float(np.median(np.abs(peaks)))
-    return float(np.median(np.abs(middles))) < MIDDLES_AGREE * size
+    late = slice(-2 * CERTAIN_MIDDLE, None)
+    size = float(np.median(np.abs(half.peak[late])))
+    middle = half.middle[2 - 2 * CERTAIN_MIDDLE :]
+    return float(np.median(np.abs(middle))) < MIDDLES_AGREE * size

@@ -18,14 +18,11 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
+# Findings of a wrong unit or scale; unless corrected, results are wrong
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
-"""Findings of a wrong unit or scale; unless corrected, results are wrong."""
-
+# Findings that are reported before any number
 DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
-"""Findings that are reported before any number."""
-
-SCALE_FINDING: Final = "angle-scale"
-"""The one of these that an effect can cause, too."""
+SCALE_FINDING: Final = "angle-scale"  # The one of these that an effect can cause, too
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -54,15 +51,10 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
 
 def _run(run: Run) -> dict[str, Any]:
     """Return the JSON object of a run."""
-    noise = dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)}
     used = run.theta[run.trusted]
+    own = ("name", "file", "sha256", "kind", "lab_time_s", "hold_out")
     return {
-        "name": run.name,
-        "file": run.file,
-        "sha256": run.sha256,
-        "kind": run.kind,
-        "lab_time_s": run.lab_time_s,
-        "hold_out": run.hold_out,
+        **{key: getattr(run, key) for key in own},
         "drive": None if run.drive is None else dict(run.drive),
         "channels": dict(run.channels),
         "unused": list(run.unused),
@@ -75,7 +67,7 @@ def _run(run: Run) -> dict[str, Any]:
         "theta_max": float(used.max()) if used.size else None,
         "count_rad": run.count_rad or None,
         "peaks_only": run.peaks_only,
-        "noise": noise,
+        "noise": dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)},
         "gyroscope_bias": _bias(run),
         "segments": [dataclasses.asdict(segment) for segment in run.segments],
         "findings": [dataclasses.asdict(found) for found in run.findings],
@@ -124,14 +116,14 @@ def _lines(run: Run) -> Iterator[str]:
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run), noise_unit(run))}"
     if (bias := _bias(run)) is not None:
-        said = f"{bias:+.3g} rad/s, what the gyroscope reads of nothing by the angle's drift"
+        said = f"{bias:+.3g} rad/s, reading of the gyroscope at rest by the drift of the angle"
         yield f"  bias      {said}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
     mended = sum(found.mended for found in run.findings)
     many = counted(len(run.findings), "finding")
-    yield f"  {many}, {mended} of them mended" if run.findings else "  nothing odd was found"
+    yield f"  {many}, {mended} of them mended" if run.findings else "  no findings"
     for found in run.findings:
         yield f"  {_line(found)}"
 
@@ -145,45 +137,38 @@ def _line(found: Finding) -> str:
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
     """Return each doubt about a unit or the records."""
-    said = _said_of(experiment, runs)
+    said = _findings(experiment, runs)
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
 
 def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a warning for each of :func:`doubts`."""
-    for text in doubts(experiment, *runs):
-        yield f"Warning: {text}"
+    return (f"Warning: {text}" for text in doubts(experiment, *runs))
 
 
 def doubted(experiment: Experiment, *runs: Run) -> bool:
     """Return whether a unit of these runs is wrong, or they are of several rigs."""
-    said = (found for _, found in _said_of(experiment, runs))
-    return any(_doubted(found) and found.what != SCALE_FINDING for found in said)
+    said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
+    return bool(said - {SCALE_FINDING})
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
     """Return whether a unit of these runs is wrong, and with it the unit of any residual."""
-    said = (found for _, found in _said_of(experiment, runs))
-    return any(
-        found.what in UNIT_FINDINGS and found.what != SCALE_FINDING and not found.mended
-        for found in said
-    )
+    said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
+    return bool(said & UNIT_FINDINGS - {SCALE_FINDING})
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a line for each finding that is no doubt."""
-    for where, found in _said_of(experiment, runs):
+    for where, found in _findings(experiment, runs):
         if not _doubted(found):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
 
 
-def _said_of(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
+def _findings(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
     """Yield the findings of an experiment and of some runs, with their places."""
-    for found in experiment.findings:
-        yield str(experiment.path), found
-    for run in runs:
-        for found in run.findings:
-            yield run.name, found
+    yield from ((str(experiment.path), found) for found in experiment.findings)
+    yield from ((run.name, found) for run in runs for found in run.findings)
 
 
 def _doubted(found: Finding) -> bool:
@@ -205,18 +190,17 @@ def _bias(run: Run) -> float | None:
 def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     """Return the noise in words."""
     if not math.isfinite(noise.sigma):
-        return "too few samples to tell"
+        return "unknown, too few samples"
     degrees = f"{math.degrees(noise.sigma):.2g} degrees{unit.removeprefix('rad')}"
     if noise.bound:
-        few = "motion is left in it at so few samples a period"
+        few = "motion included: few samples a period"
         return f"at most {noise.sigma:.2g} {unit} ({degrees}), {few}"
     said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
-        return f"{said}, that of counting: the record shows no more"
-    if not noise.by_speed:
-        return said
-    slow, fast = noise.by_speed[0], noise.by_speed[-1]
-    if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
-        what = "speed" if unit == "rad" else "acceleration"
-        said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
+        return f"{said}, that of rounding to counts: the record shows no less"
+    if noise.by_speed:
+        slow, fast = noise.by_speed[0], noise.by_speed[-1]
+        if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
+            what = "speed" if unit == "rad" else "acceleration"
+            said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
     return said

@@ -6,94 +6,58 @@ they are constant, swinging they recur in nearly equal times and do not grow.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.signal import Stretch
 from pendmap.signal.half_cycles import swings
-from pendmap.signal.robust import stretches
+from pendmap.signal.robust import between, stretches
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
-
-LEAST_SWING: Final = 5.0
-"""Standard errors below which a reading is no swing."""
-
-STILL_SPAN: Final = 8.0
-"""Standard deviations of noise within which a whole period shows no motion."""
-
-STILL_SCATTER: Final = 1.5
-"""Noise by which half a period may scatter without motion."""
-
-STEADY_HOLD: Final = 0.1
-"""Scatter of a whole period over its distance from the middle in a trembling hold."""
-
-FEWEST_QUIET: Final = 10
-"""Samples of half a period from which quiet is judged."""
-
-FEWEST_HALF_SWINGS: Final = 3
-"""Half swings that are more than a hand on its way."""
-
-UNEVEN: Final = 0.15
-"""Relative difference in time of half swings of one side, at most."""
-
-GROWTH: Final = 1.1
-"""Half swing over the one of the same side before, at most."""
-
-DECAY: Final = 0.6
-"""Half swing over the one of the same side before, at least."""
-
-RELEASE_STEP: Final = 2.5
-"""Fastest changes of a free swing from which a step is a release."""
-
-DECAYED: Final = 0.05
-"""Swing over the largest below which a motion has decayed."""
+LEAST_SWING: Final = 5.0  # Standard errors below which a reading is no swing
+STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
+STILL_SCATTER: Final = 1.5  # Noise by which half a period may scatter without motion
+STEADY_HOLD: Final = 0.1  # Scatter of a trembling hold over its distance from the middle
+FEWEST_QUIET: Final = 10  # Samples of half a period from which quiet is judged
+FEWEST_HALF_SWINGS: Final = 3  # Half swings that are more than a hand on its way
+UNEVEN: Final = 0.15  # Relative difference in time of half swings of one side, at most
+GROWTH: Final = 1.1  # Half swing over the one of the same side before, at most
+DECAY: Final = 0.6  # Half swing over the one of the same side before, at least
+RELEASE_STEP: Final = 2.5  # Fastest changes of a free swing from which a step is a release
+DECAYED: Final = 0.05  # Swing over the largest below which a motion has decayed
 
 
-@dataclasses.dataclass(frozen=True)
-class Swinging:
-    """Stretches of a record, as first place and the one after the last."""
-
-    free: list[Places]  # free swings, in order
-    held: list[Places]  # quiet stretches before a release
-
-
-def swinging(time: Floats, reading: Floats, noise: float) -> Swinging:
-    """Return where a pendulum swings freely and where it is held, from an acceleration."""
+def swinging(time: Floats, reading: Floats, noise: float) -> tuple[list[Stretch], list[Stretch]]:
+    """Return the free swings and the quiet holds before a release that an acceleration shows."""
     from scipy.ndimage import median_filter
 
     least = max(LEAST_SWING * noise, 1e-12)
     # A lone false reading is neither a step nor the end of a hold.
     reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
-    whole = [(0, time.size)]
     if crossing.size < FEWEST_HALF_SWINGS:
-        return Swinging(whole, [])
+        return [(0, time.size)], []
     period = float(np.median(crossing[2:] - crossing[:-2]))
     quiet = _quiet(time, reading, period, noise)
-    edges = [0, *(place for stretch in quiet for place in stretch), time.size]
-    largest, free, held = 0.0, [], []
-    for edge, high in zip(edges[::2], edges[1::2], strict=True):
-        low = edge
-        if high - low <= 5:
+    largest, free, held = 0.0, list[Stretch](), list[Stretch]()
+    for edge, high in between(quiet, 0, time.size):
+        if high - edge <= 5:
             continue
-        part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        if swings(time[low:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
+        part = reading[edge:high] - middle_over(time[edge:high], reading[edge:high], least)
+        if swings(time[edge:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
             continue
         largest = max(largest, float(np.max(np.abs(part))))
-        low += let_go(time[low:high], part, noise)
+        low = edge + let_go(time[edge:high], part, noise)
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
-        end = low + _untouched(
-            time[low:high], part, least, DECAYED * largest, more=high < time.size
-        )
+        small = DECAYED * largest
+        end = _untouched(time[low:high], part, least, small, more=high < time.size)
         held += [stretch for stretch in quiet if stretch[1] == edge]
-        free.append((low, end))
-    return Swinging(free or whole, held)
+        free.append((low, low + end))
+    return free or [(0, time.size)], held
 
 
 def middle_over(time: Floats, reading: Floats, least: float) -> float:
@@ -112,7 +76,7 @@ def middle_over(time: Floats, reading: Floats, least: float) -> float:
     return middle
 
 
-def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Places]:
+def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Stretch]:
     """Return stretches in which nothing changes, in order."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
@@ -141,7 +105,7 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[P
     return found
 
 
-def _all_of(middles: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+def _all_of(middles: Mask, width: int) -> Mask:
     """Return which samples are in windows of ``width`` about places within the record."""
     from scipy.ndimage import binary_dilation
 
@@ -171,28 +135,22 @@ def _untouched(time: Floats, values: Floats, least: float, small: float, *, more
     """
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
+    slack = least if math.isfinite(least) else 0.0  # the noise of few samples is not known
+
+    def follows(k: int) -> bool:
+        """Whether a half swing follows freely from the one of the same side before it."""
+        even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
+        return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)
+
     last = tops.size - 1
     # Two half swings together: a hand may cause a single one like those before.
-    while last > 2 and not all(_alike(halves, tops, k, least) for k in (last, last - 1)):
+    while last > 2 and not (follows(last) and follows(last - 1)):
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
         return time.size  # it decays to its rest
     tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
-    usual = tops[last - 1] * GROWTH + least
-    longest = (1 + UNEVEN) * halves[last - 1]
-    grown = np.max(np.abs(tail), initial=0.0) > usual
-    if (
-        not more
-        and last == tops.size - 1
-        and not grown
-        and (time[-1] - found.crossing[-1] < longest)
-    ):
+    grown = np.max(np.abs(tail), initial=0.0) > tops[last - 1] * GROWTH + least
+    whole = time[-1] - found.crossing[-1] < (1 + UNEVEN) * halves[last - 1]
+    if whole and last == tops.size - 1 and not more and not grown:
         return time.size
     return int(np.searchsorted(time, found.crossing[last + 1]))
-
-
-def _alike(halves: Floats, tops: Floats, k: int, least: float) -> bool:
-    """Return whether a half swing follows freely from the one of the same side before it."""
-    even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
-    slack = least if math.isfinite(least) else 0.0
-    return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)

@@ -1,33 +1,57 @@
-"""Tables from files: text, Excel, Parquet."""
+"""Tables from files: text of loggers in all its spellings, Excel, Parquet."""
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import datetime as dt
 import hashlib
 import io
+import re
 import zipfile
+from collections import Counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import read_whole
+from pendmap.formatting import counted, listed
 from pendmap.records.experiment import Finding
-from pendmap.records.text import MOST_BYTES, Table, decoded, parsed, refuse_large
+from pendmap.records.units import CHANNELS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
-    from numpy.typing import NDArray
 
     from pendmap.records.description import Reader
+    from pendmap.signal import Floats, Indices
 
-
-LARGEST_READING: Final = 1e18
-"""Largest number of a reading; nanoseconds since 1970 are 2e18."""
-
+MOST_COLUMNS: Final = 1000  # Columns of a table at most
+MOST_BYTES: Final = 2**30  # Largest file, and bytes of its numbers, at most
+LONGEST_LINE: Final = 40 * MOST_COLUMNS  # Characters of the longest line that may be a row
+SAMPLE_LINES: Final = 400  # Lines, from all over a file, from which separators are found
+LEAST_ROWS: Final = 0.5  # Share of the lines that are rows of numbers at least
+MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
+MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
+# Separators with decimal signs, in the order of preference
+SEPARATORS: Final = (
+    *((";", ","), ("\t", ","), ("\t", "."), (";", "."), (",", ".")),
+    *(("|", "."), (" ", "."), (" ", ","), (",", ",")),
+)
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NOTHING: Final = frozenset(
+    ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity")
+)
+# Words that loggers write for the levels of a trigger
+_LEVELS: Final = {
+    **dict.fromkeys(("true", "high", "on"), "1"),
+    **dict.fromkeys(("false", "low", "off"), "0"),
+}
+_CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
+_HEADS: Final = 30  # Lines above the numbers of a short file at most
+LARGEST_READING: Final = 1e18  # Largest number of a reading; nanoseconds since 1970 are 2e18
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -35,9 +59,21 @@ _KNOWN: Final = {
     b"%PDF": "must be CSV or Parquet, it is a PDF file",
     b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
 }
-
+# Reader of a workbook (.xlsx, .xls) by its first bytes
 ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
-"""Reader of a workbook (.xlsx, .xls) by its first bytes."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """Columns of numbers, and their rows in the file."""
+
+    names: tuple[str, ...]  # headings; empty texts without a header
+    values: Floats  # shape (rows, columns); NaN where there is no number
+    rows: Indices  # lines of the file, from 1 (of a Parquet file: rows of the table)
+    findings: tuple[Finding, ...] = ()
+    headed: bool = True
+    # Stretch among the lines that are not empty: unreadable lines leave a place out.
+    order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
 def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
@@ -78,7 +114,7 @@ def _parquet(data: bytes, where: str) -> Table:
     return Table(names, values, order + 1, order=order)
 
 
-def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[NDArray[np.float64]]]:
+def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
     """Unpack the columns of a Parquet file within the bounds that it declares."""
     import pandas as pd
     import pyarrow as pa
@@ -172,3 +208,201 @@ def _cell(cell: object) -> str:
     if isinstance(cell, (int, float)) and not isinstance(cell, bool):
         return repr(float(cell))
     return " ".join(str(cell).split())
+
+
+def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
+    """Return the text of a file, without NUL bytes, and findings; raise InputError for no text."""
+    findings: list[Finding] = []
+    if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
+        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        return data.decode("utf-16", errors="replace"), findings
+    nuls = data.count(b"\0")
+    if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:
+        return data.decode("utf-16-le", errors="replace"), findings
+    if nuls > MOST_NULS * len(data):
+        raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
+    if nuls:
+        data = data.replace(b"\0", b"")
+        text = f"{counted(nuls, 'NUL byte')} left out"
+        findings.append(Finding("nul-bytes", text, mended=True))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
+        raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
+    return text, findings
+
+
+def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
+    """Raise InputError for a table with too many columns or bytes."""
+    if columns > MOST_COLUMNS:
+        raise InputError(f"{where}: must have at most {MOST_COLUMNS} columns, got {columns}")
+    if size > MOST_BYTES:
+        most, got = (f"{value / 2**20:.0f} MiB" for value in (MOST_BYTES, size))
+        raise InputError(f"{where}: unpacks to {got}: must be at most {most}")
+
+
+def parsed(text: str, reader: Reader, where: str) -> Table:
+    """Return the table of a text; raise InputError if there are no rows of numbers."""
+    every = enumerate(re.split(r"\r\n|\n|\r", text), 1)
+    lines = [(k, line) for k, line in every if line.strip() and k > reader.skip_rows]
+    if not lines:
+        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
+    if sum(len(line) > LONGEST_LINE for _, line in lines) > LEAST_ROWS * len(lines):
+        raise InputError(
+            f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
+            f"{LONGEST_LINE} characters"
+        )
+    # A line that is too long is left out as unreadable.
+    lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
+    delimiter, decimal, width = _way(lines, reader, where)
+    cells, fits = list[str](), list[bool]()
+    for _, line in lines:
+        row = _row(line, delimiter, decimal, width)
+        fits.append(row is not None)
+        cells += row or ()
+    columns = [cells[k::width] for k in range(width)]
+    first = fits.index(True)
+    findings = []
+    if fits[-1] and not text.endswith(("\n", "\r")) and _cut(columns[-1][-21:]):
+        fits[-1] = False
+        columns = [column[:-1] for column in columns]
+        text = "the last line breaks off and is left out"
+        findings.append(Finding("half-line", text, mended=True))
+    names, headed = _header([line for _, line in lines[:first]], delimiter, width)
+    if headed and len(names) != width:
+        raise InputError(
+            f"{where}: as many columns must have names as numbers, got {len(names)} with names and"
+            f" {width} with numbers; decimal commas need another delimiter, like ;"
+        )
+    dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
+    if dropped and not (findings and len(dropped) == 1):
+        shown = listed([str(k) for k in dropped], 3)
+        said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
+        findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
+    order = np.flatnonzero(fits)
+    numbers = [_numbers(column, decimal) for column in columns]
+    places = np.array([lines[k][0] for k in order])
+    return Table(names, np.column_stack(numbers), places, tuple(findings), headed, order - first)
+
+
+def _numbers(column: list[str], decimal: str) -> Floats:
+    """Return the numbers of a column; NaN for anything else."""
+    import pandas as pd
+
+    texts = pd.Series(column)
+    if decimal != ".":
+        texts = texts.str.replace(decimal, ".", regex=False)
+    numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
+    if np.isnan(numbers).all():
+        words = texts.str.lower().map(_LEVELS)
+        numbers = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float, copy=True)
+    numbers[~np.isfinite(numbers)] = np.nan
+    return np.asarray(numbers)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    """Return the parts of a line."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        try:
+            return [part.strip() for part in next(csv.reader([line], delimiter=delimiter))]
+        except (csv.Error, StopIteration):
+            return [line]
+    return [part.strip() for part in line.split(delimiter)]
+
+
+def _is_row(parts: list[str], decimal: str) -> int:
+    """Return the count of numbers of a line; 0 if anything in it is no number."""
+    numbers = 0
+    for part in parts if len(parts) <= MOST_COLUMNS else ():
+        text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
+        if _NUMBER.fullmatch(text):
+            numbers += 1
+        elif part.lower() not in _NOTHING and part.lower() not in _LEVELS:
+            return 0
+    return numbers
+
+
+def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
+    """Return delimiter, decimal sign and width that make most lines rows."""
+    step = max(len(lines) // SAMPLE_LINES, 1)
+    # Uneven places: loggers of several sensors alternate rows of each kind.
+    places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
+    sample = [lines[k][1] for k in places]
+    found = _common(sample, reader, 2) or _common(sample, reader, 1)
+    if found == (",", ".", 2) and reader.decimal is None and _fractions(sample):
+        return ";", ",", 1
+    least = LEAST_ROWS * len(sample)
+    if found is not None:
+        fitting = sum(_row(line, *found) is not None for line in sample)
+        if fitting >= min(least, len(sample) - _HEADS):
+            return found
+    for decimal in (".", ","):
+        alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
+        if sum(_row(line, *alone) is not None for line in sample) > least:
+            return alone
+    advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
+    raise InputError(
+        f"{where}: must be CSV with a time and an angle, got no rows of numbers{advice}"
+    )
+
+
+def _fractions(sample: list[str]) -> bool:
+    """Return whether the digits behind the commas are decimals: some begin with 0."""
+    parts = [row for line in sample if (row := _row(line, ",", ".", 2))]
+    digits = all(re.fullmatch(r"\s*[+-]?\d+", a) and re.fullmatch(r"\d+\s*", b) for a, b in parts)
+    return digits and any(b.startswith("0") and len(b.strip()) > 1 for _, b in parts)
+
+
+def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
+    """Return delimiter, decimal sign and width of most lines with ``least`` numbers."""
+    most, best = 0, None
+    quoted = any('"' in line for line in sample)
+    ways = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
+    for delimiter, decimal in dict.fromkeys(ways):
+        if delimiter == decimal and not quoted:
+            continue
+        widths = Counter(
+            len(parts)
+            for parts in (_split(line, delimiter) for line in sample)
+            if len(parts) > 1 and _is_row(parts, decimal) >= least
+        )
+        for width, count in widths.most_common(1):
+            if count > most:
+                most, best = count, (delimiter, decimal, width)
+    return best
+
+
+def _row(line: str, delimiter: str, decimal: str, width: int) -> list[str] | None:
+    """Return the parts of a line that is a row of this width."""
+    parts = _split(line, delimiter)
+    return parts if len(parts) == width and _is_row(parts, decimal) else None
+
+
+def _cut(cells: list[str]) -> bool:
+    """Return whether the last cell has fewer decimals than all before it."""
+    *before, last = (len(cell.replace(",", ".").partition(".")[2]) for cell in cells)
+    return len(set(before)) == 1 and last < before[0]
+
+
+def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
+    """Return the names above the numbers, with a line of units below them."""
+    heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
+    heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1 or width == 1]
+    if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:
+        return tuple(heads[-1]), True  # decimal commas between commas: refused by the caller
+    heads = [head for head in heads if len(head) == width and any(head)]
+    if not heads:
+        return ("",) * width, False
+    names = heads[-1]
+    if len(heads) > 1 and all(re.fullmatch(r"[\(\[]?[^\d\s]{0,6}\d?[\)\]]?", n) for n in names):
+        units = [name.strip("()[] ") for name in names]
+        above = heads[-2]
+        known = any(unit and c.has(unit) for unit in units for c in CHANNELS.values())
+        if known and any(above):
+            names = [f"{a} [{u}]" if u else a for a, u in zip(above, units, strict=True)]
+    return tuple(names), True

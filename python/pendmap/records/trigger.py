@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import counted
+from pendmap.formatting import counted, listed
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records.work import Work
+    from pendmap.signal import Floats, Indices, Stretch
 
-    Floats = NDArray[np.float64]
-    Places = tuple[int, int]
-
-BETWEEN_LEVELS: Final = 0.02
-"""Share of the samples between two levels at most."""
-
-DEAD_BAND: Final = 0.2
-"""Distance from the threshold over that of the levels within which noise is no edge."""
-
-RELEASES_APART: Final = 3.0
-"""Periods of small swings between releases at least."""
-
-BOUNCE: Final = 0.3
-"""Drive periods within which a second edge is a bounce."""
-
-FEWEST_EDGES: Final = 4
-"""Edges from which the frequency of a drive is taken."""
-
-UNEVEN_EDGES: Final = 0.1
-"""Periods by which edges of a drive miss its beat, rms, besides the sampling."""
-
-DIFFERENT: Final = 3.0
-"""Standard errors from which a given frequency or phase is another."""
+BETWEEN_LEVELS: Final = 0.02  # Share of the samples between two levels at most
+DEAD_BAND: Final = 0.2  # Distance from the threshold over that of the levels, without edges
+RELEASES_APART: Final = 3.0  # Periods of small swings between releases at least
+BOUNCE: Final = 0.3  # Drive periods within which a second edge is a bounce
+FEWEST_EDGES: Final = 4  # Edges from which the frequency of a drive is taken
+UNEVEN_EDGES: Final = 0.1  # Periods by which edges of a drive miss its beat, rms
+DIFFERENT: Final = 3.0  # Standard errors from which a given frequency or phase is another
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +35,7 @@ class Beat:
     left_out: int  # bounces
 
 
-def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp], str] | None:
+def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str] | None:
     """Return the places of the first samples after each edge, and which edge it is.
 
     The threshold is between the means of the two levels; missing values keep the level. By default
@@ -81,7 +65,7 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[NDArray[np.intp],
     return (rising if edge == "rising" else falling), edge
 
 
-def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]:
+def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
     """Return the edges that do not follow a counted one within ``dead``, s."""
     kept: list[int] = []
     for k in places.tolist():
@@ -90,7 +74,7 @@ def _debounced(time: Floats, places: NDArray[np.intp], dead: float) -> list[int]
     return kept
 
 
-def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
+def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
     """Return the motion after each edge of the trigger; ``parts`` where it shows no release."""
     if "trigger" not in work.extra or not parts:
         return parts
@@ -98,41 +82,43 @@ def begun(work: Work, parts: list[Places], period: float) -> list[Places]:
     if found is None or not found[0].size:
         work.say("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
         return parts
-    kept = _debounced(work.time, found[0], period)
+    edges, edge = found
+    kept = _debounced(work.time, edges, period)
     apart = np.diff(work.time[kept])
     if apart.size and np.median(apart) < RELEASES_APART * period:
         text = (
-            f"the trigger's {counted(len(kept), f'{found[1]} edge')} recur after"
+            f"the trigger's {counted(len(kept), f'{edge} edge')} recur after"
             f" {np.median(apart):.3g} s, three swings and less: it marks no release"
         )
         work.say("trigger-unlike", text)
         return parts
     motions = []
-    for k, low in enumerate(kept):
-        high = kept[k + 1] if k + 1 < len(kept) else work.time.size
+    for low, high in itertools.pairwise([*kept, work.time.size]):
         after = [(max(a, low), min(b, high)) for a, b in parts if a < high and b > low]
-        if not after:
-            continue
-        a, b = max(after, key=lambda part: part[1] - part[0])
-        # The angle shows the release to a fraction of a swing, the trigger to a sample.
-        motions.append((low if work.time[a] - work.time[low] < period else a, b))
+        if after:
+            a, b = max(after, key=lambda part: part[1] - part[0])
+            # The angle shows the release to a fraction of a swing, the trigger to a sample.
+            motions.append((low if work.time[a] - work.time[low] < period else a, b))
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
         return parts
-    times = ", ".join(f"{work.time[k]:.6g}" for k in kept[:6]) + (", ..." if len(kept) > 6 else "")
-    bounced = found[0].size - len(kept)
-    bounces = f"; {counted(bounced, 'bounce')} left out" if bounced else ""
-    text = f"the trigger's {found[1]} edge marks {counted(len(kept), 'release')}, at {times} s"
-    work.say("trigger-release", text + bounces)
+    times = listed([f"{work.time[k]:.6g}" for k in kept], 6)
+    text = f"the trigger's {edge} edge marks {counted(len(kept), 'release')}, at {times} s"
+    work.say("trigger-release", text + _bounces(edges.size - len(kept)))
     return motions
 
 
-def _none(found: tuple[NDArray[np.intp], str] | None) -> str:
+def _bounces(number: int) -> str:
+    """Return how many edges are left out as bounces."""
+    return f"; {counted(number, 'bounce')} left out" if number else ""
+
+
+def _none(found: tuple[Indices, str] | None) -> str:
     """Return why there is no edge."""
     return "has no two levels" if found is None else f"has no {found[1]} edge"
 
 
-def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) -> Beat | None:
+def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat | None:
     """Return the frequency with which edges recur; None where they do not.
 
     Each edge is between two samples, so that the edges bound the period by ``(t_j - t_i +- (d_i +
@@ -142,16 +128,15 @@ def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) 
     """
     if places.size < FEWEST_EDGES:
         return None
-    apart = np.diff(time[places])
     # Without a known frequency: bounces are many and short, periods few and long.
-    period = 2 * math.pi / omega if omega else float(np.quantile(apart, 0.9))
+    period = 2 * math.pi / omega if omega else float(np.quantile(np.diff(time[places]), 0.9))
     kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
     if kept.size < FEWEST_EDGES:
         return None
     before, after = time[kept - 1], time[kept]
     middle = (before + after) / 2
-    period = float(np.median(np.diff(middle)))
-    number = np.concatenate([[0.0], np.cumsum(np.round(np.diff(middle) / period))])
+    apart = np.diff(middle)
+    number = np.concatenate([[0.0], np.cumsum(np.round(apart / float(np.median(apart))))])
     if np.any(np.diff(number) < 1):
         return None
     (period, start), covariance = np.polyfit(number, middle, 1, cov="unscaled")
@@ -161,58 +146,41 @@ def beat_of(time: Floats, places: NDArray[np.intp], omega: float | None = None) 
     if period <= 0 or spread > UNEVEN_EDGES * period + 2 * sampling:
         return None
     error = max(spread, sampling) * math.sqrt(float(covariance[0, 0]))
-    low, high = _allowed(before, after, number)
+    low, high = 0.0, math.inf
+    for k in range(1, kept.size):
+        steps = number[k:] - number[:-k]
+        low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
+        high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
     if low <= high:
         period, error = (low + high) / 2, (high - low) / math.sqrt(12)
     w = 2 * math.pi / period
     return Beat(w, w * error / period, middle, max(spread, sampling), places.size - kept.size)
 
 
-def _allowed(before: Floats, after: Floats, number: Floats) -> tuple[float, float]:
-    """Return the least and the greatest period that all edges allow, s."""
-    low, high = 0.0, math.inf
-    for k in range(1, number.size):
-        steps = number[k:] - number[:-k]
-        low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
-        high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
-    return low, high
-
-
 def check_drive(work: Work) -> None:
     """Report the frequency that the trigger of a forced run shows; take its phase if stated."""
     if work.plan.kind != "forced" or "trigger" not in work.extra:
         return
-    drive = work.plan.drive
-    given = drive["Omega"] if drive else None
     found = edges_of(work.extra["trigger"], work.edge)
-    if found is None or found[0].size < FEWEST_EDGES:
-        why = (
-            f"the trigger {_none(found)}"
-            if found is None or not found[0].size
-            else (f"the trigger has {counted(found[0].size, f'{found[1]} edge')}")
-        )
+    given = (work.plan.drive or {}).get("Omega")
+    beat = beat_of(work.time, found[0], given) if found else None
+    if found is None or beat is None:
+        why = f"the trigger {_none(found)}"
+        if found and found[0].size:
+            edges = counted(found[0].size, f"{found[1]} edge")
+            uneven = f"the trigger's {edges} do not recur evenly"
+            why = uneven if found[0].size >= FEWEST_EDGES else f"the trigger has {edges}"
         work.say("trigger-unlike", f"{why}: it shows no drive")
         return
-    beat = beat_of(work.time, found[0], given)
-    if beat is None:
-        text = (
-            f"the trigger's {found[0].size} {found[1]} edges do not recur evenly: it shows no drive"
-        )
-        work.say("trigger-unlike", text)
-        return
-    bounces = f"; {counted(beat.left_out, 'bounce')} left out" if beat.left_out else ""
     said = (
         f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
-        f" {counted(beat.time.size, f'{found[1]} edge')}{bounces}"
+        f" {counted(beat.time.size, f'{found[1]} edge')}{_bounces(beat.left_out)}"
     )
-    if drive is None or given is None:
-        work.say("trigger-drive", said)
-        return
-    if abs(beat.omega - given) > DIFFERENT * beat.stderr:
+    if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
         work.say("trigger-differs", f"{said}: the drive is given with {given:.7g}")
         return
     work.say("trigger-drive", said)
-    if work.phase is not None:
+    if given is not None and work.phase is not None:
         _phase(work, beat, given, work.phase)
 
 

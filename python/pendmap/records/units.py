@@ -12,6 +12,7 @@ from pendmap.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Units of a recorded pivot: the SI unit and the factor to it
 PIVOT_UNITS: Final = {
     "m/s2": ("m/s2", 1.0),
     "g": ("m/s2", 9.80665),
@@ -20,8 +21,6 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-"""Units of a recorded pivot: the SI unit and the factor to it."""
-
 _TURN: Final = 2 * math.pi
 _DEGREE: Final = math.pi / 180
 
@@ -56,7 +55,6 @@ class Channel:
 
 
 _RAW: Final = ("v", "mv", "volt", "volts", "count", "counts", "tick", "ticks", "adc", "lsb")
-
 _TIMES: Final = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
     **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
@@ -78,11 +76,11 @@ _SPEEDS: Final = {
     "rpm": _TURN / 60,
     **dict.fromkeys(("rev/s", "rps"), _TURN),
 }
+# Units of an acceleration that needs no place on the rod, in rad/s^2
 ANGULAR_ACCELERATIONS: Final = {
     **dict.fromkeys(("rad/s2", "1/s2"), 1.0),
     **dict.fromkeys(("deg/s2", "°/s2"), _DEGREE),
 }
-"""Units of an acceleration that needs no place on the rod, in rad/s^2."""
 _ACCELERATIONS: Final = {
     **dict.fromkeys(("m/s2", "m/s/s", "ms-2", "m/ss"), 1.0),
     "g": 9.80665,
@@ -94,7 +92,7 @@ _LENGTHS: Final = {
     "cm": 1e-2,
     "mm": 1e-3,
 }
-
+# By name, in the order in which columns are tried
 CHANNELS: Final = {
     "time": Channel(
         "s",
@@ -129,8 +127,6 @@ CHANNELS: Final = {
         "1", {"1": 1.0, "v": 1.0, "mv": 1e-3, "ttl": 1.0}, "trigger", "trigger|trig|sync|ttl"
     ),
 }
-"""By name, in the order in which columns are tried."""
-
 _IN_BRACKETS: Final = re.compile(r"^(?P<name>.*?)\s*[\(\[\{](?P<unit>[^\)\]\}]*)[\)\]\}]\s*$")
 _AFTER: Final = re.compile(r"^(?P<name>[^/]+?)\s*(?:/\s*|,\s*|\s+in\s+)(?P<unit>.+)$")
 _BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$", re.IGNORECASE)

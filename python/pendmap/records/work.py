@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted
+from pendmap.formatting import counted, listed
 from pendmap.records.experiment import Finding, Segment
 
 if TYPE_CHECKING:
@@ -19,14 +19,10 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import RunPlan
     from pendmap.records.rod_sensors import Accelerometer
+    from pendmap.signal import Floats, Indices, Mask
 
-    Floats = NDArray[np.float64]
-
-FEWEST_SAMPLES = 5
-"""Samples that a record must have."""
-
-_FEWEST_PEAKS = 3
-"""Turning points that a record of turning points must have."""
+FEWEST_SAMPLES = 5  # Samples that a record must have
+_FEWEST_PEAKS = 3  # Turning points that a record of turning points must have
 
 
 @dataclasses.dataclass
@@ -39,9 +35,10 @@ class Work:
     declared: frozenset[str]  # channels with a unit or scale in [columns]
     time: Floats
     theta: Floats
-    rows: NDArray[np.intp]  # lines of the file
-    extra: dict[str, Floats]  # further channels; the pivot's as pivot:vertical, pivot:horizontal
-    trusted: NDArray[np.bool_]
+    rows: Indices  # lines of the file
+    extra: dict[str, Floats]  # further channels
+    pivot: dict[str, Floats]  # recorded motion of the pivot by direction
+    trusted: Mask
     findings: list[Finding]
     columns: Mapping[str, str]  # the heading of each channel
     unused: tuple[str, ...]  # headings of the columns that no channel is read from
@@ -57,6 +54,10 @@ class Work:
     phase: float | None = None  # phase of the drive at that edge, rad
     edges: bool = False  # each reading is an edge of an encoder
     pivot_unit: str | None = None
+    middle: float = 0.0  # of the swing, rad
+    period: float = math.nan  # of small swings, s
+    noise: float = 0.0  # of a reading, rad
+    limit: float = 0.0  # span of readings within which nothing moves, rad
 
     @property
     def made_of(self) -> Accelerometer | None:
@@ -70,14 +71,14 @@ class Work:
         text: str,
         *,
         mended: bool = False,
-        at: NDArray[np.intp] | None = None,
+        at: Indices | None = None,
         span: tuple[float, float] | None = None,
     ) -> None:
         """Add a finding, at samples or over a span of time in s."""
         where = ""
         if at is not None and at.size:
-            shown = ", ".join(str(int(self.rows[k])) for k in at[:3])
-            where = f"{'rows' if at.size > 1 else 'row'} {shown}{', ...' if at.size > 3 else ''}"
+            shown = listed([str(row) for row in self.rows[at[:4]]], 3)
+            where = f"{'rows' if at.size > 1 else 'row'} {shown}"
             span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
         if span is not None and not all(map(math.isfinite, span)):
             span = None
@@ -89,6 +90,20 @@ class Work:
         self.time, self.theta = self.time[which], self.theta[which]
         self.rows, self.trusted = self.rows[which], self.trusted[which]
         self.extra = {name: values[which] for name, values in self.extra.items()}
+        self.pivot = {way: values[which] for way, values in self.pivot.items()}
+
+    def leave_out(self, which: Mask, what: str, noun: str, why: str) -> None:
+        """Leave out samples, if any, and report how many and why."""
+        at = np.flatnonzero(which)
+        if at.size:
+            self.say(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
+            self.keep(~which)
+
+    def distrust(self, at: Indices, what: str, text: str) -> None:
+        """Take samples, if any, out of fits, and report them."""
+        if at.size:
+            self.trusted[at] = False
+            self.say(what, text, at=at)
 
     def apart(self) -> tuple[list[Work], list[Finding]]:
         """Return a work for each release, and the findings that belong to none of them.
@@ -135,15 +150,6 @@ class Work:
                 f"{self.where}: must have {least} samples or more with time and angle, got"
                 f" {counted(self.time.size, 'sample')}"
             )
-
-    def pivot(self) -> dict[str, Floats] | None:
-        """Return the pivot's recorded motion by direction, or None."""
-        found = {
-            name.removeprefix("pivot:"): values
-            for name, values in self.extra.items()
-            if name.startswith("pivot:")
-        }
-        return found or None
 
 
 def _within(low: float | None, high: float | None, begin: float, end: float) -> bool:

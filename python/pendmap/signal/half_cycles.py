@@ -1,6 +1,6 @@
 """Half cycles of a record, without errors, for checks.
 
-The methods of identification have peaks and crossings of their own, with standard errors.
+The methods of identification have other peaks and crossings, with standard errors.
 """
 
 from __future__ import annotations
@@ -12,13 +12,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
-DEAD_BAND: Final = 0.05
-"""Median size within which a crossing of the middle is noise."""
+DEAD_BAND: Final = 0.05  # Median size within which a crossing of the middle is noise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,6 +25,14 @@ class Swings:
     crossing: Floats  # s, linear between samples, shape (M + 1,)
     peak_time: Floats  # s, of the farthest sample between two crossings, shape (M,)
     peak: Floats  # rad from the middle, shape (M,)
+
+    @property
+    def middle(self) -> Floats:
+        """Middles of the swing at the peaks but the first and last, rad, shape (M - 2,).
+
+        Weights (1, 2, 1) cancel the bias that the decay gives to a mean of two turns.
+        """
+        return (self.peak[:-2] + 2 * self.peak[1:-1] + self.peak[2:]) / 4
 
     @property
     def period(self) -> Floats:

@@ -14,45 +14,45 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices, Mask
 
 
-POINTS: Final = 9
-"""Samples of a window."""
-
-_EVEN: Final = 1e-3
-"""Relative error of an even interval."""
-
-_BLOCK: Final = 20_000
-"""Uneven windows that are solved at a time."""
-
-_NORMAL_MAD: Final = 0.674489750196
-"""Median of the absolute value of a standard normal variable."""
-
-_OUTLIER: Final = 4.5
-"""Standard deviations from which a residual is left out."""
-
-_ROUNDS: Final = 4
-"""Repetitions of a fit without outliers at most."""
-
+POINTS: Final = 9  # Samples of a window
+_EVEN: Final = 1e-3  # Relative error of an even interval
+_BLOCK: Final = 20_000  # Uneven windows that are solved at a time
+_NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
+_OUTLIER: Final = 4.5  # Standard deviations from which a residual is left out
+_ROUNDS: Final = 4  # Repetitions of a fit without outliers at most
 _EVEN_WINDOW: Final = 1e-3
-
-_WINDOW_BLOCK: Final = 4096
-"""Windows of uneven samples that are solved at a time."""
+_WINDOW_BLOCK: Final = 4096  # Windows of uneven samples that are solved at a time
 
 
 @dataclasses.dataclass(frozen=True)
 class LocalFit:
     """Residuals and slopes of polynomials through neighbouring samples."""
 
-    middle: NDArray[np.intp]  # samples of the residuals, shape (M,)
+    middle: Indices  # samples of the residuals, shape (M,)
     residual: Floats  # reading less polynomial over the noise gain, shape (M,)
     slope: Floats  # in the middle, shape (M,)
     neighbours: int  # samples to each side of a window
     sum_of_squares: float  # M residuals are worth M over this many independent ones
     shares: Floats  # of the samples in the variance of a residual, shape (points,); sum 1
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, rad."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def stderr(self) -> float:
+        """Standard error of the root mean square of residuals that share samples, rad."""
+        return self.rms * math.sqrt(self.sum_of_squares / (2 * self.middle.size))
+
+    def only(self, which: Mask) -> LocalFit:
+        """Return the fit with some of its residuals."""
+        return dataclasses.replace(
+            self, middle=self.middle[which], residual=self.residual[which], slope=self.slope[which]
+        )
 
 
 def local_fit(
@@ -112,7 +112,7 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
 
 
 def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Return residual over its gain, and slope, of windows (M, points) of their own spacing."""
+    """Return residual over its gain, and slope, of uneven windows, shape (M, points)."""
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]
@@ -268,7 +268,7 @@ def smoothed_velocity(
     return slope, stderr
 
 
-def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
+def _evenly(time: Floats, step: float, reach: int) -> Mask:
     """Return around which samples a window of ``reach`` to each side is evenly spaced."""
     even = np.zeros(time.size, bool)
     # All intervals of a window together may be off by as much as one.
@@ -281,9 +281,9 @@ def _evenly(time: Floats, step: float, reach: int) -> NDArray[np.bool_]:
 
 
 def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
-    time: Floats, theta: Floats, at: NDArray[np.intp], width: int, scale: float, degree: int
+    time: Floats, theta: Floats, at: Indices, width: int, scale: float, degree: int
 ) -> tuple[Floats, Floats]:
-    """Return slopes and their errors at some samples, each from a window of its own spacing."""
+    """Return slopes and their errors at some samples, each from an uneven window."""
     # The first and the last whole window serve the ends.
     first = np.clip(at - width // 2, 0, time.size - width)
     within = first[:, None] + np.arange(width)

@@ -9,23 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
-    Places = NDArray[np.intp]
-    from numpy.typing import ArrayLike, NDArray
+    from pendmap.signal import Floats, Indices, Mask, Stretch
 
-LONG_INTERVAL: Final = 1.6
-"""Intervals in ticks from which samples are missing; one lost sample makes 2."""
-
-SCATTERED_STAMPS: Final = 0.1
-"""Robust scatter of intervals in ticks from which one long interval is no gap."""
-
-STAMPS_BESIDE: Final = 8
-"""Stamps on each side whose means tell a lost sample from a stamp that is off."""
-
-CERTAIN_GAP: Final = 4.0
-"""Standard deviations of such means from which a step of the clock is a gap."""
+LONG_INTERVAL: Final = 1.6  # Ticks of an interval from which samples are missing
+SCATTERED_STAMPS: Final = 0.1  # Robust scatter of intervals, in ticks, that hides a gap
+STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared
+CERTAIN_GAP: Final = 4.0  # Standard deviations of a step of these means that is a gap
 
 
 def normal_scale(values: Floats) -> float:
@@ -44,26 +35,32 @@ def broad_scale(sizes: Floats) -> float:
     return float(max(1.4826 * half, most / 1.2816))
 
 
-def true_runs(mask: NDArray[np.bool_]) -> tuple[Places, Places]:
+def true_runs(mask: Mask) -> tuple[Indices, Indices]:
     """Return where stretches of True begin and end (exclusive)."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
-def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the stretches of True: first place and the one after the last."""
+def stretches(mask: Mask) -> list[Stretch]:
+    """Return the stretches of True."""
     low, high = true_runs(mask)
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
-def equal_runs(values: NDArray[np.float64], least: int) -> tuple[Places, Places]:
+def between(stretches: list[Stretch], low: int, high: int) -> list[Stretch]:
+    """Return what stretches in order leave of the samples from ``low`` to ``high``."""
+    edges = [low, *(place for stretch in stretches for place in stretch), high]
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def equal_runs(values: Floats, least: int) -> tuple[Indices, Indices]:
     """Return where stretches of at least ``least`` equal values begin and end (exclusive)."""
     low, high = true_runs(np.diff(values) == 0)
     long = high - low + 1 >= least
     return low[long], high[long] + 1
 
 
-def from_first(time: ArrayLike) -> tuple[NDArray[np.float64], float]:
+def from_first(time: ArrayLike) -> tuple[Floats, float]:
     """Return times relative to the first one, and the first one, s: stamps cost digits."""
     t = np.ascontiguousarray(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t[0]):
@@ -71,7 +68,7 @@ def from_first(time: ArrayLike) -> tuple[NDArray[np.float64], float]:
     return t - t[0], float(t[0])
 
 
-def span(time: NDArray[np.float64]) -> str:
+def span(time: Floats) -> str:
     """Return the time span of a record in words."""
     first, last = (f"{round(float(t), 4):.15g}" for t in (time[0], time[-1]))
     return f"{first} to {last} s"
@@ -89,7 +86,7 @@ class Intervals:
     """Tick and gaps of a clock."""
 
     tick: float  # mean interval without gaps, s
-    gaps: NDArray[np.intp]  # intervals that are too long
+    gaps: Indices  # intervals that are too long
     missing: int  # samples missing in the gaps
 
 
