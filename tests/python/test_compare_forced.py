@@ -14,8 +14,7 @@ import pendmap
 from driven_decays import motion
 from pendmap import InputError, Rig, virtual_rig
 from pendmap.comparison import Ensemble, compare
-from pendmap.comparison.ensemble import Simulated, Start
-from pendmap.comparison.forced import Statistic
+from pendmap.comparison.forced import Start, Statistic, simulated_readings
 from pendmap.comparison.steady import Cycle
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run, read_experiment
@@ -61,8 +60,9 @@ def test_members_are_trajectories_of_the_model(
     driven = dataclasses.replace(rig, p=0.6, Omega=12.0, phi=0.4)
     run = pendmap.simulate(driven, 1.0, -2.0, 6.0, samples=32)
     time = run["time"].values
-    model = Simulated(FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE), rig)
-    found = model.readings(np.array([1.0, 1.0]), np.array([-2.0, 0.0]), time)
+    record = FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE)
+    starts = np.array([1.0, 1.0]), np.array([-2.0, 0.0])
+    found = simulated_readings(record, rig, starts, time, None)
     offset = 0.02 if effects else 0.0
     np.testing.assert_allclose(found[0] - offset, run["theta"].values, atol=2e-7)
     assert np.abs(found[1] - found[0]).max() > 0.1

@@ -17,7 +17,7 @@ from pendmap import InputError, render
 from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify_experiment
-from pendmap.identification.methods.joint import fit_together
+from pendmap.identification.methods.trajectory import fit_together
 from pendmap.records import Experiment, Run
 from pendmap.records.summary import as_json, as_text
 

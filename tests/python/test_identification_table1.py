@@ -10,8 +10,7 @@ from decays import decay, record
 from pendmap import Rig
 from pendmap.comparison import compare
 from pendmap.comparison.free import as_text, tables
-from pendmap.identification import Estimate, Identification
-from pendmap.identification.table1 import table1
+from pendmap.identification import Estimate, Identification, table1
 from pendmap.records import Experiment, Run
 
 TRUE = Identification("true", {"w0": Estimate(6.2), "c_over_m": Estimate(0.05)})

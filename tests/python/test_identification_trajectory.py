@@ -12,10 +12,11 @@ import pytest
 
 from driven_decays import motion
 from pendmap.errors import InputError
-from pendmap.identification.fit import fit_runs, score
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.trajectory import fit_decay, identify
 from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun, Pivot
+from pendmap.identification.sensitivity import sensitivities
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
@@ -110,7 +111,7 @@ def test_what_the_model_lacks_is_said(decay: np.ndarray) -> None:
     assert abs(better["c_over_m"]) < 4 * (better.estimates["c_over_m"].stderr or 0)
 
 
-def test_the_score_names_what_is_missing_and_its_size() -> None:
+def test_the_score_shows_the_missing_effect_and_its_size() -> None:
     theta = motion(TIME, (2.5, 0.0), w0=6.0, c_over_m=0.03, friction=0.05, drag=2e-3)
     run = FitRun(TIME, noisy(theta, 2e-3, 4), 2e-3)
     base = Rig(w0=6.01, c_over_m=0.05, Tr=0.05, effects=(OFFSET,))
@@ -120,7 +121,11 @@ def test_the_score_names_what_is_missing_and_its_size() -> None:
     names = [f"{name}.{size}" for name, size in sizes.items()]
     extra = tuple(Effect(name, {size: 0.0}) for name, size in sizes.items())
     wide = dataclasses.replace(base, effects=(OFFSET, *extra))
-    pull, information = score(fit, [run], names, wide)
+    seen = sensitivities(fit, [run], names, wide)
+    old, new = np.split(seen.columns, [len(free)], axis=1)
+    q, _ = np.linalg.qr(old / np.linalg.norm(old, axis=0))
+    own = new - q @ (q.T @ new)
+    pull, information = own.T @ seen.residual, own.T @ own
     gain = pull**2 / np.diag(information)
     better = fit_runs([run], wide, [*free, names[0]])
     assert gain[0] == max(gain)

@@ -21,9 +21,9 @@ from pendmap.errors import (
 from pendmap.formatting import Estimate, Readable, counted, percent
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.joint import as_fit_run, reading_of_run
 from pendmap.identification.methods.trajectory import OFFSET
 from pendmap.identification.peaks import find_peaks
+from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig

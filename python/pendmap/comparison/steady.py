@@ -12,9 +12,9 @@ from pendmap.analysis.regimes import kind_of
 from pendmap.comparison.itinerary import LONGEST
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Callable
 
-    from pendmap.comparison.ensemble import Simulated
+    from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
@@ -172,18 +172,22 @@ def folded(
 
 
 def reached(
-    model: Simulated, starts: tuple[float, Floats, Floats], period: float
+    simulated: Callable[[Floats, Floats, Floats], Floats],
+    starts: tuple[float, Floats, Floats],
+    period: float,
+    damping: float,
 ) -> tuple[Reached, ...]:
     """Return the cycles that a model ends on, the most frequent first.
 
-    ``starts`` are a time on the run's clock (s), and angles and velocities then (rad, rad/s).
+    ``simulated`` returns readings from angles and velocities (rad, rad/s) at times (s); ``starts``
+    are a time on the run's clock, and angles and velocities then; ``damping`` is ``c/m``, 1/s.
     """
     begin, theta, velocity = starts
-    rate = 0.5 * model.model.c_over_m * period
+    rate = 0.5 * damping * period
     periods = min(max(_DECAY / rate if rate else math.inf, _FOLLOWED[0]), _FOLLOWED[1])
     first = math.ceil(begin / period) + math.ceil(periods)
     times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
-    readings = model.readings(theta, velocity, np.concatenate([[begin], times]))
+    readings = simulated(theta, velocity, np.concatenate([[begin], times]))
     groups: list[tuple[Cycle, int]] = []
     for row in readings[:, 1:]:
         cycle = _closed(row, period)

@@ -62,6 +62,13 @@ class TrajectoryFit:
         """Return the value of one estimate."""
         return self.estimates[name].value
 
+    def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
+        """Return a run's drive; an unknown phase is that fitted for the run at this place, or 0."""
+        if run.drive is None or run.drive.get("phi") is not None:
+            return run.drive
+        names = (f"phi[{place}]", "phi")
+        return {**run.drive, "phi": next((self[n] for n in names if n in self.estimates), 0.0)}
+
 
 def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     runs: Sequence[FitRun],
@@ -120,39 +127,6 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     with core_errors(FitDiverged):
         found = _core.fit_runs(given, unknown.start, choices, begun)
     return _result(found, model, unknown, chosen)
-
-
-def score(
-    fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what candidate parameters would gain, without fitting them (the score test).
-
-    ``model`` is that of the fit with the candidates' effects, at the values where they are scored:
-    0 for a size. Returned are ``pull``, shape (k,), half of the slope of the sum of squares by each
-    candidate, fitted parameters and states following, and ``information``, shape (k, k), half of
-    its curvature: candidate ``i`` alone gains ``pull[i]**2 / information[i, i]``, with the size
-    ``pull[i] / information[i, i]`` in SI; sets of candidates likewise.
-    """
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
-
-    units = Units(model.w0, si=True)
-    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
-    start = {name: fit.estimates[name].value for name in fit.names}
-    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    with core_errors(FitDiverged):
-        windows = bare_windows(fit.windows, units)
-        at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
-    pull = unknown.columns(at.pull[None], at.values)[0]
-    information = unknown.columns(unknown.columns(at.information, at.values).T, at.values)
-    new = np.array([name not in fit.estimates for name in unknown.names])
-    old = ~new
-    through = information[np.ix_(new, old)] @ np.linalg.pinv(
-        information[np.ix_(old, old)], hermitian=True
-    )
-    return (
-        pull[new] - through @ pull[old],
-        information[np.ix_(new, new)] - through @ information[np.ix_(old, new)],
-    )
 
 
 def prepared(
@@ -256,9 +230,7 @@ FAR: Final = 1.0
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:
     """Refuse a fit in which the residual of a run is as large as its motion."""
     for run, residual in zip(runs, fit.residuals, strict=True):
-        counted = np.isfinite(residual)
-        if run.trusted is not None:
-            counted &= run.trusted
+        counted = np.isfinite(residual) & run.counted
         if not counted.any():
             continue
         rms = float(np.sqrt(np.mean(residual[counted] ** 2)))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from pendmap.identification.methods.base import Identification
-    from pendmap.identification.methods.joint import JointFit
+    from pendmap.identification.methods.trajectory import JointFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import Table1
     from pendmap.model import Rig

@@ -82,22 +82,12 @@ class PeakErrors:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """A row of table 1.
+    """A row of table 1."""
 
-    Parameters
-    ----------
-    what : str
-        ``period`` or ``peak``.
-    asked, measured : float
-        Value in the paper's table, and the nearest one in this record, s or rad.
-    errors : mapping of str to float
-        By method: the error's absolute value, percent; NaN where the simulation rests by then.
-    """
-
-    what: str
-    asked: float
-    measured: float
-    errors: Mapping[str, float]
+    what: str  # period or peak
+    asked: float  # value in the paper's table, s or rad
+    measured: float  # nearest value in this record
+    errors: Mapping[str, float]  # by method, absolute, percent; NaN where the simulation rests
 
 
 @dataclasses.dataclass(frozen=True)

@@ -242,9 +242,7 @@ def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
     for run, first, last, *_ in fit.windows:
         record = runs[run]
         residual = fit.white[run][first:last]
-        good = np.isfinite(residual)
-        if record.trusted is not None:
-            good &= record.trusted[first:last]
+        good = np.isfinite(residual) & record.counted[first:last]
         if np.count_nonzero(good) < LEAST:
             continue
         time = record.time[first:last][good]

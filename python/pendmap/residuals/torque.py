@@ -154,11 +154,9 @@ def project_out(
     """
     parts = []
     for window, own in zip(windows, columns, strict=True):
-        run = runs[window.run]
-        if run.trusted is not None:
-            lost = ~run.trusted[window.first : window.first + len(window.residual)]
-            for values in (own, window.columns, window.states, window.residual):
-                values[lost] = 0.0
+        lost = ~runs[window.run].counted[window.first : window.first + len(window.residual)]
+        for values in (own, window.columns, window.states, window.residual):
+            values[lost] = 0.0
         parts.append(window.freed(own))
     base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
     sizes = np.linalg.norm(base, axis=0)
@@ -184,12 +182,10 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
         np.arccos(np.clip(1 - energy, -1, 1)),
     )
     phase = np.full(theta.shape, math.nan)
-    if run.drive:
-        names = (f"phi[{window.run}]", "phi")
-        fitted = next((fit[n] for n in names if n in fit.estimates), 0.0)
-        known = run.drive.get("phi")
-        turned = float(run.drive.get("Omega") or 0.0) * run.time[own]
-        phase = np.angle(np.exp(1j * (turned + (fitted if known is None else known))))
+    drive = fit.drive_of(run, window.run)
+    if drive:
+        turned = (drive.get("Omega") or 0.0) * run.time[own] + (drive["phi"] or 0.0)
+        phase = np.angle(np.exp(1j * turned))
     return {
         "angle": np.angle(np.exp(1j * theta)),
         "velocity": velocity,

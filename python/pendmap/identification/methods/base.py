@@ -7,15 +7,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.formatting import Estimate, counted, estimate_text
-from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.uncertainty import Z95
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -127,39 +126,19 @@ class Identification:
         return Rig(**known)
 
 
-def on_record(from_peaks: Callable[..., Identification]) -> Callable[..., Identification]:
-    """Return a method of peaks as one of a record, whose peaks are found unless they are given."""
-
-    def identify(
-        time: ArrayLike,
-        theta: ArrayLike,
-        *,
-        sigma: float | None = None,
-        trusted: ArrayLike | None = None,
-        peaks: Peaks | None = None,
-        **choices: Any,  # noqa: ANN401 (those of the method)
-    ) -> Identification:
-        """Identify damping from a record, s and rad; ``choices`` are those of ``from_peaks``."""
-        if peaks is None:
-            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-        return from_peaks(peaks, **choices)
-
-    return identify
-
-
-def too_few(  # noqa: PLR0913 (what is counted, and how it is worded)
+def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
     count: int,
     least: int,
-    *,
-    of: int | None = None,
+    total: int | None = None,
     where: str = "",
     warnings: Sequence[str] = (),
     because: str = "",
 ) -> Identification:
-    """Return that a method needs ``least`` peaks ``where`` a record of ``of`` has ``count``."""
-    peaks = counted(count, "peak") if of is None else f"{count} of {counted(of, 'peak')}"
-    text = " ".join(part for part in (peaks, where) if part)
-    text = f"not applicable: {text}, {least} are needed" + (f": {because}" if because else "")
+    """Return that a method needs ``least`` peaks ``where`` a record of ``total`` has ``count``."""
+    peaks = counted(count, "peak") if total is None else f"{count} of {counted(total, 'peak')}"
+    text = f"not applicable: {f'{peaks} {where}'.strip()}, {least} are needed" + (
+        f": {because}" if because else ""
+    )
     return Identification(warnings=(*warnings, text), applicable=False)
 
 

@@ -12,17 +12,21 @@ import numpy as np
 
 from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.methods.decrement import Reading, from_amplitudes
-from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.uncertainty import bootstrap, estimates, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+    from pendmap.identification.peaks import Peaks
 
     Floats = NDArray[np.float64]
 
 
 CUT: Final = math.radians(12.0)
 """Peaks above this are dropped, rad: there the pendulum is not linear."""
+
+ENDS_ABOVE: Final = "the record ends above it"
+"""Reason why a record has no peaks below the cut."""
 
 _FEWEST: Final = 4
 """Peaks below the cut that are needed."""
@@ -50,7 +54,11 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
 
 
 def from_peaks(
-    peaks: Peaks, *, reading: Reading = "all", cut: float = CUT, why: str = ""
+    peaks: Peaks,
+    record: tuple[Floats, Floats] | None = None,
+    *,
+    reading: Reading = "all",
+    cut: float = CUT,
 ) -> Identification:
     """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
@@ -60,8 +68,8 @@ def from_peaks(
     cycles": ``odd_ends`` takes 2.7 between the first and the last pair of peaks that begin at an
     odd one, ``odd_triplets`` the mean over the triplets that do. The method is biased: by the
     nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
-    four peaks of all; the module ``repaired`` corrects that. ``why`` is the reason where a record
-    has no peaks below the cut, if it is not the record's end.
+    four peaks of all; the module ``repaired`` corrects that. The samples of the ``record``, s and
+    rad, show why there is no peak below the cut.
     """
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
@@ -73,15 +81,12 @@ def from_peaks(
         small = small.select(np.arange(len(small)) < size.size)
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
-        none = len(peaks) and not len(small)
-        return too_few(
-            size.size,
-            least,
-            of=len(peaks.turned),
-            where=f"under {math.degrees(cut):.3g} degrees",
-            warnings=warnings,
-            because=(why or "the record ends above it") if none else "",
-        )
+        why = ""
+        if len(peaks) and not len(small):
+            lost = record is not None and _unresolved(*record, peaks, cut)
+            why = "peaks are not resolved: too few samples a period" if lost else ENDS_ABOVE
+        where = f"under {math.degrees(cut):.3g} degrees"
+        return too_few(size.size, least, len(peaks.turned), where, warnings, why)
     parity = int(small.index[0]) % 2
     count = len(small)
 
@@ -117,35 +122,15 @@ def from_peaks(
     )
 
 
-def identify(  # noqa: PLR0913 (record, then what may be chosen)
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-    reading: Reading = "all",
-    cut: float = CUT,
-) -> Identification:
-    """Identify damping by the printed method from a record, s and rad; see :func:`from_peaks`."""
-    if peaks is None:
-        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    why = _unresolved(*samples(time, theta, trusted), peaks, cut)
-    return from_peaks(peaks, reading=reading, cut=cut, why=why)
-
-
-def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> str:
-    """Return that peaks were lost, in words, where a record continues below a cut."""
+def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> bool:
+    """Return whether a record continues below a cut, and its peaks there are lost."""
     if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
-        return ""
+        return False
     size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
     above = np.flatnonzero(size >= cut)
     first = int(above[-1]) + 1 if above.size else 0
     # Within a half swing after the last large peak no peak is lost: turns are noise.
     if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
-        return ""
-    late = theta[first:]
-    turns = np.count_nonzero(np.diff(np.sign(np.diff(late))))
-    if turns < _FEWEST:
-        return ""
-    return "peaks are not resolved: too few samples a period"
+        return False
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(theta[first:]))))
+    return bool(turns >= _FEWEST)

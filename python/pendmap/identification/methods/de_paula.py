@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
@@ -48,7 +48,7 @@ def from_peaks(
     windows = {"fast": fast, "slow": slow}
     chosen = {n: turned.select((size >= low) & (size < high)) for n, (low, high) in windows.items()}
     lacking = [
-        too_few(len(some), _FEWEST, of=len(turned), where=_between(windows[name]))
+        too_few(len(some), _FEWEST, len(turned), _between(windows[name]))
         for name, some in chosen.items()
         if len(some) < _FEWEST
     ]
@@ -92,9 +92,6 @@ def from_peaks(
         warnings=tuple(warnings),
         covariance=(names, covariance),
     )
-
-
-identify = on_record(from_peaks)
 
 
 def _between(window: tuple[float, float]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
@@ -39,7 +39,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     small = small.select(np.abs(small.amplitude) < cut)
     under = "" if math.isinf(cut) else f" under {math.degrees(cut):.3g} degrees"
     if len(small) < _FEWEST:
-        return too_few(len(small), _FEWEST, of=len(peaks.turned), where=under.strip())
+        return too_few(len(small), _FEWEST, len(peaks.turned), under.strip())
     count, warnings = len(small), []
     half_cycles = (small.index - small.index[0]).astype(float)
     size = np.abs(small.amplitude)
@@ -94,6 +94,3 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
         covariance=(names, np.asarray(covariance)),
         misfit=misfit if small.known else None,
     )
-
-
-identify = on_record(from_peaks)

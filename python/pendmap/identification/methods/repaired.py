@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.base import Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT, small_peaks
 from pendmap.identification.methods.decrement import recursion
 from pendmap.identification.period import frequency
@@ -43,8 +43,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     count = len(small)
     if count < _FEWEST:
         under = f"under {math.degrees(cut):.3g} degrees"
-        total = len(peaks.turned)
-        return too_few(count, _FEWEST, of=total, where=under, warnings=warnings)
+        return too_few(count, _FEWEST, len(peaks.turned), under, warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
     # Peaks measured elsewhere may come without errors: then all weigh the same.
@@ -112,6 +111,3 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         covariance=(names, np.asarray(outer)),
         misfit=misfit,
     )
-
-
-identify = on_record(from_peaks)

@@ -18,7 +18,7 @@ from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import starting_values
 from pendmap.identification.parameters import SENSOR
-from pendmap.identification.readings import reading_of
+from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.runs import FitRun
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
+    from pendmap.records import Run
 
 
 TOO_GOOD: Final = 0.7
@@ -201,8 +202,7 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     their fitted parameters (``effect.parameter``), by default all but exponents, orders and widths.
     """
     first = runs[0]
-    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
-    time, theta = first.time[good], first.angle[good]
+    time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
     # A sensor on the rod has a bias instead of a zero.
@@ -273,3 +273,44 @@ def _by_peaks(
             " must be given: w0 = 6.2 under [rig] in experiment.toml"
         )
     return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}
+
+
+@dataclasses.dataclass(frozen=True)
+class JointFit:
+    """A pendulum fitted to several runs, in the order of its curves and residuals."""
+
+    fit: TrajectoryFit
+    runs: tuple[Run, ...]
+    readings: tuple[Reading, ...]
+
+    @property
+    def noise(self) -> float:
+        """Root mean square of the noise of the readings that count, rad."""
+        counts = [int(run.trusted.sum()) for run in self.runs]
+        square = np.average([reading.sigma**2 for reading in self.readings], weights=counts)
+        return math.sqrt(square)
+
+
+def fit_together(
+    runs: Sequence[Run],
+    *,
+    start: Rig | None = None,
+    known: dict[str, float] | None = None,
+    effects: Sequence[Effect | str] = (),
+) -> JointFit:
+    """Fit natural frequency, damping, the sensor's zero and effects to one run or more.
+
+    ``start``, with its effects, or ``known`` parameters are where the search begins, else it is
+    found from the first run: TooShortError is raised where that gives none. Sizes of ``effects``
+    are fitted.
+    """
+    if not runs:
+        raise InputError("runs must hold one record or more, got none")
+    readings = [reading_of_run(run) for run in runs]
+    fit, worth = fit_from_start(
+        [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
+        readings,
+        start=start or known,
+        effects=effects,
+    )
+    return JointFit(fit, tuple(runs), worth)
