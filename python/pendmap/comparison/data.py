@@ -187,7 +187,7 @@ def _hold_stretches(
         if inside and run.forced:
             fitted.append(run)
             continue
-        good, sigma = run.counted, run.sigmas
+        good = run.counted
         # Parts of the samples that count, not of the time at rest after them.
         samples = np.flatnonzero(good)
         back = np.zeros(good.shape, bool)
@@ -197,9 +197,12 @@ def _hold_stretches(
                 continue
             back[a:b] = good[a:b]
             if not inside:
-                time, theta, own = run.time[a:b], run.theta[a:b], sigma[a:b]
-                part = dataclasses.replace(run, time=time, theta=theta, sigma=own)
-                held.append(dataclasses.replace(part, trusted=good[a:b]))
+                time, theta = run.time[a:b], run.theta[a:b]
+                held.append(
+                    dataclasses.replace(
+                        run, time=time, theta=theta, sigma=run.sigmas[a:b], trusted=good[a:b]
+                    )
+                )
                 held_of.append(k)
         fitted.append(dataclasses.replace(run, trusted=good & ~back))
         if inside and back.any():

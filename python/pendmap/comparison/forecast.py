@@ -231,21 +231,17 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     for held_out in (False, True):
         runs = data.held if held_out else data.fitted
         before, after = ((f.held if held_out else f.fitted) for f in (base, best))
-        own = [
-            RunGap(run.name, held_out, _floor(run), _rms([run], before, k), _rms([run], after, k))
+        squares = [np.square(run.sigmas[run.counted]) for run in runs]
+        noise = [float(np.sqrt(np.mean(each))) for each in squares]
+        rows += [
+            RunGap(run.name, held_out, noise[k], _rms([run], before, k), _rms([run], after, k))
             for k, run in enumerate(runs)
         ]
-        sizes = [int(run.counted.sum()) for run in runs]
-        squares = [size * row.noise_floor**2 for size, row in zip(sizes, own, strict=True)]
-        floors.append(math.sqrt(sum(squares) / sum(sizes)))
+        sizes = [each.size for each in squares]
+        total = sum(size * floor**2 for size, floor in zip(sizes, noise, strict=True))
+        floors.append(math.sqrt(total / sum(sizes)))
         rms += [_rms(runs, before), _rms(runs, after)]
-        rows += own
     return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
-
-
-def _floor(run: FitRun) -> float:
-    """Return the root mean square noise of a run's readings that count, rad."""
-    return float(np.sqrt(np.mean(np.square(run.sigmas[run.counted]))))
 
 
 def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:

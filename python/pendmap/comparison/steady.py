@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pendmap.analysis.regimes import kind_of
 from pendmap.comparison.itinerary import LONGEST
@@ -150,8 +151,6 @@ def folded(
     ``time`` is on the drive's clock; ``closes`` are ``n`` and ``w`` of the cycle, ``since`` (s) is
     when it begins to repeat itself.
     """
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (scipy takes a while)
-
     n, w = closes
     length = n * period
     first = math.ceil(since / period)

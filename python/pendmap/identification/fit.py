@@ -77,7 +77,6 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     *,
     start: Mapping[str, float] | None = None,
     profiled: Sequence[str] | None = None,
-    shortest_s: float | None = None,
     windows: Sequence[tuple[int, int, int, float, float]] | None = None,
     sigma_doubt: float = 0.0,
     hold: bool = False,
@@ -91,7 +90,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free parameters
     and an initial state for each window (Bock 1983, Progress in Scientific Computing 2, 95); where
     readings are intervals, ``-2 log P`` of them stands for the square. Windows begin with about one
-    swing (``shortest_s``) and grow by ``growth`` from stage to stage, to the whole record of a free
+    swing and grow by ``growth`` from stage to stage, to the whole record of a free
     decay; ``windows`` of a former fit make one stage. Intervals are those of Venzon & Moolgavkar
     (1988), Applied Statistics 37, 87, for the names in ``profiled``, by default all.
 
@@ -110,10 +109,9 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     names = unknown.names
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
-    swing = math.tau / model.w0
     choices = {
         "tolerance": tolerance_of(runs),
-        "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
+        "shortest": units.w0 * (math.tau / model.w0),
         "growth": growth,
         "steps": steps,
         "gain": least_gain,

@@ -109,23 +109,14 @@ class Finder:
                 break
         if fit is None:
             return None
-        end = self._end(fit, time)
-        # An error of the instant above the width of the window: there is no turn.
-        return end if end.stderr_time <= 2 * fit.half else None
-
-    def _end(self, fit: WindowFit, time: float) -> End:
         (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
-        sigma = self._effective(fit)
-        bend = bend or math.inf
+        sigma, bend = self._effective(fit), bend or math.inf
         slope = slope_gain * sigma
-        return End(
-            time,
-            value + slope**2 / (2 * bend),
-            slope / abs(bend),
-            gain * sigma,
-            "turn",
-            fit.half,
-        )
+        stderr = slope / abs(bend)
+        # An error of the instant above the width of the window: there is no turn.
+        if not stderr <= 2 * fit.half:
+            return None
+        return End(time, value + slope**2 / (2 * bend), stderr, gain * sigma, "turn", fit.half)
 
     def _effective(self, fit: WindowFit) -> float:
         """Return the noise of a sample, where samples share errors of the count."""

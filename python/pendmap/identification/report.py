@@ -193,12 +193,8 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
     """Return the runs that a method read; rms and noise are those of the joint fit."""
     entries: list[dict[str, Any]] = []
     for k, run in enumerate(report.runs):
-        time = run.time[run.trusted]
-        rms = noise = None
-        if report.joint is not None:
-            left = report.joint.fit.residuals[k][run.trusted]
-            rms = float((left**2).mean() ** 0.5)
-            noise = report.joint.readings[k].sigma
+        time, joint = run.time[run.trusted], report.joint
+        left = None if joint is None else joint.fit.residuals[k][run.trusted]
         entries.append(
             {
                 "name": run.name,
@@ -207,8 +203,8 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
                 "from_s": float(time[0]),
                 "to_s": float(time[-1]),
                 "samples": int(time.size),
-                "rms": rms,
-                "noise": noise,
+                "rms": None if left is None else float((left**2).mean() ** 0.5),
+                "noise": None if joint is None else joint.readings[k].sigma,
             }
         )
     return entries

@@ -62,7 +62,8 @@ def fit_swings(
     the quiet half of the blocks. ``known`` forms are not fitted, and count with their errors.
     """
     instant, state, form = (part.copy() for part in start)
-    blocks = _blocks(instant.size)
+    edges = np.linspace(0, instant.size, max(round(instant.size / BLOCK), 1) + 1).round()
+    blocks = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
     prior = None if known is not None else _prior(instant, state, form, blocks)
     trial = windows
     for turn in range(_ROUNDS):
@@ -90,12 +91,6 @@ def fit_swings(
             break
     rows = _rows(trial, instant, state, form)
     return _errors(rows, blocks, (instant, state, form), trial.used, prior, sigma, known)
-
-
-def _blocks(count: int) -> list[slice]:
-    parts = max(round(count / BLOCK), 1)
-    edges = np.linspace(0, count, parts + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _prior(

@@ -6,6 +6,8 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pendmap.formatting import Estimate, counted, estimate_text
 from pendmap.identification.uncertainty import Z95
 from pendmap.model import Rig
@@ -13,7 +15,6 @@ from pendmap.model import Rig
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -95,20 +96,13 @@ class Identification:
                 made[name] = Estimate(value)
                 continue
             lever = -power * value / w0.value
-            shared = self._shared(numerator, "w0")
+            names, matrix = self.covariance or ((), np.empty((0, 0)))
+            both = {numerator, "w0"} <= set(names)
+            shared = float(matrix[names.index(numerator), names.index("w0")]) if both else 0.0
             variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
             error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
             made[name] = Estimate(value, error, (value - Z95 * error, value + Z95 * error))
         return made
-
-    def _shared(self, one: str, other: str) -> float:
-        """The covariance of two estimates."""
-        if self.covariance is None:
-            return 0.0
-        names, matrix = self.covariance
-        if one not in names or other not in names:
-            return 0.0
-        return float(matrix[names.index(one), names.index(other)])
 
     @property
     def rig(self) -> Rig:

@@ -147,14 +147,9 @@ def _warnings(
     for name in ("c_over_m", "Tr", *opposing):
         if name in estimates and estimates[name].value < 0:
             low, high = estimates[name].ci95 or (-math.inf, math.inf)
-            found.append(
-                f"{name} is {estimates[name].value:.3g}, which no pendulum has: "
-                + (
-                    "its interval reaches 0"
-                    if low <= 0 <= high
-                    else "an effect is missing in the model"
-                )
-            )
+            reaches = low <= 0 <= high
+            why = "its interval reaches 0" if reaches else "an effect is missing in the model"
+            found.append(f"{name} is {estimates[name].value:.3g}, which no pendulum has: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         found.append(
@@ -181,15 +176,13 @@ def _warnings(
     return found
 
 
-def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
+def fit_from_start(
     runs: Sequence[FitRun],
     readings: Sequence[Reading],
     *,
     start: Rig | Mapping[str, float] | None = None,
-    offset: bool = True,
     friction: bool = True,
     effects: Sequence[Effect | str] = (),
-    free: Sequence[str] | None = None,
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
     """Return the fit to several records, from a start that the first gives, and their readings.
 
@@ -197,16 +190,16 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     peaks, or of a global search over their envelope; the better one counts. Readings whose noise
     grows with speed count by it, unless the model lacks an effect: then they count alike.
     ``start`` comes by default from zero crossings and the energy of each half swing; TooShortError
-    is raised where the first record gives none. ``offset`` fits the sensor's zero, ``friction``
-    Coulomb friction; ``effects`` act besides (SI), and begin small if given by name. ``free`` names
-    their fitted parameters (``effect.parameter``), by default all but exponents, orders and widths.
+    is raised where the first record gives none. ``friction`` fits Coulomb friction; ``effects`` act
+    besides (SI), and begin small if given by name. Fitted are all their parameters but exponents,
+    orders and widths.
     """
     first = runs[0]
     time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
     # A sensor on the rod has a bias instead of a zero.
-    zeroed = offset and any(run.rod_sensor is None for run in runs)
+    zeroed = any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
         model = _start_of(begin, time, theta, readings[0].sigma)
@@ -214,11 +207,11 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
             model = dataclasses.replace(model, Tr=0.0)
         named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
         known = [*model.effects, *named]
-        zero = [OFFSET] if zeroed and OFFSET not in {e.name for e in known} else []
-        more = [Effect(name, {"d": 0.0}) for name in zero]
-        model = dataclasses.replace(model, effects=(*known, *more))
-        wanted = _sizes(known) if free is None else free
-        return fit_runs(runs, model, [*names, *wanted, *_sizes(more)], sigma_doubt=doubt)
+        if zeroed and OFFSET not in {e.name for e in known}:
+            known.append(Effect(OFFSET, {"d": 0.0}))
+        sizes = [f"{effect.name}.{size}" for effect in known for size in effect.sizes]
+        model = dataclasses.replace(model, effects=tuple(known))
+        return fit_runs(runs, model, [*names, *sizes], sigma_doubt=doubt)
 
     found = fitted(start)
     if found.widening > LACKING and any(reading.law for reading in readings):
@@ -237,11 +230,6 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
         return found, tuple(readings)
     better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
     return again if better else found, tuple(readings)
-
-
-def _sizes(effects: Sequence[Effect]) -> list[str]:
-    """Return the names of effects' parameters, without those of shape."""
-    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
 
 
 def _start_of(
