@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from decays import decay, record
 from pendmap.identification import METHODS, Peaks
-from pendmap.identification.methods import combined, de_paula, decrement, log_decrement, repaired
+from pendmap.identification.methods import combined, de_paula, log_decrement, repaired
 from pendmap.identification.methods.registry import identify_peaks, scatter
 from pendmap.identification.period import frequency, mean_period
 
@@ -29,19 +29,19 @@ WIDE = decay()
 def test_peaks_by_2_4_to_2_6_return_what_made_them(
     delta: float, theta_r: float, first: float, parity: int
 ) -> None:
-    made = decrement.recursion(first, delta, theta_r, 100)
+    made = combined.recursion(first, delta, theta_r, 100)
     below = np.flatnonzero(made <= 0)
     made = made[: below[0]] if below.size else made
     if made.size < 6:
         return
-    assert decrement.decrement(made) == pytest.approx(delta, abs=1e-12)
-    assert decrement.coulomb(made) == pytest.approx(theta_r, abs=1e-12)
+    assert combined.decrement(made) == pytest.approx(delta, abs=1e-12)
+    assert combined.coulomb(made) == pytest.approx(theta_r, abs=1e-12)
     # Every triplet says the same, and so do both readings of "odd half cycles alone".
-    deltas, thetas = decrement.triplets(made)
+    deltas, thetas = combined.triplets(made)
     assert deltas == pytest.approx(delta, abs=1e-10)
     assert thetas == pytest.approx(theta_r, abs=1e-10)
     for reading in ("odd_ends", "odd_triplets"):
-        found = decrement.from_amplitudes(made, np.arange(made.size) * 0.5, reading, parity)
+        found = combined.from_amplitudes(made, np.arange(made.size) * 0.5, reading, parity)
         assert found.delta == pytest.approx(delta, abs=1e-10)
         assert found.theta_r == pytest.approx(theta_r, abs=1e-10)
 
@@ -49,7 +49,7 @@ def test_peaks_by_2_4_to_2_6_return_what_made_them(
 @given(zero=st.floats(-3e-3, 3e-3), theta_r=st.floats(5e-4, 5e-3), delta=st.floats(0.001, 0.01))
 @settings(max_examples=50)
 def test_the_repair_finds_the_zero_too(zero: float, theta_r: float, delta: float) -> None:
-    made = decrement.recursion(0.2, delta, theta_r, 60)
+    made = combined.recursion(0.2, delta, theta_r, 60)
     made = made[made > 0]
     w0, zeta = 6.2, delta / math.sqrt(1 + delta**2)
     quarter = np.array([_quarter(a) for a in made])
@@ -82,10 +82,10 @@ def test_the_recipe_on_the_exact_peaks(truths: dict[str, Any]) -> None:
     small, warnings = combined.small_peaks(exact_peaks(truths), wanted["cut"])
     assert not warnings
     assert small.index[[0, -1]].tolist() == [wanted["i0"], wanted["i0"] + wanted["k"]]
-    found = decrement.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
+    found = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
     for name in ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr"):
         assert getattr(found, name) == pytest.approx(wanted[name], rel=1e-9), name
-    deltas, _ = decrement.triplets(np.abs(small.amplitude))
+    deltas, _ = combined.triplets(np.abs(small.amplitude))
     assert deltas.mean() == pytest.approx(wanted["delta_triplet_mean"], rel=1e-9)
     result = combined.from_peaks(exact_peaks(truths))
     assert result["w0"] == pytest.approx(wanted["w0"], rel=1e-9)
@@ -98,8 +98,8 @@ def test_exact_linear_peaks_give_the_reference_numbers(truths: dict[str, Any]) -
     for made in truths["free_decay"]["linear"]:
         peaks = np.array(made["peaks_abs"], float)[:-1]
         w0, zeta = float(made["w0"]), float(made["zeta"])
-        assert decrement.decrement(peaks) == pytest.approx(float(made["eq27_delta"]), abs=1e-12)
-        assert decrement.coulomb(peaks) * w0**2 == pytest.approx(float(made["eq210_Tr"]), abs=1e-12)
+        assert combined.decrement(peaks) == pytest.approx(float(made["eq27_delta"]), abs=1e-12)
+        assert combined.coulomb(peaks) * w0**2 == pytest.approx(float(made["eq210_Tr"]), abs=1e-12)
         times = np.array(made["times"], float)[:-1]
         period = 2 * math.pi / (w0 * math.sqrt(1 - zeta**2))
         assert mean_period(times) == pytest.approx(period, rel=1e-12)
@@ -148,7 +148,7 @@ def test_the_errors_of_the_repair_are_honest() -> None:
 def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
     small = decay(c_over_m=0.05, tr=0.05, release=0.2)
     peaks = small.peak[:-1] + 1e-3
-    deltas, _ = decrement.triplets(np.abs(peaks))
+    deltas, _ = combined.triplets(np.abs(peaks))
     about = deltas - np.median(deltas)
     assert np.all(np.sign(about[1:-2]) == -np.sign(about[2:-1]))
     made = Peaks.of(small.peak_time[:-1], peaks)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
+
+
+MISFIT: Final = 2.0
+"""chi^2 per degree of freedom above which a method of peaks warns."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

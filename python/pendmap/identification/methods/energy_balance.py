@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
 from pendmap.identification.period import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
 from pendmap.signal.local_polynomial import smoothed_velocity
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 _FEWEST: Final = 5
 """Peaks that are needed."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 _LARGEST: Final = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
 _PHASE: Final = 0.5
@@ -77,7 +75,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
             f"{period_samples:.3g} samples a period: below {_SAMPLES} velocities are smoothed, and "
             "the errors are too small"
         )
-    if misfit > _MISFIT:
+    if misfit > MISFIT:
         warnings.append(
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "
             "are widened by it"

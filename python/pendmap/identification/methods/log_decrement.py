@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 Reading = Literal["ends", "line"]
 _FEWEST: Final = 3
 """Peaks below the cut that are needed."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 
 
 def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> Identification:
@@ -73,9 +71,9 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     covariance = propagated(compute, values, stderr)
     if not small.known:
         misfit = math.nan
-    if misfit > _MISFIT and reading == "line":
+    if misfit > MISFIT and reading == "line":
         covariance = covariance * np.array([[1.0, misfit**0.5], [misfit**0.5, misfit]])
-    if misfit > _MISFIT:
+    if misfit > MISFIT:
         warnings.append(
             f"the decay is not exponential: chi^2 per degree of freedom is {misfit:.3g} about a "
             f"straight line of decrement {-decrements[1] / math.pi:.3g}; what is not viscous is "
