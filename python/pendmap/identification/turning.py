@@ -272,9 +272,7 @@ QUIET: Final = 10.0
 """Standard errors within which readings at rest lie."""
 
 
-def rough_start(
-    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
-) -> dict[str, float] | None:
+def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
     """Return starting values of ``w0``, ``c_over_m`` and ``Tr``, None of fewer than two swings.
 
     A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
@@ -298,7 +296,7 @@ def rough_start(
     return {"w0": w0, "c_over_m": max(viscous, 1e-4) * w0, "Tr": max(friction, 1e-5) * w0**2}
 
 
-def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
+def rough_damping(peaks: Floats) -> tuple[float, float]:
     """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from 3 peaks or more."""
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     action = 8 * (ellipe(m) - (1 - m) * ellipk(m))

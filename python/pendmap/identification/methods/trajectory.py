@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from pendmap.identification.readings import Reading
     from pendmap.records import Run
 
+    Floats = NDArray[np.float64]
+
 
 TOO_GOOD: Final = 0.7
 """chi^2 per degree of freedom below which a warning says that sigma is too large."""
@@ -51,8 +53,8 @@ class TooShortError(InputError):
 
 
 def identify(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
     """Identify the damping of a free decay by fitting its whole trajectory.
@@ -99,8 +101,8 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
 
 
 def fit_decay(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     *,
     sigma: float | None = None,
     trusted: NDArray[np.bool_] | None = None,
@@ -233,10 +235,7 @@ def fit_from_start(
 
 
 def _start_of(
-    start: Rig | Mapping[str, float] | None,
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    sigma: float,
+    start: Rig | Mapping[str, float] | None, time: Floats, theta: Floats, sigma: float
 ) -> Rig:
     """Return where a search starts: given values, the others from the record's half swings."""
     if isinstance(start, Rig):
@@ -247,9 +246,7 @@ def _start_of(
     return Rig(**known)
 
 
-def _by_peaks(
-    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
-) -> dict[str, float]:
+def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
     """Return a start from the methods of peaks, which handle rotations too."""
     try:
         start = starting_values(time, theta, sigma=sigma)
