@@ -26,7 +26,7 @@ WIDE = decay()
     parity=st.integers(0, 1),
 )
 @settings(max_examples=200)
-def test_peaks_by_2_4_to_2_6_return_what_made_them(
+def test_eqs_2_7_and_2_10_invert_2_4_to_2_6(
     delta: float, theta_r: float, first: float, parity: int
 ) -> None:
     made = combined.recursion(first, delta, theta_r, 100)
@@ -48,7 +48,9 @@ def test_peaks_by_2_4_to_2_6_return_what_made_them(
 
 @given(zero=st.floats(-3e-3, 3e-3), theta_r=st.floats(5e-4, 5e-3), delta=st.floats(0.001, 0.01))
 @settings(max_examples=50)
-def test_the_repair_finds_the_zero_too(zero: float, theta_r: float, delta: float) -> None:
+def test_the_repaired_method_finds_the_zero_error(
+    zero: float, theta_r: float, delta: float
+) -> None:
     made = combined.recursion(0.2, delta, theta_r, 60)
     made = made[made > 0]
     w0, zeta = 6.2, delta / math.sqrt(1 + delta**2)
@@ -119,7 +121,7 @@ def test_mean_periods_of_wide_swings_give_a_low_w0(truths: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize("offset_deg", [0.0, 0.05, -0.3])
-def test_the_repair_of_a_noisy_record(offset_deg: float) -> None:
+def test_the_repaired_method_on_a_noisy_record(offset_deg: float) -> None:
     time, angle = record(WIDE, counts=4096, offset=math.radians(offset_deg), seed=5)
     found = METHODS["combined_repaired"].identify(time, angle)
     assert found.applicable
@@ -132,7 +134,7 @@ def test_the_repair_of_a_noisy_record(offset_deg: float) -> None:
         assert low < found[name] < high
 
 
-def test_the_errors_of_the_repair_are_honest() -> None:
+def test_errors_of_the_repaired_method_match_the_scatter() -> None:
     small = decay(c_over_m=0.05, tr=0.05, release=0.2)
     off = []
     for seed in range(60):
@@ -169,7 +171,7 @@ def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> 
     assert "ends above" in METHODS["combined"].identify(time, angle).warnings[-1]
 
 
-def test_what_is_negative_is_said_and_kept() -> None:
+def test_negative_damping_is_reported_and_kept() -> None:
     time, angle = record(WIDE, offset=math.radians(0.05), counts=4096)
     found = METHODS["combined_odd_triplets"].identify(time, angle)
     assert found["c_over_m"] < 0
@@ -187,7 +189,7 @@ def test_a_missing_peak_is_not_bridged() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) -> None:
+def test_a_short_record_gives_the_numbers_of_peaks_found_and_needed(count: int) -> None:
     """Two peaks lie between 12 and 90 degrees, ``count`` of them below."""
     small = math.radians(11.0) * 0.9 ** np.arange(count)
     size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
@@ -204,7 +206,7 @@ def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) 
     assert len(found) == (2 if count < 3 else 1)
 
 
-def test_peaks_alone_tell_their_own_scatter() -> None:
+def test_errors_of_bare_peaks_follow_from_their_scatter() -> None:
     made = decay(release=2.5)
     time, peak = made.peak_time[30:140], made.peak[30:140]
     rng = np.random.default_rng(4)

@@ -81,7 +81,7 @@ def test_every_method_has_the_common_result() -> None:
     assert everything["energy_balance"]["w0"] == pytest.approx(6.2, rel=1e-4)
 
 
-def test_the_errors_of_energy_balance_are_honest() -> None:
+def test_errors_of_the_energy_balance_match_the_scatter() -> None:
     off = []
     for seed in range(30):
         time, angle = record(WIDE, noise_deg=0.2, offset=2e-3, seed=seed)
@@ -114,7 +114,7 @@ def test_de_paula_finds_each_damping_alone() -> None:
     assert "between 2.86 and 17.2 degrees" in found.used
 
 
-def test_de_paula_counts_each_damping_twice() -> None:
+def test_de_paula_overestimates_both_dampings() -> None:
     time, angle = record(WIDE)
     found = de_paula.from_peaks(find_peaks(time, angle))
     assert found["c_over_m"] > 1.2 * 0.0496

@@ -1,4 +1,4 @@
-"""Rows of table 1: each tells something of its own."""
+"""Rows of table 1: none repeats another."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pendmap.records import Experiment, Run
 TRUE = Identification("true", {"w0": Estimate(6.2), "c_over_m": Estimate(0.05)})
 
 
-def test_rows_neither_repeat_nor_fall_on_the_start() -> None:
+def test_rows_do_not_repeat_and_leave_out_the_start() -> None:
     time, angle = record(decay(release=1.0, until=40.0), seconds=20)
     rows = table1(time, angle, {"true": TRUE}).rows
     assert [row.what for row in rows] == ["period", "period"]

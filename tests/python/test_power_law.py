@@ -138,7 +138,7 @@ def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]
 
 
 @pytest.mark.thorough
-def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
+def test_standard_errors_of_a_power_match_the_scatter(tmp_path: Path) -> None:
     scaled = []
     for seed in range(1, 17):
         truth, trials = hidden(tmp_path, seed)
@@ -159,7 +159,7 @@ def test_errors_are_as_great_as_they_are_said_to_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_diagnosis_says_how_well_the_power_is_known(tmp_path: Path) -> None:
+def test_a_diagnosis_gives_the_interval_of_the_power(tmp_path: Path) -> None:
     found, truth = diagnosed(
         tmp_path, "power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0
     )

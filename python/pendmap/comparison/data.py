@@ -67,7 +67,7 @@ class DataSplit:
     fitted_of: tuple[int, ...]  # Place in ``runs`` of each fitted record
     held_of: tuple[int, ...]  # Place in ``runs`` of each record held back
     # Whether stretches within fitted runs are held back, which the fitted motion passes through;
-    # else what is held back has initial states of its own.
+    # else the records held back have their own initial states.
     inside: bool
 
     @property

@@ -234,7 +234,7 @@ def _why_not(model: Rig, run: Run) -> str:
 def _compared(model: Rig, run: Run) -> RunComparison:
     reading = reading_of_run(run)
     given = as_fit_run(run, reading)
-    model = rig_of(given, model)  # whatever drives it elsewhere
+    model = rig_of(given, model)  # with the drive of the run
     fit = fit_runs([given], model, free=())
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
     estimates = {name: Estimate(getattr(model, name)) for name in ("w0", "c_over_m", "Tr")}

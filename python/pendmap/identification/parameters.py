@@ -60,8 +60,8 @@ def free_quantities(
 ) -> list[Quantity]:
     """Return the free parameters of runs whose rigs are given.
 
-    ``free`` has names as of :func:`pendmap.identification.fit.fit_runs`; a phase that a run does
-    not know is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
+    ``free`` has names like those of :func:`pendmap.identification.fit.fit_runs`; the unknown phase
+    of a run is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
     values that replace the rigs'.
     """
     names = list(dict.fromkeys(free))

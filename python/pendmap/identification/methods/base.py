@@ -32,7 +32,7 @@ class Identification:
         Its name in the registry, as in the JSON of ``pendmap identify``.
     estimates : mapping of str to Estimate
         By the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr`` in
-        rad/s^2, ...) and ``offset`` (rad), whatever the method knows. ``zeta`` and ``theta_r``
+        rad/s^2, ...) and ``offset`` (rad), those that the method gives. ``zeta`` and ``theta_r``
         follow from them. Empty where the method is not applicable.
     used : str
         Data that it used, in words.
