@@ -19,10 +19,10 @@ from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import starting_values
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
-from pendmap.identification.runs import FitRun
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect, opposes
+from pendmap.records import Run
 from pendmap.signal.robust import from_first, span
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
-    from pendmap.records import Run
+    from pendmap.identification.runs import FitRun
 
     Floats = NDArray[np.float64]
 
@@ -125,16 +125,8 @@ def fit_decay(
     good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
-    elapsed, first = from_first(time)
-    reading = reading_of(elapsed, theta, sigma, trusted=good)
-    run = FitRun(
-        elapsed,
-        theta - reading.shift,
-        reading.each,
-        trusted=good,
-        lab_time_s=first,
-        count=reading.interval,
-    )
+    reading = reading_of(from_first(time)[0], theta, sigma, trusted=good)
+    run = as_fit_run(Run("", "", "free", time, theta, good), reading)
     found, (reading,) = fit_from_start([run], [reading], **choices)
     return found, reading
 
