@@ -103,8 +103,10 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     torques, errors, _ = _solved(further, residual)
-    # Errors from the residuals of all bins together.
-    errors *= math.sqrt(max(noise.level, _level(residual - further @ torques)))
+    # Errors by the sum of squares over the number of independent readings (residuals.noise).
+    power = dct(residual - further @ torques, norm="ortho") ** 2
+    level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
+    errors *= math.sqrt(max(noise.level, level))
     first = 0
     for name in names:
         lows, highs = edges[name][:-1], edges[name][1:]
@@ -126,13 +128,6 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
         ]
         first = own.stop
     return Torque(found, gains, noise)
-
-
-def _level(residual: Floats) -> float:
-    """Return the sum of squares over the number of independent readings (residuals.noise)."""
-    power = dct(residual, norm="ortho") ** 2
-    total = float(power.sum())
-    return float(np.sum(power**2)) / (3 * total) if total > 0 else 0.0
 
 
 def window_derivatives(
