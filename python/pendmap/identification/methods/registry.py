@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Final
+import functools
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from pendmap.identification.peaks import find_peaks, samples
 from pendmap.signal.robust import from_first, normal_scale
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -37,7 +38,6 @@ class Method:
 
     name: str  # in results and in JSON
     compute: Callable[..., Identification]  # of peaks, of peaks and samples, or of samples alone
-    choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # its further arguments
     reads_peaks: bool = True  # found once for all methods
     reads_samples: bool = False
     needs_samples: bool = False  # whether it cannot be applied to peaks alone
@@ -53,7 +53,7 @@ class Method:
     ) -> Identification:
         """Identify the damping of a record, arguments as for :func:`identify`."""
         if not self.reads_peaks:
-            found = self.compute(time, theta, sigma=sigma, trusted=trusted, **self.choices)
+            found = self.compute(time, theta, sigma=sigma, trusted=trusted)
             return dataclasses.replace(found, method=self.name)
         if peaks is None:
             peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
@@ -69,24 +69,23 @@ class Method:
             )
             return Identification(self.name, warnings=(text,), applicable=False)
         given = {"record": record} if self.reads_samples else {}
-        found = self.compute(peaks, **given, **self.choices)
+        found = self.compute(peaks, **given)
         return dataclasses.replace(found, method=self.name)
 
 
 BEST: Final = "trajectory"
 """The default method."""
 
+_ODD_ENDS = functools.partial(combined.from_peaks, reading="odd_ends")
+_ODD_TRIPLETS = functools.partial(combined.from_peaks, reading="odd_triplets")
+
 METHODS: Final = {
     method.name: method
     for method in (
         Method(BEST, trajectory.identify, reads_peaks=False, needs_samples=True),
         Method("combined", combined.from_peaks, reads_samples=True),
-        *(
-            Method(
-                f"combined_{reading}", combined.from_peaks, {"reading": reading}, reads_samples=True
-            )
-            for reading in ("odd_ends", "odd_triplets")
-        ),
+        Method("combined_odd_ends", _ODD_ENDS, reads_samples=True),
+        Method("combined_odd_triplets", _ODD_TRIPLETS, reads_samples=True),
         Method("combined_repaired", repaired.from_peaks),
         Method("log_decrement", log_decrement.from_peaks),
         Method("de_paula", de_paula.from_peaks),
