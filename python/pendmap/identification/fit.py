@@ -104,9 +104,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
-    units = Units(model.w0, si=True)
-    unknown, given = prepared(runs, model, free, start or {}, units)
-    names = unknown.names
+    unknown, given = prepared(runs, model, free, start or {})
+    names, units = unknown.names, unknown.units
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
     choices = {
@@ -128,15 +127,12 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
 
 
 def prepared(
-    runs: Sequence[FitRun],
-    model: Rig,
-    free: Sequence[str],
-    start: Mapping[str, float],
-    units: Units,
+    runs: Sequence[FitRun], model: Rig, free: Sequence[str], start: Mapping[str, float]
 ) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs as the core takes them."""
     if not runs:
         raise InputError("runs must hold one record or more, got none")
+    units = Units(model.w0, si=True)
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
     return Conversion(free_quantities(runs, rigs, free, start), units), given

@@ -10,7 +10,6 @@ import numpy as np
 from pendmap.errors import FitDiverged, core_errors
 from pendmap.identification.fit import prepared
 from pendmap.identification.runs import bare_windows, tolerance_of
-from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,13 +84,12 @@ def window_slopes(
     """Return the parameters' names and the derivatives window by window."""
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
-    units = Units(model.w0, si=True)
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
-    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    begin = unknown.start
+    unknown, given = prepared(runs, model, [*base, *candidates], start)
+    begin, windows = unknown.start, bare_windows(fit.windows, unknown.units)
     with core_errors(FitDiverged):
-        found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
+        found = _core.fit_rows(given, begin, tolerance_of(runs), windows)
     ends = np.cumsum([len(one.rows) for one in found])
     bare = np.zeros((int(ends[-1]), len(begin)))
     for one, end in zip(found, ends, strict=True):
