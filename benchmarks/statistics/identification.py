@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
-from pendmap.identification.methods import combined, de_paula, decrement, log_decrement
+from pendmap.identification.methods import combined, de_paula, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
@@ -55,11 +55,11 @@ def recursion_error() -> tuple[float, float]:
     rng = np.random.default_rng(0)
     for _ in range(2000):
         delta, theta_r = rng.uniform(0.002, 0.01), rng.uniform(5e-4, 8e-3)
-        peaks = decrement.recursion(rng.uniform(0.1, 0.21), delta, theta_r, 200)
+        peaks = combined.recursion(rng.uniform(0.1, 0.21), delta, theta_r, 200)
         below = np.flatnonzero(peaks <= 0)
         peaks = peaks[: below[0]] if below.size else peaks
-        worst[0] = max(worst[0], abs(decrement.decrement(peaks) - delta))
-        worst[1] = max(worst[1], abs(decrement.coulomb(peaks) - theta_r) * 6.2**2)
+        worst[0] = max(worst[0], abs(combined.decrement(peaks) - delta))
+        worst[1] = max(worst[1], abs(combined.coulomb(peaks) - theta_r) * 6.2**2)
     return worst[0], worst[1]
 
 
@@ -69,7 +69,7 @@ def recipe_errors() -> dict[str, float]:
     exact, wanted = truths["free_decay"]["nonlinear"][0], truths["decrement_recipe"][0]
     peaks = Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
     small, _ = combined.small_peaks(peaks)
-    made = decrement.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
+    made = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
     names = ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr")
     return {name: abs(getattr(made, name) - wanted[name]) for name in names}
 

@@ -65,7 +65,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
     report = identification.identify_experiment(free)
     model = identification.identified_model(report)
     found = diagnosis.diagnose(free, max_effects=0)
-    peaks = identification.find_peaks(time, theta)
     methods = identification.identify(time, theta)
     pendulum = pendmap.Pendulum(p=0.6)
     small = pendmap.Grid.square(12)
@@ -87,7 +86,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "diagnosed_model": lambda: diagnosis.diagnosed_model(found),
         "effects": pendmap.effects,
         "find_peaks": lambda: identification.find_peaks(time, theta),
-        "global_start": lambda: identification.global_start(peaks),
         "identified_model": lambda: identification.identified_model(report),
         "identify": lambda: identification.identify(time, theta),
         "identify_experiment": lambda: identification.identify_experiment(free),
@@ -104,7 +102,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "save": lambda: pendmap.save(basins, folder / "again.nc"),
         "save_model": lambda: pendmap.save_model(model, folder / "again.toml"),
         "simulate": lambda: pendmap.simulate(pendulum, 1.0, 0.0, 20.0, lyapunov=True),
-        "starting_values": lambda: identification.starting_values(time, theta),
         "table1": lambda: identification.table1(time, theta, methods),
         "tongues": lambda: pendmap.tongues(pendulum, [1.0, 2.0]),
         "uncertainty_exponent": lambda: pendmap.uncertainty_exponent(halves),

@@ -14,8 +14,7 @@ import pendmap
 from driven_decays import motion
 from pendmap import InputError, Rig, virtual_rig
 from pendmap.comparison import Ensemble, compare
-from pendmap.comparison.ensemble import Simulated, Start
-from pendmap.comparison.forced import Statistic
+from pendmap.comparison.forced import Start, Statistic, simulated_readings
 from pendmap.comparison.steady import Cycle
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run, read_experiment
@@ -55,20 +54,21 @@ def forced(theta: float, velocity: float, seconds: float, **drive: float) -> Run
 def test_members_are_trajectories_of_the_model(
     effects: tuple[tuple[str, dict[str, float]], ...],
 ) -> None:
-    """As ``simulate`` has them from the same start, read by the sensor."""
+    """Members equal ``simulate`` from the same start, plus the error of the sensor."""
     own = tuple(pendmap.Effect(name, values) for name, values in effects)
     rig = dataclasses.replace(RIG, effects=own)
     driven = dataclasses.replace(rig, p=0.6, Omega=12.0, phi=0.4)
     run = pendmap.simulate(driven, 1.0, -2.0, 6.0, samples=32)
     time = run["time"].values
-    model = Simulated(FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE), rig)
-    found = model.readings(np.array([1.0, 1.0]), np.array([-2.0, 0.0]), time)
+    record = FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE)
+    starts = np.array([1.0, 1.0]), np.array([-2.0, 0.0])
+    found = simulated_readings(record, rig, starts, time, None)
     offset = 0.02 if effects else 0.0
     np.testing.assert_allclose(found[0] - offset, run["theta"].values, atol=2e-7)
     assert np.abs(found[1] - found[0]).max() > 0.1
 
 
-def test_the_start_is_known_as_well_as_the_noise_lets_it(tmp_path: Path) -> None:
+def test_the_error_of_the_start_follows_from_the_noise(tmp_path: Path) -> None:
     experiment = made(tmp_path, forced(1.0, 2.0, 20.0))
     start = compare(RIG, experiment, ensemble=Ensemble(members=20)).forced[0].start
     assert abs(start.theta - 1.0) < 4 * start.stderr[0] < 0.004
@@ -81,7 +81,7 @@ def test_the_start_is_known_as_well_as_the_noise_lets_it(tmp_path: Path) -> None
 
 
 @pytest.mark.thorough
-def test_the_true_model_gives_what_the_rig_does_and_another_one_does_not(tmp_path: Path) -> None:
+def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> None:
     """Runs that tumble; the chance of a true model's statistic is even between 0 and 1."""
     plans = [forced(0.4 * k, 3.0, 40.0, p=1.5, frequency=11.0) for k in range(6)]
     experiment = made(tmp_path, *plans)
@@ -133,7 +133,7 @@ def test_a_steady_state_is_the_models_orbit(
         assert less.steady.overestimate < -0.01
 
 
-def test_another_end_is_said(tmp_path: Path) -> None:
+def test_a_different_steady_state_is_reported(tmp_path: Path) -> None:
     experiment = made(tmp_path, forced(0.2, 14.5, 60.0))
     stiff = dataclasses.replace(RIG, c_over_m=6.0)  # no rotation lasts
     comparison = compare(stiff, experiment, ensemble=Ensemble(members=20))
@@ -177,7 +177,7 @@ def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -
     assert math.isinf(found[2].statistics[3].measured)  # driven without a period: no rest
 
 
-def test_what_cannot_be_compared_is_left_out_with_its_reason(tmp_path: Path) -> None:
+def test_runs_that_cannot_be_compared_are_left_out_with_a_reason(tmp_path: Path) -> None:
     time = np.arange(0, 12, 0.02)
     theta = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.3, friction=0.08)
     theta += np.random.default_rng(0).normal(0, 1e-3, time.size)
@@ -240,7 +240,7 @@ def test_cycles_are_moved_by_periods_and_turns() -> None:
         ({"seed": -1}, "seed must be .*, got -1"),
     ],
 )
-def test_odd_ensembles_are_refused(given: dict[str, float], said: str) -> None:
+def test_ensembles_out_of_range_are_refused(given: dict[str, float], said: str) -> None:
     with pytest.raises(InputError, match=said):
         Ensemble(**given)  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""What of an experiment is fitted and what is held back to try models on."""
+"""Division of an experiment into records to fit and records held back."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def run(
         (4, 0, ["free0", "free1", "free2", "free3"], True),
     ],
 )
-def test_what_is_held_back_where_nothing_is_marked(
+def test_runs_and_stretches_are_held_back_where_none_is_marked(
     free: int, forced: int, held: list[str], *, inside: bool
 ) -> None:
     runs = [run(f"free{k}", "free") for k in range(free)]
@@ -53,7 +53,7 @@ def test_what_is_held_back_where_nothing_is_marked(
     assert {each.name for each in data.fitted} == {each.name for each in runs} - whole
 
 
-def test_what_is_marked_is_held_back_and_nothing_else() -> None:
+def test_only_marked_runs_are_held_back() -> None:
     runs = [run("a", "free"), run("b", "forced"), run("c", "forced", hold_out=True)]
     data = split_records(Experiment(Path("there"), tuple(runs)))
     assert [each.name for each in data.held] == ["c"]
@@ -73,7 +73,7 @@ def test_a_run_too_short_to_show_its_noise_has_that_of_the_others() -> None:
     assert alone.doubt > 0.02
 
 
-def test_without_noise_a_reading_is_worth_no_more_than_a_sensor_can_tell() -> None:
+def test_the_noise_of_exact_readings_is_that_of_the_finest_sensor() -> None:
     runs = tuple(run(name, "free", noise=0.0) for name in "abc")
     readings = split_records(Experiment(Path("there"), runs)).readings
     assert all(reading.sigma >= 1e-7 for reading in readings)

@@ -27,7 +27,7 @@ def test_a_block_reads_the_angle_at_its_own_time() -> None:
     assert found.sigma == pytest.approx(1e-5 / np.sqrt(size), rel=1e-9)
 
 
-def test_errors_and_what_does_not_count_are_those_of_the_readings() -> None:
+def test_blocks_keep_the_errors_and_the_left_out_readings() -> None:
     rng = np.random.default_rng(4)
     sigma = np.where(TIME < 10, 1e-3, 4e-3)
     trusted = rng.random(TIME.size) > 0.05
@@ -46,7 +46,7 @@ def test_errors_and_what_does_not_count_are_those_of_the_readings() -> None:
     )
 
 
-def test_a_fit_finds_the_same_with_the_same_errors() -> None:
+def test_a_fit_to_blocks_equals_one_to_readings() -> None:
     readings = ANGLE + 1e-3 * np.random.default_rng(5).standard_normal(TIME.size)
     run = FitRun(TIME, readings, 1e-3)
     start = Rig(w0=8.01, c_over_m=0.04, Tr=0.04)
@@ -58,6 +58,6 @@ def test_a_fit_finds_the_same_with_the_same_errors() -> None:
 
 
 @pytest.mark.parametrize("every", [20, 100])
-def test_readings_that_are_not_dense_stay(every: int) -> None:
+def test_sparse_readings_are_not_averaged(every: int) -> None:
     run = FitRun(TIME[::every], ANGLE[::every], 1e-3)
     assert average_blocks(run) is run

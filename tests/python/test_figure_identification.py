@@ -19,7 +19,7 @@ from pendmap import render
 from pendmap.charts import identification, methods
 from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
-from pendmap.identification.methods.decrement import recursion
+from pendmap.identification.methods.combined import recursion
 from pendmap.paper import drawings
 from pendmap.paper.draw import draw_pendulum
 from pendmap.records import Experiment, Run

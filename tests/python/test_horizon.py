@@ -25,7 +25,7 @@ def found() -> Discrepancy:
     return once("quadratic_drag")
 
 
-def test_at_no_horizon_the_error_is_the_noise(found: Discrepancy) -> None:
+def test_the_error_at_horizon_0_is_the_noise(found: Discrepancy) -> None:
     assert {forecast.kind for forecast in found.forecasts} == {"free", "forced"}
     for forecast in found.forecasts:
         assert forecast.horizon[0] < 0.2
@@ -33,7 +33,7 @@ def test_at_no_horizon_the_error_is_the_noise(found: Discrepancy) -> None:
         assert forecast.before[0] == pytest.approx(forecast.noise_floor, rel=0.1)
 
 
-def test_the_new_model_sees_farther(found: Discrepancy) -> None:
+def test_the_new_model_forecasts_farther(found: Discrepancy) -> None:
     for forecast in found.forecasts:
         assert np.all(np.diff(forecast.horizon) > 0)
         far = forecast.horizon > 0.5 * forecast.horizon[-1]

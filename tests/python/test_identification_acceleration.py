@@ -45,13 +45,13 @@ def agrees(report: IdentificationReport, truth: dict[str, float], sigmas: float 
 def test_the_truth_is_found_at_any_amplitude(
     tmp_path: Path, release: float, distance: float
 ) -> None:
-    """Both sides of the centre of oscillation at 0.255 m, the sine folded beyond a quarter turn."""
+    """Sensors on both sides of the centre of oscillation at 0.255 m, also beyond a quarter turn."""
     time, _, force = readings(release=release, distance=distance, bias=0.05, tilt=0.02)
     report = identified(experiment(tmp_path, TANGENTIAL % distance, time, force))
     agrees(report, TRUTH | ({"bias": 0.05, "tilt": 0.02} if release >= 1 else {}))
 
 
-def test_without_gravity(tmp_path: Path) -> None:
+def test_an_accelerometer_that_shows_no_gravity_is_fitted(tmp_path: Path) -> None:
     time, _, force = readings(distance=0.25, gravity=0.0)
     column = (TANGENTIAL % 0.25).replace("}", ", gravity_removed = true }")
     agrees(identified(experiment(tmp_path, column, time, force)), TRUTH)
@@ -66,7 +66,7 @@ def test_an_angular_acceleration_needs_no_place(tmp_path: Path, unit: str, per: 
     assert "tilt" not in report.best.estimates
 
 
-def test_readings_in_g_and_gravity_of_the_rig(tmp_path: Path) -> None:
+def test_readings_in_g_use_the_gravity_of_the_rig(tmp_path: Path) -> None:
     time, _, force = readings(gravity=9.79)
     column = (TANGENTIAL % 0.1).replace("m/s2", "g")
     there = experiment(tmp_path, column, time, force / 9.80665, more="[rig]\ngravity = 9.79\n")
@@ -81,7 +81,7 @@ def test_the_sense_of_the_axis_does_not_matter_alone(tmp_path: Path) -> None:
         assert one[name] == pytest.approx(other[name], rel=1e-6)
 
 
-def test_it_is_as_good_as_an_angle_of_the_same_relative_noise(tmp_path: Path) -> None:
+def test_errors_equal_those_of_an_angle_of_the_same_relative_noise(tmp_path: Path) -> None:
     """Readings over their gain are angles of small swings: so are the errors."""
     time, theta, force = readings()
     gain = GRAVITY - 0.1 * TRUTH["w0"] ** 2
@@ -112,7 +112,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
 
 
 def test_strong_friction_makes_the_reading_jump(tmp_path: Path) -> None:
-    """At each turn by 2 r Tr = 0.5 m/s^2, 25 times the noise."""
+    """The reading jumps at each turn by 2 r Tr = 0.5 m/s^2, 25 times the noise."""
     time, _, force = readings(distance=0.5, friction=0.5, c_over_m=0.1, seconds=20)
     report = identified(experiment(tmp_path, TANGENTIAL % 0.5, time, force))
     for name, true in {"w0": 6.2, "c_over_m": 0.1, "Tr": 0.5}.items():

@@ -61,13 +61,15 @@ def test_the_sum_is_the_likelihood_of_the_counts() -> None:
     rise = deviance(other) - deviance(fit)
     assert rise > 10
     assert other.chi2 - fit.chi2 == pytest.approx(rise, rel=1e-6)
-    # One for each reading, as of squares; and the slopes have the variance that they are said to.
+    # The mean is 1 a reading, like that of squares; the slopes have the variance that is stated.
     assert fit.chi2 / fit.degrees == pytest.approx(1, abs=0.05)
     assert np.mean(fit.white[0] ** 2) == pytest.approx(1, abs=0.15)
 
 
 @pytest.mark.parametrize(("noise", "rate"), [(0.0, 100), (0.15, 100), (0.3, 300)])
-def test_errors_are_less_than_of_values_and_honest(noise: float, rate: float) -> None:
+def test_errors_of_intervals_are_below_those_of_values_and_match_the_scatter(
+    noise: float, rate: float
+) -> None:
     own, plain, z = [], [], []
     for seed in range(12):
         time, theta = coarse(256, noise, seed, rate=rate)
@@ -86,7 +88,7 @@ def test_errors_are_less_than_of_values_and_honest(noise: float, rate: float) ->
     assert np.sqrt(np.mean(np.square(z))) < 1.4
 
 
-def test_what_rests_on_one_count_says_no_more_with_time() -> None:
+def test_samples_at_rest_on_one_count_add_no_information() -> None:
     made = decay(w0=6.2, c_over_m=0.2, tr=0.5, release=1.5, until=60.0)
     rests = float(made.peak_time[-1])
     errors = []
@@ -97,7 +99,7 @@ def test_what_rests_on_one_count_says_no_more_with_time() -> None:
     assert errors[1] > 0.9 * errors[0]
 
 
-def test_a_finer_count_is_no_interval() -> None:
+def test_readings_of_a_fine_count_are_not_intervals() -> None:
     time, theta = coarse(1024, 0.5, 1)
     reading = reading_of(time, theta)
     assert not reading.coarse

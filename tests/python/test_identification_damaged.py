@@ -10,7 +10,8 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError
-from pendmap.identification import find_peaks, identify, starting_values, table1
+from pendmap.identification import find_peaks, identify, table1
+from pendmap.identification.methods.start import starting_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable

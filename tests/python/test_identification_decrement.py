@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -12,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decays import decay, record
-from pendmap.identification import Peaks
-from pendmap.identification.methods import combined, de_paula, decrement, log_decrement, repaired
+from pendmap.identification import METHODS, Peaks
+from pendmap.identification.methods import combined, de_paula, log_decrement, repaired
 from pendmap.identification.methods.registry import identify_peaks, scatter
 from pendmap.identification.period import frequency, mean_period
 
@@ -27,30 +26,32 @@ WIDE = decay()
     parity=st.integers(0, 1),
 )
 @settings(max_examples=200)
-def test_peaks_by_2_4_to_2_6_return_what_made_them(
+def test_eqs_2_7_and_2_10_invert_2_4_to_2_6(
     delta: float, theta_r: float, first: float, parity: int
 ) -> None:
-    made = decrement.recursion(first, delta, theta_r, 100)
+    made = combined.recursion(first, delta, theta_r, 100)
     below = np.flatnonzero(made <= 0)
     made = made[: below[0]] if below.size else made
     if made.size < 6:
         return
-    assert decrement.decrement(made) == pytest.approx(delta, abs=1e-12)
-    assert decrement.coulomb(made) == pytest.approx(theta_r, abs=1e-12)
+    assert combined.decrement(made) == pytest.approx(delta, abs=1e-12)
+    assert combined.coulomb(made) == pytest.approx(theta_r, abs=1e-12)
     # Every triplet says the same, and so do both readings of "odd half cycles alone".
-    deltas, thetas = decrement.triplets(made)
+    deltas, thetas = combined.triplets(made)
     assert deltas == pytest.approx(delta, abs=1e-10)
     assert thetas == pytest.approx(theta_r, abs=1e-10)
     for reading in ("odd_ends", "odd_triplets"):
-        found = decrement.from_amplitudes(made, np.arange(made.size) * 0.5, reading, parity)
+        found = combined.from_amplitudes(made, np.arange(made.size) * 0.5, reading, parity)
         assert found.delta == pytest.approx(delta, abs=1e-10)
         assert found.theta_r == pytest.approx(theta_r, abs=1e-10)
 
 
 @given(zero=st.floats(-3e-3, 3e-3), theta_r=st.floats(5e-4, 5e-3), delta=st.floats(0.001, 0.01))
 @settings(max_examples=50)
-def test_the_repair_finds_the_zero_too(zero: float, theta_r: float, delta: float) -> None:
-    made = decrement.recursion(0.2, delta, theta_r, 60)
+def test_the_repaired_method_finds_the_zero_error(
+    zero: float, theta_r: float, delta: float
+) -> None:
+    made = combined.recursion(0.2, delta, theta_r, 60)
     made = made[made > 0]
     w0, zeta = 6.2, delta / math.sqrt(1 + delta**2)
     quarter = np.array([_quarter(a) for a in made])
@@ -83,10 +84,10 @@ def test_the_recipe_on_the_exact_peaks(truths: dict[str, Any]) -> None:
     small, warnings = combined.small_peaks(exact_peaks(truths), wanted["cut"])
     assert not warnings
     assert small.index[[0, -1]].tolist() == [wanted["i0"], wanted["i0"] + wanted["k"]]
-    found = decrement.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
+    found = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
     for name in ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr"):
         assert getattr(found, name) == pytest.approx(wanted[name], rel=1e-9), name
-    deltas, _ = decrement.triplets(np.abs(small.amplitude))
+    deltas, _ = combined.triplets(np.abs(small.amplitude))
     assert deltas.mean() == pytest.approx(wanted["delta_triplet_mean"], rel=1e-9)
     result = combined.from_peaks(exact_peaks(truths))
     assert result["w0"] == pytest.approx(wanted["w0"], rel=1e-9)
@@ -99,8 +100,8 @@ def test_exact_linear_peaks_give_the_reference_numbers(truths: dict[str, Any]) -
     for made in truths["free_decay"]["linear"]:
         peaks = np.array(made["peaks_abs"], float)[:-1]
         w0, zeta = float(made["w0"]), float(made["zeta"])
-        assert decrement.decrement(peaks) == pytest.approx(float(made["eq27_delta"]), abs=1e-12)
-        assert decrement.coulomb(peaks) * w0**2 == pytest.approx(float(made["eq210_Tr"]), abs=1e-12)
+        assert combined.decrement(peaks) == pytest.approx(float(made["eq27_delta"]), abs=1e-12)
+        assert combined.coulomb(peaks) * w0**2 == pytest.approx(float(made["eq210_Tr"]), abs=1e-12)
         times = np.array(made["times"], float)[:-1]
         period = 2 * math.pi / (w0 * math.sqrt(1 - zeta**2))
         assert mean_period(times) == pytest.approx(period, rel=1e-12)
@@ -120,9 +121,9 @@ def test_mean_periods_of_wide_swings_give_a_low_w0(truths: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize("offset_deg", [0.0, 0.05, -0.3])
-def test_the_repair_of_a_noisy_record(offset_deg: float) -> None:
+def test_the_repaired_method_on_a_noisy_record(offset_deg: float) -> None:
     time, angle = record(WIDE, counts=4096, offset=math.radians(offset_deg), seed=5)
-    found = repaired.identify(time, angle)
+    found = METHODS["combined_repaired"].identify(time, angle)
     assert found.applicable
     assert found["offset"] == pytest.approx(math.radians(offset_deg), abs=5e-4)
     assert found["w0"] == pytest.approx(6.2, rel=3e-4)
@@ -133,12 +134,12 @@ def test_the_repair_of_a_noisy_record(offset_deg: float) -> None:
         assert low < found[name] < high
 
 
-def test_the_errors_of_the_repair_are_honest() -> None:
+def test_errors_of_the_repaired_method_match_the_scatter() -> None:
     small = decay(c_over_m=0.05, tr=0.05, release=0.2)
     off = []
     for seed in range(60):
         time, angle = record(small, seconds=25, noise_deg=0.1, seed=seed)
-        found = repaired.identify(time, angle)
+        found = METHODS["combined_repaired"].identify(time, angle)
         true = {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.05, "offset": 0.0}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
     scatter = np.std(off, axis=0)
@@ -149,7 +150,7 @@ def test_the_errors_of_the_repair_are_honest() -> None:
 def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
     small = decay(c_over_m=0.05, tr=0.05, release=0.2)
     peaks = small.peak[:-1] + 1e-3
-    deltas, _ = decrement.triplets(np.abs(peaks))
+    deltas, _ = combined.triplets(np.abs(peaks))
     about = deltas - np.median(deltas)
     assert np.all(np.sign(about[1:-2]) == -np.sign(about[2:-1]))
     made = Peaks.of(small.peak_time[:-1], peaks)
@@ -161,19 +162,18 @@ def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
 
 def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> None:
     time, angle = record(WIDE, seconds=30)
-    odd_ends = functools.partial(combined.identify, reading="odd_ends")
-    for method in (combined.identify, odd_ends, repaired.identify):
-        found = method(time, angle)
+    for name in ("combined", "combined_odd_ends", "combined_repaired"):
+        found = METHODS[name].identify(time, angle)
         assert not found.applicable
         assert not found.estimates
         assert "not applicable" in found.warnings[-1]
         assert "12 degrees" in found.warnings[-1]
-    assert "ends above" in combined.identify(time, angle).warnings[-1]
+    assert "ends above" in METHODS["combined"].identify(time, angle).warnings[-1]
 
 
-def test_what_is_negative_is_said_and_kept() -> None:
+def test_negative_damping_is_reported_and_kept() -> None:
     time, angle = record(WIDE, offset=math.radians(0.05), counts=4096)
-    found = combined.identify(time, angle, reading="odd_triplets")
+    found = METHODS["combined_odd_triplets"].identify(time, angle)
     assert found["c_over_m"] < 0
     assert any(text.startswith("unphysical: c_over_m") for text in found.warnings)
     assert found.rig.c_over_m == 0
@@ -182,14 +182,14 @@ def test_what_is_negative_is_said_and_kept() -> None:
 def test_a_missing_peak_is_not_bridged() -> None:
     time, angle = record(WIDE)
     trusted = (time < 70) | (time > 71.2)
-    found = combined.identify(time, angle, trusted=trusted)
+    found = METHODS["combined"].identify(time, angle, trusted=trusted)
     assert any("peaks are missing" in text for text in found.warnings)
-    whole = combined.identify(time, angle)
+    whole = METHODS["combined"].identify(time, angle)
     assert not any("peaks are missing" in text for text in whole.warnings)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) -> None:
+def test_a_short_record_gives_the_numbers_of_peaks_found_and_needed(count: int) -> None:
     """Two peaks lie between 12 and 90 degrees, ``count`` of them below."""
     small = math.radians(11.0) * 0.9 ** np.arange(count)
     size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
@@ -206,7 +206,7 @@ def test_a_short_record_is_told_how_many_peaks_of_how_many_it_lacks(count: int) 
     assert len(found) == (2 if count < 3 else 1)
 
 
-def test_peaks_alone_tell_their_own_scatter() -> None:
+def test_errors_of_bare_peaks_follow_from_their_scatter() -> None:
     made = decay(release=2.5)
     time, peak = made.peak_time[30:140], made.peak[30:140]
     rng = np.random.default_rng(4)

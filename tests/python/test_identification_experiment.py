@@ -100,7 +100,7 @@ def test_a_decay_that_begins_with_rotations(tmp_path: Path) -> None:
         assert abs(found.value - true) < 5 * found.stderr
 
 
-def test_what_is_left_out_is_said() -> None:
+def test_runs_that_are_not_read_are_reported() -> None:
     def run(kind: Literal["free", "forced"] = "free", *, hold_out: bool = False) -> Run:
         time = np.arange(10.0)
         good = np.ones(10, bool)

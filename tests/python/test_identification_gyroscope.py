@@ -17,7 +17,7 @@ from pendmap import InputError, render
 from pendmap.comparison.data import split_records
 from pendmap.comparison.free import compare
 from pendmap.identification import identified_model, identify_experiment
-from pendmap.identification.methods.joint import fit_together
+from pendmap.identification.methods.trajectory import fit_together
 from pendmap.records import Experiment, Run
 from pendmap.records.summary import as_json, as_text
 
@@ -75,7 +75,7 @@ def agrees(best: Identification, truth: dict[str, float], sigmas: float = 3.5) -
 
 @pytest.mark.parametrize("release", [0.3, 1.0, 2.2, 2.9])
 def test_the_truth_is_found_at_any_amplitude(tmp_path: Path, release: float) -> None:
-    """Until rest and beyond, where noise integrated would pass for motion."""
+    """The record goes on at rest, where integrated noise resembles motion."""
     best = fit_model(read(tmp_path, *rates(release=release, seconds=40)))
     agrees(best, TRUTH | {"bias": 0.01})
     assert best.misfit == pytest.approx(1, abs=0.1)
@@ -83,7 +83,7 @@ def test_the_truth_is_found_at_any_amplitude(tmp_path: Path, release: float) -> 
 
 
 @pytest.mark.parametrize("bias", [-0.3, 0.1])
-def test_a_large_bias(tmp_path: Path, bias: float) -> None:
+def test_a_large_bias_of_a_gyroscope_is_fitted(tmp_path: Path, bias: float) -> None:
     run = read(tmp_path, *rates(release=1.0, bias=bias))
     assert run.gyroscope is not None
     assert run.gyroscope.bias == pytest.approx(bias, abs=2e-3)
@@ -119,7 +119,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
 
 
 def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
-    """An angle of noise sigma / w0 says as much of a small swing."""
+    """An angle of noise sigma / w0 gives the same information on a small swing."""
     time, rate = rates(release=0.5)
     best = fit_model(read(tmp_path, time, rate))
     _, angle = record(
@@ -136,8 +136,8 @@ def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
         assert 0.8 < one / two < 1.25, name
 
 
-def test_degrees_a_second(tmp_path: Path) -> None:
-    """By the heading, and seen from the period where no unit is given."""
+def test_a_gyroscope_in_degrees_per_second(tmp_path: Path) -> None:
+    """The unit follows from the heading, or from the period where there is none."""
     time, rate = rates()
     for name in ("Gyroscope z (deg/s)", "gyro_z"):
         run = read(tmp_path, time, rate * 180 / math.pi, name)
@@ -146,7 +146,7 @@ def test_degrees_a_second(tmp_path: Path) -> None:
         agrees(fit_model(run), TRUTH | {"bias": 0.01})
 
 
-def test_milliseconds(tmp_path: Path) -> None:
+def test_a_gyroscope_with_times_in_milliseconds(tmp_path: Path) -> None:
     time, rate = rates()
     text = "\n".join(f"{1e3 * t:.3f},{v:.8g}" for t, v in zip(time, rate, strict=True))
     path = tmp_path / "run.csv"
@@ -154,7 +154,7 @@ def test_milliseconds(tmp_path: Path) -> None:
     agrees(fit_model(pendmap.read_experiment(path).runs[0]), TRUTH | {"bias": 0.01})
 
 
-def test_a_range_that_ends_and_false_readings(tmp_path: Path) -> None:
+def test_clipped_and_false_readings_do_not_count(tmp_path: Path) -> None:
     """Sensors for 500 degrees a second clip a wide swing; what is clipped does not count."""
     time, rate = rates()
     end = math.radians(500)
@@ -167,7 +167,7 @@ def test_a_range_that_ends_and_false_readings(tmp_path: Path) -> None:
     agrees(fit_model(run), TRUTH | {"bias": 0.01})
 
 
-def test_rest_is_not_taken_for_releases(tmp_path: Path) -> None:
+def test_drift_at_rest_is_no_release(tmp_path: Path) -> None:
     """At rest the integrated angle walks; that is no motion."""
     time = np.arange(4001) / 100
     made = decay(c_over_m=0.05, tr=0.5, release=1.0)
@@ -193,8 +193,8 @@ def forced(time: Floats) -> Floats:
     return np.asarray(found.y[1])
 
 
-def test_a_forced_run(tmp_path: Path) -> None:
-    """What the pivot does is no part of a rate."""
+def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
+    """The motion of the pivot does not enter a rate."""
     time = np.arange(2000) / 100
     noise = 5e-3 * np.random.default_rng(0).standard_normal(time.size)
     written(tmp_path / "run.csv", time, forced(time) + 0.01 + noise)
@@ -210,7 +210,7 @@ def test_a_forced_run(tmp_path: Path) -> None:
         assert abs(fit[name] - true) < 3.5 * stderr, name
 
 
-def test_coarse_steps_of_the_rate(tmp_path: Path) -> None:
+def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
     """Steps of ten times the noise err evenly, by step / sqrt(12)."""
     time, rate = rates(noise=2e-3)
     run = read(tmp_path, time, 0.02 * np.round(rate / 0.02))
@@ -220,7 +220,7 @@ def test_coarse_steps_of_the_rate(tmp_path: Path) -> None:
         assert best[name] == pytest.approx(true, rel=0.02)
 
 
-def test_look_says_noise_and_bias(tmp_path: Path) -> None:
+def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
     there = written(tmp_path / "run.csv", *rates())
     experiment = pendmap.read_experiment(there)
     (run,) = as_json(experiment)["runs"]
@@ -234,7 +234,7 @@ def test_look_says_noise_and_bias(tmp_path: Path) -> None:
     render.draw_record(experiment, tmp_path / "record.png")
 
 
-def test_an_angle_beside_it_is_what_counts(tmp_path: Path) -> None:
+def test_an_angle_is_preferred_to_a_gyroscope(tmp_path: Path) -> None:
     time, rate = rates(release=1.0)
     _, angle = record(decay(release=1.0), seconds=30.0, offset=0.01)
     path = tmp_path / "both.csv"

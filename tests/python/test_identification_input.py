@@ -1,4 +1,4 @@
-"""What identification refuses, in a line, and what it warns of."""
+"""Errors and warnings of the identification."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ TIME = np.arange(50) / 10
         (identify, (TIME[::-1], np.cos(TIME)), "time must increase"),
     ],
 )
-def test_refused_in_a_line(call: Any, given: tuple[Any, ...], complaint: str) -> None:  # noqa: ANN401
+def test_bad_input_is_refused(call: Any, given: tuple[Any, ...], complaint: str) -> None:  # noqa: ANN401
     with pytest.raises(InputError, match=complaint) as error:
         call(*given)
     assert "\n" not in str(error.value)
 
 
-def test_methods_are_a_list() -> None:
+def test_methods_must_be_a_list() -> None:
     with pytest.raises(InputError, match=r"methods must be a list of names, .*, got 'trajectory'"):
         identify(TIME, np.cos(TIME), methods="trajectory")
 
 
-def test_few_samples_a_period_are_said() -> None:
+def test_few_samples_a_period_give_a_warning() -> None:
     names = ["energy_balance", "combined"]
     coarse = identify(*record(decay(), seconds=60, rate=16), methods=names)
     assert any("samples a period" in text for text in coarse["energy_balance"].warnings)

@@ -38,7 +38,9 @@ def late(fine: np.ndarray, tau: float, sigma: float, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("tau", [5e-4, 2e-3])
-def test_how_far_instants_miss_their_stamps_is_told(fine: np.ndarray, tau: float) -> None:
+def test_the_scatter_of_instants_about_their_stamps_is_estimated(
+    fine: np.ndarray, tau: float
+) -> None:
     for seed in range(5):
         law = noise_of(TIME, late(fine, tau, 1e-3, seed)).law
         assert law is not None
@@ -75,7 +77,7 @@ def test_readings_at_missed_instants_are_moved_toward_rest(fine: np.ndarray) -> 
     assert float(moved @ shift / (shift @ shift)) == pytest.approx(1.0, abs=0.25)
 
 
-def test_weights_halve_the_errors_and_state_them_rightly(fine: np.ndarray) -> None:
+def test_weights_halve_the_errors_and_match_the_scatter(fine: np.ndarray) -> None:
     scores: dict[str, list[float]] = {name: [] for name in NAMES}
     ratios: dict[str, list[tuple[float, float]]] = {name: [] for name in NAMES}
     for seed in range(12):
@@ -112,7 +114,7 @@ def test_velocities_are_those_of_polynomials_through_each_window() -> None:
             assert gain[k] == pytest.approx(np.sqrt(square[-2, -2]), rel=1e-6)
 
 
-def test_where_the_model_lacks_more_than_the_noise_readings_count_alike(fine: np.ndarray) -> None:
+def test_readings_count_alike_where_the_model_errs_more_than_the_noise(fine: np.ndarray) -> None:
     # A gain of 3 % is no scatter of a clock: by its law the few readings at rest would rule.
     theta = late(fine, 2e-3, 3e-4, 1) + 0.03 * fine[200:60_200:20] ** 3
     reading = reading_of(TIME, theta, count=0.0)
@@ -126,7 +128,7 @@ def test_where_the_model_lacks_more_than_the_noise_readings_count_alike(fine: np
     assert fit.rms < 0.9 * by_law.rms
 
 
-def test_stamps_that_are_off_bias_nothing(fine: np.ndarray) -> None:
+def test_wrong_stamps_cause_no_bias(fine: np.ndarray) -> None:
     """The instants are regular and their stamps miss them: a weight must not know by how much."""
     tau, sigma, decays = 2e-3, 1e-3, 12
     exact = fine[200::20][: TIME.size]
@@ -150,7 +152,7 @@ def test_stamps_that_are_off_bias_nothing(fine: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(("every", "few"), [(10, True), (12, True), (3, False), (1, False)])
-def test_of_few_samples_a_period_the_noise_is_a_bound(
+def test_the_noise_of_few_samples_a_period_is_a_bound(
     fine: np.ndarray, every: int, *, few: bool
 ) -> None:
     """The stamps are exact: what grows with speed is motion that polynomials leave."""

@@ -39,7 +39,9 @@ def test_peaks_of_a_clean_record_are_the_true_ones(truths: dict) -> None:
     ("noise_deg", "rate", "counts"),
     [(0.05, 100.0, 0), (0.1, 100.0, 4096), (0.5, 100.0, 4096), (0.2, 30.0, 0), (0.5, 1000.0, 0)],
 )
-def test_standard_errors_are_honest(noise_deg: float, rate: float, counts: int) -> None:
+def test_standard_errors_of_peaks_match_the_scatter(
+    noise_deg: float, rate: float, counts: int
+) -> None:
     off: dict[str, list[float]] = {"amplitude": [], "time": [], "crossing": []}
     for seed in range(5 if rate > 500 else 10):
         time, angle = record(WIDE, rate=rate, noise_deg=noise_deg, counts=counts, seed=seed)
@@ -114,7 +116,7 @@ def test_a_record_that_begins_in_motion_has_no_release() -> None:
     assert np.abs(peaks.amplitude - WIDE.peak[first + peaks.index]).max() < 4e-3
 
 
-def test_numbers_go_on_behind_a_gap() -> None:
+def test_numbers_of_peaks_count_across_a_gap() -> None:
     time, angle = record(WIDE)
     trusted = (time < 20) | (time > 24.3)
     peaks = find_peaks(time, angle, trusted=trusted)
@@ -152,7 +154,7 @@ def test_an_angle_that_rests_some_turns_away() -> None:
     assert away.amplitude == pytest.approx(there.amplitude, abs=1e-9)
 
 
-def test_what_does_not_swing_has_no_peaks() -> None:
+def test_a_record_without_swings_has_no_peaks() -> None:
     time = np.arange(500) / 100
     noise = 1e-3 * np.random.default_rng(0).standard_normal(500)
     for angle in (np.zeros(500), noise, 1.0 + noise, np.exp(-time) + noise):
@@ -184,7 +186,7 @@ def test_bad_records_are_refused(time: list[float], theta: list[float]) -> None:
         find_peaks(time, theta)
 
 
-def test_peaks_of_others_get_their_signs() -> None:
+def test_absolute_peaks_get_alternating_signs() -> None:
     peaks = Peaks.of([0, 1, 2], [0.3, 0.2, 0.1])
     assert peaks.amplitude.tolist() == [0.3, -0.2, 0.1]
     assert peaks.odd.tolist() == [False, True, False]

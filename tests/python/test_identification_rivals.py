@@ -16,12 +16,11 @@ from pendmap.identification import (
     Identification,
     Peaks,
     find_peaks,
-    global_start,
     identify,
-    starting_values,
     table1,
 )
-from pendmap.identification.methods import de_paula, energy_balance, log_decrement
+from pendmap.identification.methods import de_paula, log_decrement
+from pendmap.identification.methods.start import global_start, starting_values
 from pendmap.identification.period import envelope, viscous_work
 
 WIDE = decay()
@@ -82,11 +81,11 @@ def test_every_method_has_the_common_result() -> None:
     assert everything["energy_balance"]["w0"] == pytest.approx(6.2, rel=1e-4)
 
 
-def test_the_errors_of_energy_balance_are_honest() -> None:
+def test_errors_of_the_energy_balance_match_the_scatter() -> None:
     off = []
     for seed in range(30):
         time, angle = record(WIDE, noise_deg=0.2, offset=2e-3, seed=seed)
-        found = energy_balance.identify(time, angle)
+        found = METHODS["energy_balance"].identify(time, angle)
         assert found.misfit == pytest.approx(1, abs=0.5)
         true = {**BOTH, "offset": 2e-3}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
@@ -97,30 +96,31 @@ def test_the_errors_of_energy_balance_are_honest() -> None:
 
 def test_friction_is_taken_for_viscous_by_the_logarithmic_decrement() -> None:
     time, angle = record(WIDE)
-    found = log_decrement.identify(time, angle)
+    peaks = find_peaks(time, angle)
+    found = log_decrement.from_peaks(peaks)
     assert found["c_over_m"] > 4 * 0.0496
     assert any("not exponential" in text for text in found.warnings)
-    line = log_decrement.identify(time, angle, reading="line")
+    line = log_decrement.from_peaks(peaks, reading="line")
     assert 0.0496 < line["c_over_m"] < found["c_over_m"]
 
 
 def test_de_paula_finds_each_damping_alone() -> None:
     time, angle = record(DRY, seconds=30, noise_deg=1e-3)
-    found = de_paula.identify(time, angle, fast=(0.1, 0.3), slow=(0.0, 0.2))
+    found = de_paula.from_peaks(find_peaks(time, angle), fast=(0.1, 0.3), slow=(0.0, 0.2))
     assert found["Tr"] == pytest.approx(0.03, rel=5e-3)
     time, angle = record(VISCOUS, seconds=30, noise_deg=1e-3)
-    found = de_paula.identify(time, angle, fast=(0.05, 0.3), slow=(0.0, 0.05))
+    found = de_paula.from_peaks(find_peaks(time, angle), fast=(0.05, 0.3), slow=(0.0, 0.05))
     assert found["c_over_m"] == pytest.approx(0.12, rel=5e-3)
     assert "between 2.86 and 17.2 degrees" in found.used
 
 
-def test_de_paula_counts_each_damping_twice() -> None:
+def test_de_paula_overestimates_both_dampings() -> None:
     time, angle = record(WIDE)
-    found = de_paula.identify(time, angle)
+    found = de_paula.from_peaks(find_peaks(time, angle))
     assert found["c_over_m"] > 1.2 * 0.0496
     assert found["Tr"] > 1.2 * 0.08
     assert len(found.warnings) == 2
-    short = de_paula.identify(time[:3000], angle[:3000])
+    short = de_paula.from_peaks(find_peaks(time[:3000], angle[:3000]))
     assert not short.applicable
 
 

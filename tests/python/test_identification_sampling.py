@@ -32,7 +32,7 @@ SENSORS = ((0.05, 4096), (0.1, 0), (0.2, 1024), (0.5, 1024))
 
 
 def resolved(made: Decay, noise_deg: float, counts: int, seconds: float) -> int:
-    """How many peaks stand ten times the noise away from the next one."""
+    """Return the number of peaks that differ from the next by more than ten times the noise."""
     count = math.tau / counts / math.sqrt(12) if counts else 0.0
     sigma = math.hypot(math.radians(noise_deg), count)
     clear = np.abs(np.diff(made.peak)) > 10 * sigma
@@ -42,7 +42,7 @@ def resolved(made: Decay, noise_deg: float, counts: int, seconds: float) -> int:
 
 @pytest.mark.parametrize("made", [WIDE, VISCOUS, DRY], ids=["wide", "viscous", "dry"])
 @pytest.mark.parametrize("samples", [6.3, 8.0, 10.0, 15.0, 25.0, 100.0])
-def test_all_peaks_are_found_at_any_rate_and_their_errors_are_honest(
+def test_all_peaks_are_found_at_any_rate_with_errors_that_match_the_scatter(
     made: Decay, samples: float
 ) -> None:
     times, sizes, crossings = [], [], []
@@ -145,13 +145,13 @@ def test_samples_between_readings_make_no_peaks(made: str, ratio: int) -> None:
     assert np.mean(np.abs(off) < 1.96 * turned.stderr_time + (0.01 / ratio)) > 0.89
 
 
-def test_what_was_measured_is_not_thinned() -> None:
+def test_measured_samples_are_not_thinned() -> None:
     for noise_deg, counts, rate in ((0.1, 4096, 100), (0.0, 0, 1000), (0.05, 1024, 1000)):
         time, angle = record(WIDE, seconds=40, noise_deg=noise_deg, counts=counts, rate=rate)
         assert measured(time, angle) is None
 
 
-def test_a_look_says_at_which_rate_was_measured(tmp_path: Path) -> None:
+def test_look_reports_the_rate_of_the_measurement(tmp_path: Path) -> None:
     time, angle = record(WIDE, seconds=40, noise_deg=0.1)
     table = np.column_stack(drawn(time, angle, 100, "straight lines"))
     file = tmp_path / "dense.csv"

@@ -1,4 +1,4 @@
-"""Rows of table 1: each tells something of its own."""
+"""Rows of table 1: none repeats another."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from decays import decay, record
 from pendmap import Rig
 from pendmap.comparison import compare
 from pendmap.comparison.free import as_text, tables
-from pendmap.identification import Estimate, Identification
-from pendmap.identification.table1 import table1
+from pendmap.identification import Estimate, Identification, table1
 from pendmap.records import Experiment, Run
 
 TRUE = Identification("true", {"w0": Estimate(6.2), "c_over_m": Estimate(0.05)})
 
 
-def test_rows_neither_repeat_nor_fall_on_the_start() -> None:
+def test_rows_do_not_repeat_and_leave_out_the_start() -> None:
     time, angle = record(decay(release=1.0, until=40.0), seconds=20)
     rows = table1(time, angle, {"true": TRUE}).rows
     assert [row.what for row in rows] == ["period", "period"]

@@ -12,10 +12,11 @@ import pytest
 
 from driven_decays import motion
 from pendmap.errors import InputError
-from pendmap.identification.fit import fit_runs, score
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.trajectory import fit_decay, identify
 from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun, Pivot
+from pendmap.identification.sensitivity import sensitivities
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
@@ -79,7 +80,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     assert 160 <= sum(covered) <= 179
 
 
-def test_the_error_is_the_bound(decay: np.ndarray) -> None:
+def test_the_standard_error_is_the_cramer_rao_bound(decay: np.ndarray) -> None:
     # The covariance against the information of finite differences by scipy, state included.
     found = identify(TIME, noisy(decay, 1e-3, 2), sigma=1e-3)
     columns = [np.ones_like(TIME)]
@@ -95,7 +96,7 @@ def test_the_error_is_the_bound(decay: np.ndarray) -> None:
         assert found.estimates[name].stderr == pytest.approx(limit, rel=0.02)
 
 
-def test_what_the_model_lacks_is_said(decay: np.ndarray) -> None:
+def test_a_missing_effect_gives_a_warning(decay: np.ndarray) -> None:
     del decay
     theta = motion(TIME, (2.5, 0.0), w0=6.0, friction=0.05, drag=0.05)
     found = identify(TIME, noisy(theta, 2e-4, 3))
@@ -110,7 +111,7 @@ def test_what_the_model_lacks_is_said(decay: np.ndarray) -> None:
     assert abs(better["c_over_m"]) < 4 * (better.estimates["c_over_m"].stderr or 0)
 
 
-def test_the_score_names_what_is_missing_and_its_size() -> None:
+def test_the_score_shows_the_missing_effect_and_its_size() -> None:
     theta = motion(TIME, (2.5, 0.0), w0=6.0, c_over_m=0.03, friction=0.05, drag=2e-3)
     run = FitRun(TIME, noisy(theta, 2e-3, 4), 2e-3)
     base = Rig(w0=6.01, c_over_m=0.05, Tr=0.05, effects=(OFFSET,))
@@ -120,7 +121,11 @@ def test_the_score_names_what_is_missing_and_its_size() -> None:
     names = [f"{name}.{size}" for name, size in sizes.items()]
     extra = tuple(Effect(name, {size: 0.0}) for name, size in sizes.items())
     wide = dataclasses.replace(base, effects=(OFFSET, *extra))
-    pull, information = score(fit, [run], names, wide)
+    seen = sensitivities(fit, [run], names, wide)
+    old, new = np.split(seen.columns, [len(free)], axis=1)
+    q, _ = np.linalg.qr(old / np.linalg.norm(old, axis=0))
+    own = new - q @ (q.T @ new)
+    pull, information = own.T @ seen.residual, own.T @ own
     gain = pull**2 / np.diag(information)
     better = fit_runs([run], wide, [*free, names[0]])
     assert gain[0] == max(gain)
@@ -131,7 +136,7 @@ def test_the_score_names_what_is_missing_and_its_size() -> None:
     )
 
 
-def test_several_runs_share_what_is_theirs() -> None:
+def test_several_runs_share_the_parameters_of_the_pendulum() -> None:
     time = np.arange(1500) * 0.02
     p, big_omega, phi = 0.3, 11.0, 0.7
     free = motion(time, (2.8, 0.0), **TRUTH)
@@ -159,7 +164,7 @@ def test_several_runs_share_what_is_theirs() -> None:
     assert both.widening > 1
 
 
-def test_a_recorded_pivot_drives(decay: np.ndarray) -> None:
+def test_a_recorded_pivot_motion_drives_the_model(decay: np.ndarray) -> None:
     del decay
     time = np.arange(1000) * 0.02
 
@@ -174,7 +179,7 @@ def test_a_recorded_pivot_drives(decay: np.ndarray) -> None:
     assert fit["c_over_m"] == pytest.approx(0.1, rel=1e-5)
 
 
-def test_a_coarse_sensor_is_no_more_trusted_than_its_count(decay: np.ndarray) -> None:
+def test_the_noise_of_a_coarse_sensor_is_at_least_that_of_its_count(decay: np.ndarray) -> None:
     count = math.tau / 500
     theta = np.round((decay + 0.3 * count) / count) * count
     reading = reading_of(TIME, theta)
@@ -189,7 +194,7 @@ def test_a_coarse_sensor_is_no_more_trusted_than_its_count(decay: np.ndarray) ->
 
 
 @pytest.mark.parametrize("sigma", [1e-4, 1e-3, 1e-2])
-def test_the_noise_is_seen_without_a_model(decay: np.ndarray, sigma: float) -> None:
+def test_the_noise_is_estimated_without_a_model(decay: np.ndarray, sigma: float) -> None:
     assert reading_of(TIME, noisy(decay, sigma, 6)).sigma == pytest.approx(sigma, rel=0.08)
 
 
@@ -211,7 +216,7 @@ def test_samples_not_trusted_do_not_count(decay: np.ndarray) -> None:
         assert abs(estimate.value - TRUTH[own]) < 4 * (estimate.stderr or 0)
 
 
-def test_what_does_not_fit_together_is_refused(decay: np.ndarray) -> None:
+def test_arrays_that_do_not_match_are_refused(decay: np.ndarray) -> None:
     with pytest.raises(InputError, match="as many"):
         identify(TIME, decay[:-1])
     with pytest.raises(InputError, match=r"sigma must be .*, got -1"):
@@ -238,7 +243,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("window", [(0, 0, 21), (0, 9, 9), (1, 0, 20)])
-def test_windows_are_samples_of_their_runs(window: tuple[int, int, int]) -> None:
+def test_windows_beyond_their_runs_are_refused(window: tuple[int, int, int]) -> None:
     run = FitRun(np.arange(20.0) * 0.05, 0.1 * np.cos(0.3 * np.arange(20)), 1e-3)
     with pytest.raises(InputError, match="must be samples of a run"):
         fit_runs([run], Rig(w0=6.0), ["w0"], windows=((*window, 0.1, 0.0),))

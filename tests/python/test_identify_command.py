@@ -87,7 +87,7 @@ def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path:
     assert [path.name for path in tmp_path.iterdir()] == ["decay.csv"]
 
 
-def test_some_methods_and_an_effect(decay_file: Path, pendmap_command: Run) -> None:
+def test_methods_and_an_effect_can_be_chosen(decay_file: Path, pendmap_command: Run) -> None:
     words = ("--method", "trajectory", "--method", "log_decrement", "--effect", "quadratic_drag")
     run = pendmap_command("identify", decay_file, *words, "--json")
     assert run.returncode == 0, run.stderr
@@ -135,7 +135,7 @@ def test_drag_is_tried_where_the_residual_exceeds_the_noise(
         (("look", "decay.png", "--plot", "./decay.png"), "'--plot': 'decay.png': is an input"),
     ],
 )
-def test_refused_on_one_line(
+def test_bad_arguments_are_refused_on_one_line(
     tmp_path: Path,
     decay_file: Path,
     pendmap_command: Run,
@@ -168,7 +168,7 @@ def test_refused_on_one_line(
 @pytest.mark.parametrize(
     "words", [("identify", "lab", "--method", "energy_balance"), ("compare", "model.toml", "lab")]
 )
-def test_a_wrong_unit_is_said_before_all_else(
+def test_a_wrong_unit_is_reported_first(
     words: tuple[str, ...], tmp_path: Path, pendmap_command: Run
 ) -> None:
     time, angle = record(decay(), seconds=20, seed=3)
@@ -202,8 +202,8 @@ def test_numbers_with_their_errors(value: float, error: float | None, shown: str
     assert estimate_text(Estimate(value, error)) == shown
 
 
-def test_a_reader_that_goes_away_is_no_failed_check(decay_file: Path, tmp_path: Path) -> None:
-    """What a shell says of any command that ends so: 128 and the signal's number."""
+def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:
+    """The exit code is 128 and the number of the signal, by the convention of shells."""
     words = ["identify", decay_file, "--method", "energy_balance", "--out", "model.toml"]
     read, write = os.pipe()
     os.close(read)

@@ -1,4 +1,4 @@
-"""What a path does among its wells: paths whose itinerary is known."""
+"""Statistics of paths among wells, on paths whose itinerary is known."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_velocities_are_those_of_the_motion() -> None:
 
 
 @pytest.mark.parametrize(("n", "w"), [(1, 0), (2, 0), (3, 0), (1, 1), (2, -1), (5, 5), (8, 3)])
-def test_what_repeats_is_found_with_its_period_and_turns(n: int, w: int) -> None:
+def test_a_cycle_is_found_with_its_period_and_turns(n: int, w: int) -> None:
     rate = math.tau / (n * PERIOD)
     cycle = 0.8 * np.sin(rate * TIME) + 0.3 * np.cos((2 * n - 1) * rate * TIME)
     path = cycle + w * rate * TIME + np.random.default_rng(2).normal(0, 0.001, TIME.size)
@@ -64,7 +64,7 @@ def test_the_time_to_settle_is_that_of_the_slowest_part() -> None:
     assert found.settled[0] == pytest.approx(expected, abs=2 * TICK)
 
 
-def test_what_does_not_repeat_never_settles() -> None:
+def test_a_path_without_a_cycle_never_settles() -> None:
     drawn = np.random.default_rng(3).normal(0, 1, TIME.size)
     walk = np.cumsum(drawn) * 0.1
     found = of(walk)
@@ -74,7 +74,7 @@ def test_what_does_not_repeat_never_settles() -> None:
     assert math.isinf(of(late).settled[0])
 
 
-def test_without_a_period_only_what_stays_has_settled() -> None:
+def test_without_a_period_only_rest_counts_as_settled() -> None:
     ruler = Ruler(TICK, 1.0, None, 0.001)
     stays = np.exp(-0.5 * TIME) * np.cos(6 * TIME) + math.tau
     n, w, settled = repeats(stays[None], ruler)
@@ -84,7 +84,7 @@ def test_without_a_period_only_what_stays_has_settled() -> None:
     assert math.isinf(repeats(np.sin(6 * TIME)[None], ruler)[2][0])
 
 
-def test_many_paths_at_once_are_as_one_by_one() -> None:
+def test_many_paths_at_once_equal_single_ones() -> None:
     rng = np.random.default_rng(4)
     paths = np.stack(
         [np.sin(math.tau / PERIOD * TIME + k) + 0.02 * k * TIME * rng.normal() for k in range(7)]

@@ -23,8 +23,7 @@ from pendmap.diagnosis.next_experiment.power import chance_resolved, chance_wron
 from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.summary import as_json
 from pendmap.errors import InputError
-from pendmap.identification.methods.joint import as_fit_run
-from pendmap.identification.readings import reading_of
+from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan
 

@@ -25,7 +25,7 @@ def density(correlation: float, phase: float = W0 * INTERVAL) -> float:
 
 
 @pytest.mark.parametrize("swell", [1.0, 1.15])
-def test_slow_residuals_have_the_chance_that_noise_gives_them(swell: float) -> None:
+def test_the_chance_of_slow_residuals_is_that_of_noise_alone(swell: float) -> None:
     # Noise about swings whose initial states were fitted, in one run stronger than is stated.
     rng = np.random.default_rng(2)
     chances = []
@@ -54,7 +54,7 @@ def test_white_noise_stays_white() -> None:
     # Of coarser counts than that quick noise of 0.9 is nothing but rounding.
     [(c, n) for c in COLOURS for n in (0.3, 1.0, None) if n != 0.3 or c < 0.8],
 )
-def test_coloured_noise_leaves_no_more_than_noise(correlation: float, noise: float | None) -> None:
+def test_coloured_noise_has_no_excess(correlation: float, noise: float | None) -> None:
     # Of coarse counts white noise of the rounding hides how steep the coloured part is.
     rng = np.random.default_rng(3)
     chances, levels = [], []
@@ -76,7 +76,7 @@ def test_coloured_noise_leaves_no_more_than_noise(correlation: float, noise: flo
 
 
 @pytest.mark.parametrize("correlation", COLOURS)
-def test_what_a_model_lacks_shows_in_coloured_noise(correlation: float) -> None:
+def test_a_missing_effect_shows_in_coloured_noise(correlation: float) -> None:
     # As strong over the noise where it is, whatever its colour: 300 a run in the sum of squares.
     rng = np.random.default_rng(5)
     slow = np.sin(0.5 * W0 * INTERVAL * np.arange(SAMPLES))
@@ -87,7 +87,7 @@ def test_what_a_model_lacks_shows_in_coloured_noise(correlation: float) -> None:
         assert found.chance_of(300 * density(correlation), 1) < 1e-6
 
 
-def test_a_gain_has_the_chance_that_noise_gives_it() -> None:
+def test_the_chance_of_a_gain_is_that_of_noise_alone() -> None:
     # What one number gains, the product with a column of unit length, squared, at the swing.
     rng = np.random.default_rng(8)
     for correlation in (0.0, 0.5):

@@ -16,8 +16,7 @@ from pendmap.comparison.data import split_records
 from pendmap.comparison.free import as_json as compared
 from pendmap.comparison.free import as_text as compared_text
 from pendmap.identification import identified_model, identify_experiment
-from pendmap.identification.methods.joint import as_fit_run
-from pendmap.identification.readings import reading_of
+from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Run
 from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text

@@ -5,19 +5,7 @@ fitted and those held back; ``replay`` runs a fitted model from a state; ``forec
 against the horizon, and those of periods and peaks.
 """
 
-from pendmap.comparison.data import DataSplit
 from pendmap.comparison.forced import Ensemble, ForcedComparison
-from pendmap.comparison.forecast import Cycles, Forecast, Gap
 from pendmap.comparison.free import Comparison, RunComparison, compare
 
-__all__ = [
-    "Comparison",
-    "Cycles",
-    "DataSplit",
-    "Ensemble",
-    "ForcedComparison",
-    "Forecast",
-    "Gap",
-    "RunComparison",
-    "compare",
-]
+__all__ = ["Comparison", "Ensemble", "ForcedComparison", "RunComparison", "compare"]

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.methods.joint import as_fit_run
-from pendmap.identification.readings import Reading, reading_of
+from pendmap.identification.readings import Reading, as_fit_run, reading_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +67,7 @@ class DataSplit:
     fitted_of: tuple[int, ...]  # Place in ``runs`` of each fitted record
     held_of: tuple[int, ...]  # Place in ``runs`` of each record held back
     # Whether stretches within fitted runs are held back, which the fitted motion passes through;
-    # else what is held back has initial states of its own.
+    # else the records held back have their own initial states.
     inside: bool
 
     @property
@@ -92,16 +91,6 @@ class DataSplit:
         doubts = np.array([self.readings[k].doubt for k in self.fitted_of])
         sizes = np.array([float(run.time.size) for run in self.fitted])
         return float(np.sqrt(np.sum((sizes * doubts) ** 2)) / np.sum(sizes))
-
-
-def counted(run: FitRun) -> NDArray[np.bool_]:
-    """Return which samples of a run count."""
-    return np.ones(run.time.shape, bool) if run.trusted is None else run.trusted
-
-
-def sigmas(run: FitRun) -> Floats:
-    """Return the standard error of each reading of a run, rad."""
-    return np.broadcast_to(np.asarray(run.sigma, np.float64), run.time.shape)
 
 
 def split_records(experiment: Experiment) -> DataSplit:
@@ -198,7 +187,7 @@ def _hold_stretches(
         if inside and run.forced:
             fitted.append(run)
             continue
-        good, sigma = counted(run), sigmas(run)
+        good = run.counted
         # Parts of the samples that count, not of the time at rest after them.
         samples = np.flatnonzero(good)
         back = np.zeros(good.shape, bool)
@@ -208,9 +197,12 @@ def _hold_stretches(
                 continue
             back[a:b] = good[a:b]
             if not inside:
-                time, theta, own = run.time[a:b], run.theta[a:b], sigma[a:b]
-                part = dataclasses.replace(run, time=time, theta=theta, sigma=own)
-                held.append(dataclasses.replace(part, trusted=good[a:b]))
+                time, theta = run.time[a:b], run.theta[a:b]
+                held.append(
+                    dataclasses.replace(
+                        run, time=time, theta=theta, sigma=run.sigmas[a:b], trusted=good[a:b]
+                    )
+                )
                 held_of.append(k)
         fitted.append(dataclasses.replace(run, trusted=good & ~back))
         if inside and back.any():
@@ -240,7 +232,7 @@ def average_blocks(run: FitRun) -> FitRun:
     """
     if run.count is not None:
         return run
-    weights = np.where(counted(run), sigmas(run) ** -2.0, 0.0)
+    weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
         found = _block_means(run.time, run.theta, weights, size)
         if _dense(*found[:3]):

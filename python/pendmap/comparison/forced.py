@@ -9,12 +9,21 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.comparison import steady
-from pendmap.comparison.ensemble import Simulated, Start, start_of
 from pendmap.comparison.itinerary import Itineraries, Ruler
-from pendmap.errors import MOST_SEED, InputError, check_number, check_whole
+from pendmap.errors import (
+    MOST_SEED,
+    FitDiverged,
+    InputError,
+    check_number,
+    check_whole,
+    core_errors,
+)
 from pendmap.identification.fit import fit_runs
-from pendmap.identification.methods.joint import as_angles, as_fit_run, reading_of_run
+from pendmap.identification.readings import as_angles, as_fit_run, reading_of_run
+from pendmap.identification.runs import bare_run, rig_of
+from pendmap.identification.sensitivity import window_slopes
 from pendmap.signal.robust import intervals_of
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,12 +31,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.formatting import Estimate
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
+    Simulated = Callable[[Floats, Floats, Floats], Floats]
 
 
 _AT_ONCE: Final = 4_000_000
@@ -46,6 +57,8 @@ _STATISTICS: Final = (
     ("greatest velocity", "rad/s", "fastest"),
 )
 """Name, unit and field of :class:`Itineraries` of each statistic."""
+_EXACTNESS: Final = 1e-9
+"""Integrator's error allowed a step."""
 _EVEN: Final = (2.5, 97.5)
 """Ends of the middle 95 %, percent."""
 
@@ -79,6 +92,68 @@ class Ensemble:
         if not 0 <= check_number("spread", self.spread) <= 1:
             raise InputError(f"spread must be a number from 0 to 1 rad, got {self.spread:g}")
         check_whole("seed", self.seed, 0, MOST_SEED)
+
+
+@dataclasses.dataclass(frozen=True)
+class Start:
+    """Initial state of a run, as a model estimates it from the first seconds."""
+
+    time: float  # s, on the run's clock
+    theta: float  # rad
+    velocity: float  # rad/s
+    covariance: Floats  # shape (2, 2), of both
+
+    @property
+    def stderr(self) -> tuple[float, float]:
+        """Standard errors, rad and rad/s."""
+        return tuple(np.sqrt(np.diag(self.covariance)).tolist())
+
+    def drawn(self, count: int, spread: float, w0: float, seed: int) -> tuple[Floats, Floats]:
+        """Draw starts about it, the first of them itself, shapes (count,).
+
+        They are normal with the covariance of the start plus ``spread^2`` in angle and ``(spread
+        w0)^2`` in velocity.
+        """
+        wide = self.covariance + np.diag([spread**2, (spread * w0) ** 2])
+        drawn = np.random.default_rng(seed).multivariate_normal(np.zeros(2), wide, count)
+        drawn[0] = 0.0
+        return self.theta + drawn[:, 0], self.velocity + drawn[:, 1]
+
+
+def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
+    """Return the state at the beginning of a run's first window, with its covariance.
+
+    ``fit`` is of this run alone, with its windows' states adapted.
+    """
+    first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
+    _, (window,) = window_slopes(first, [run], (), fit.model)
+    scale = np.array([1.0, fit.model.w0])
+    covariance = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
+    ((_, begin, _, theta, velocity),) = first.windows
+    return Start(float(run.time[begin]), theta, velocity, covariance * np.outer(scale, scale))
+
+
+def simulated_readings(
+    run: FitRun, model: Rig, starts: tuple[Floats, Floats], times: Floats, threads: int | None
+) -> Floats:
+    """Return readings of a model under the drive or pivot motion of a run, rad, shape (M, N).
+
+    M starts (rad, rad/s) at the first of N times (s, on the run's clock); readings are not wrapped,
+    and NaN after a motion left the range of numbers.
+    """
+    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+
+    units = Units(model.w0, si=True)
+    theta, velocity = starts
+    with core_errors(FitDiverged):
+        return _core.replay(
+            bare_run(run, rig_of(run, model), units),
+            np.ascontiguousarray(theta, dtype=np.float64),
+            np.ascontiguousarray(units.bare(velocity, 1), dtype=np.float64),
+            np.ascontiguousarray(units.bare(times, -1), dtype=np.float64),
+            _EXACTNESS,
+            threads or 0,
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -200,22 +275,27 @@ def compare_forced(
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
     own = Itineraries.of(measured[None], ruler)
     theta, velocity = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
-    simulated = Simulated(given, model, threads)
+
+    def simulated(theta: Floats, velocity: Floats, times: Floats) -> Floats:
+        return simulated_readings(given, model, (theta, velocity), times, threads)
+
     made, kept = _members(simulated, (theta, velocity), time, ruler, progress)
+    if not kept.any():
+        raise InputError(f"{run.name}: the model leaves the range of numbers from every start")
     theta, velocity = theta[kept], velocity[kept]
     statistics = tuple(
         Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
         for name, unit, key in _STATISTICS
     )
     place = _example(statistics)
-    reading = simulated.readings(theta[place, None], velocity[place, None], time)[0]
+    reading = simulated(theta[place, None], velocity[place, None], time)[0]
     found = None
     if period is not None and own.n[0]:
         closes, since = (int(own.n[0]), int(own.w[0])), time[0] + float(own.settled[0])
         starts = start.time, theta[:_FOLLOWED], velocity[:_FOLLOWED]
         found = steady.compared(
             steady.folded(time, measured, period, closes, since),
-            steady.reached(simulated, starts, period),
+            steady.reached(simulated, starts, period, model.c_over_m),
         )
     return ForcedComparison(
         run=run,
@@ -248,7 +328,7 @@ def _evenly(run: Run, worth: Reading, given: FitRun, begin: float) -> tuple[Floa
 
 
 def _members(
-    model: Simulated,
+    simulated: Simulated,
     starts: tuple[Floats, Floats],
     time: Floats,
     ruler: Ruler,
@@ -260,16 +340,12 @@ def _members(
     parts, kept = [], np.zeros(count, dtype=bool)
     for first in range(0, count, many):
         own = slice(first, first + many)
-        reading = model.readings(starts[0][own], starts[1][own], time)
+        reading = simulated(starts[0][own], starts[1][own], time)
         kept[own] = np.isfinite(reading).all(axis=1)
         noise = draw.normal(0.0, ruler.sigma, reading.shape)
         parts.append(Itineraries.of((reading + noise)[kept[own]], ruler))
         if progress is not None:
             progress(min(first + many, count), count)
-    if not kept.any():
-        raise InputError(
-            f"{model.run.name}: the model leaves the range of numbers from every start"
-        )
     return Itineraries.joined(parts), kept
 
 

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.data import counted, sigmas
 from pendmap.comparison.further import Reasons, compute_part
-from pendmap.comparison.replay import Motion, drive_of, fit_states, run_forward
+from pendmap.comparison.replay import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
@@ -79,14 +78,24 @@ class Forecast:
 
 @dataclasses.dataclass(frozen=True)
 class _Stretch:
-    """Consecutive readings held back, ``first`` to ``last`` of a run."""
+    """Consecutive readings held back of a run."""
 
     run: FitRun
     place: int  # Of the record in what is held back
-    held: Mask
+    held: Mask  # Readings held back
     good: Mask  # Readings that count, held back or not
-    first: int
-    last: int
+    earliest: float  # First time with a swing of readings before it, s
+    latest: float  # Last time, s
+
+
+@dataclasses.dataclass(frozen=True)
+class _Launch:
+    """Start of a forecast in a stretch."""
+
+    stretch: _Stretch
+    behind: Mask  # Readings of the swing before, to which the state is fitted
+    ahead: Mask  # Readings held back up to the horizon
+    bins: NDArray[np.int64]  # Bin of the horizon of each of these
 
 
 def compare_forecasts(
@@ -108,105 +117,78 @@ def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
     held, of = data.held[place], data.held_of[place]
     run = data.fitted[data.fitted_of.index(of)] if of in data.fitted_of else held
     back = np.zeros(run.time.shape, bool)
-    at = np.searchsorted(run.time, held.time)
-    back[at] = counted(held)
-    good = back | counted(run)
+    back[np.searchsorted(run.time, held.time)] = held.counted
+    good = back | run.counted
     samples = np.flatnonzero(back)
     if samples.size < FEWEST:
         return []
-    cuts = np.flatnonzero(np.diff(run.time[samples]) > swing) + 1
-    return [
-        _Stretch(run, place, back, good, int(part[0]), int(part[-1]))
-        for part in np.split(samples, cuts)
-    ]
-
-
-def _earliest(stretch: _Stretch, swing: float) -> float:
-    """Return the first time with a swing of readings before it."""
-    time = stretch.run.time
-    return max(float(time[stretch.first]), float(time[np.argmax(stretch.good)]) + swing)
+    begin = float(run.time[np.argmax(good)]) + swing
+    parts = np.split(samples, np.flatnonzero(np.diff(run.time[samples]) > swing) + 1)
+    ends = [(float(run.time[part[0]]), float(run.time[part[-1]])) for part in parts]
+    return [_Stretch(run, place, back, good, max(first, begin), last) for first, last in ends]
 
 
 def _forecast(
     kind: str, stretches: list[_Stretch], base: Fits, best: Fits, swing: float
 ) -> Forecast | None:
     """Return the errors of both models over all starts; None without a start."""
-    rooms = [float(s.run.time[s.last]) - _earliest(s, swing) for s in stretches]
-    rooms = [room for room in rooms if room > 0]
+    rooms = [s.latest - s.earliest for s in stretches if s.latest > s.earliest]
     if not rooms:
         return None
     reach = REACH * float(np.median(rooms))
-    starts = [(s, at) for s in stretches for at in _starts(s, reach, swing)]
-    if not starts:
-        return None
     count = int(np.clip(10 * reach / swing, 4, BINS))
-    which, floors = [], []
-    for stretch, at in starts:
-        ahead = stretch.run.time - at
-        counts = _ahead(stretch, at, reach)
-        bins = np.minimum((ahead[counts] / reach * count).astype(int), count - 1)
-        which.append((counts, bins))
-        noise = sigmas(stretch.run)[counts]
-        floors.append(float(np.mean(noise**2)) if counts.any() else math.nan)
-    before, after = (_errors(model, starts, which, reach, swing, count) for model in (base, best))
+    launches = [one for s in stretches for one in _launches(s, reach, swing, count)]
+    if not launches:
+        return None
+    noise = [one.stretch.run.sigmas[one.ahead] for one in launches]
+    floors = [float(np.mean(each**2)) if each.size else math.nan for each in noise]
+    before, after = (_errors(model, launches, swing, count) for model in (base, best))
     middles = (np.arange(count) + 0.5) * reach / count
     floor = math.sqrt(float(np.nanmean(floors)))
-    return Forecast(kind, middles, before, after, floor, len(starts))
+    return Forecast(kind, middles, before, after, floor, len(launches))
 
 
-def _starts(stretch: _Stretch, reach: float, swing: float) -> list[float]:
-    """Return the start times of forecasts in a stretch with enough readings before each."""
-    first = _earliest(stretch, swing)
-    room = float(stretch.run.time[stretch.last]) - reach - first
+def _launches(stretch: _Stretch, reach: float, swing: float, count: int) -> list[_Launch]:
+    """Return the starts of forecasts in a stretch with enough readings before each."""
+    room = stretch.latest - reach - stretch.earliest
     if room < 0:
         return []
-    count = min(STARTS, 1 + int(room / (swing / 2)))
-    times = np.linspace(first, first + room, count)
-    return [float(at) for at in times if np.count_nonzero(_behind(stretch, at, swing)) >= FEWEST]
+    starts = min(STARTS, 1 + int(room / (swing / 2)))
+    found = []
+    for at in np.linspace(stretch.earliest, stretch.earliest + room, starts):
+        later = stretch.run.time - at
+        behind = stretch.good & (later > -swing) & (later <= 0)
+        ahead = stretch.held & (later > 0) & (later <= reach)
+        bins = np.minimum((later[ahead] / reach * count).astype(np.int64), count - 1)
+        if np.count_nonzero(behind) >= FEWEST:
+            found.append(_Launch(stretch, behind, ahead, bins))
+    return found
 
 
-def _behind(stretch: _Stretch, at: float, swing: float) -> Mask:
-    time = stretch.run.time
-    return np.asarray(stretch.good & (time - at > -swing) & (time - at <= 0))
-
-
-def _ahead(stretch: _Stretch, at: float, reach: float) -> Mask:
-    ahead = stretch.run.time - at
-    return np.asarray(stretch.held & (ahead > 0) & (ahead <= reach))
-
-
-def _errors(  # noqa: PLR0913, PLR0917 (the model, the starts, how errors are binned)
-    model: Fits,
-    starts: list[tuple[_Stretch, float]],
-    which: list[tuple[Mask, NDArray[np.int64]]],
-    reach: float,
-    swing: float,
-    count: int,
-) -> Floats:
+def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> Floats:
     """Return the root mean square error in each bin, rad."""
     before, whole = [], []
-    for stretch, at in starts:
-        drive = drive_of(model.held, stretch.run, stretch.place)
-        run = dataclasses.replace(stretch.run, drive=drive)
-        behind = _behind(stretch, at, swing)
-        before.append(_samples(run, behind))
-        whole.append(_samples(run, behind | _ahead(stretch, at, reach)))
+    for one in launches:
+        drive = model.held.drive_of(one.stretch.run, one.stretch.place)
+        run = dataclasses.replace(one.stretch.run, drive=drive)
+        before.append(_samples(run, one.behind))
+        whole.append(_samples(run, one.behind | one.ahead))
     motion = Motion.of(model.fitted)
     states = fit_states(motion, before, [_guess(run, swing) for run in before])
     forecasts = run_forward(motion, whole, states)
     squares, samples = np.zeros(count), np.zeros(count)
-    for (stretch, _), (counts, bins), (readings, _) in zip(starts, which, forecasts, strict=True):
-        error = stretch.run.theta[counts] - readings[readings.size - bins.size :]
+    for one, (readings, _) in zip(launches, forecasts, strict=True):
+        error = one.stretch.run.theta[one.ahead] - readings[readings.size - one.bins.size :]
         error = np.angle(np.exp(1j * error))  # turns over the top do not count
-        squares += np.bincount(bins, error**2, count)
-        samples += np.bincount(bins, minlength=count)
+        squares += np.bincount(one.bins, error**2, count)
+        samples += np.bincount(one.bins, minlength=count)
     with np.errstate(invalid="ignore"):
         return np.sqrt(squares / np.where(samples > 0, samples, math.nan))
 
 
 def _samples(run: FitRun, kept: Mask) -> FitRun:
     """Return a run with some of its samples."""
-    sigma, time, theta = sigmas(run)[kept], run.time[kept], run.theta[kept]
+    sigma, time, theta = run.sigmas[kept], run.time[kept], run.theta[kept]
     return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=None)
 
 
@@ -249,21 +231,17 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     for held_out in (False, True):
         runs = data.held if held_out else data.fitted
         before, after = ((f.held if held_out else f.fitted) for f in (base, best))
-        own = [
-            RunGap(run.name, held_out, _floor(run), _rms([run], before, k), _rms([run], after, k))
+        squares = [np.square(run.sigmas[run.counted]) for run in runs]
+        noise = [float(np.sqrt(np.mean(each))) for each in squares]
+        rows += [
+            RunGap(run.name, held_out, noise[k], _rms([run], before, k), _rms([run], after, k))
             for k, run in enumerate(runs)
         ]
-        sizes = [int(counted(run).sum()) for run in runs]
-        squares = [size * row.noise_floor**2 for size, row in zip(sizes, own, strict=True)]
-        floors.append(math.sqrt(sum(squares) / sum(sizes)))
+        sizes = [each.size for each in squares]
+        total = sum(size * floor**2 for size, floor in zip(sizes, noise, strict=True))
+        floors.append(math.sqrt(total / sum(sizes)))
         rms += [_rms(runs, before), _rms(runs, after)]
-        rows += own
     return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
-
-
-def _floor(run: FitRun) -> float:
-    """Return the root mean square noise of a run's readings that count, rad."""
-    return float(np.sqrt(np.mean(np.square(sigmas(run)[counted(run)]))))
 
 
 def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
@@ -271,7 +249,7 @@ def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
     squares, count = 0.0, 0
     for k, run in enumerate(runs, start=first):
         residual = fit.residuals[k]
-        good = np.isfinite(residual) & counted(run)
+        good = np.isfinite(residual) & run.counted
         squares += float(np.sum(residual[good] ** 2))
         count += int(np.count_nonzero(good))
     return math.sqrt(squares / count) if count else math.nan

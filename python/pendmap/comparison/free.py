@@ -21,9 +21,9 @@ from pendmap.errors import (
 from pendmap.formatting import Estimate, Readable, counted, percent
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.joint import as_fit_run, reading_of_run
 from pendmap.identification.methods.trajectory import OFFSET
 from pendmap.identification.peaks import find_peaks
+from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
@@ -234,7 +234,7 @@ def _why_not(model: Rig, run: Run) -> str:
 def _compared(model: Rig, run: Run) -> RunComparison:
     reading = reading_of_run(run)
     given = as_fit_run(run, reading)
-    model = rig_of(given, model)  # whatever drives it elsewhere
+    model = rig_of(given, model)  # with the drive of the run
     fit = fit_runs([given], model, free=())
     peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
     estimates = {name: Estimate(getattr(model, name)) for name in ("w0", "c_over_m", "Tr")}

@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,8 +54,6 @@ class Ruler:
 
     def velocity(self, reading: Floats) -> Floats:
         """Return slopes of local cubics, rad/s, shape (..., N) as the readings."""
-        from scipy.signal import savgol_filter  # noqa: PLC0415 (scipy takes a while)
-
         half = max(round(_SWING * self.swing / self.tick), 2)
         width = min(2 * half + 1, (reading.shape[-1] - 1) // 2 * 2 + 1)
         if width <= _DEGREE:

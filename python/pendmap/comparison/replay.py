@@ -87,19 +87,6 @@ def fit_states(motion: Motion, runs: Sequence[FitRun], states: States) -> list[t
     return [(theta, velocity) for *_, theta, velocity in fit.windows]
 
 
-def drive_of(held: TrajectoryFit, run: FitRun, place: int) -> Mapping[str, float | None] | None:
-    """Return the drive of a run held back; an unknown phase is that of the fit."""
-    if run.drive is None or run.drive.get("phi") is not None:
-        return run.drive
-    return {**run.drive, "phi": _fitted_phase(held, place)}
-
-
-def _fitted_phase(fit: TrajectoryFit, place: int) -> float:
-    """Return the drive phase, rad, that a fit has for a run; 0 where it has none."""
-    names = (f"phi[{place}]", "phi")
-    return next((fit.estimates[n].value for n in names if n in fit.estimates), 0.0)
-
-
 def _fit_motion(
     motion: Motion, runs: Sequence[FitRun], states: States, *, steps: int
 ) -> TrajectoryFit:
@@ -140,9 +127,7 @@ def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -
     for k, run in enumerate(fitted):
         theta, velocity = fit.curves[k]
         known = np.flatnonzero(np.isfinite(theta))
-        phase = (run.drive or {}).get("phi")
-        phase = _fitted_phase(fit, k) if phase is None else phase
-        drive = run.drive and {**run.drive, "phi": phase}
+        drive = fit.drive_of(run, k)
         for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
             time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # the fewest times of a record
             runs.append(
@@ -151,21 +136,15 @@ def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -
                 )
             )
             states.append((float(theta[at]), float(velocity[at])))
-    values = effect_action(Motion.of(fit), effect, runs, states, step)
-    torque, reading = ((float(np.sqrt(np.mean(x**2))), float(np.abs(x).max())) for x in values)
-    return Strength(*torque, *reading)
-
-
-def effect_action(
-    motion: Motion, effect: str, runs: Sequence[FitRun], states: States, step: float
-) -> tuple[Floats, Floats]:
-    """Return an effect's torque, rad/s^2, and addition to the reading, rad, where runs start.
-
-    Each run lasts ``step``, s.
-    """
+    motion = Motion.of(fit)
     with_it = run_forward(motion, runs, states)
     without = run_forward(motion.without(effect), runs, states)
     pairs = list(zip(with_it, without, strict=True))
     torque = np.array([(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in pairs])
     reading = np.array([a[0] - b[0] for (a, _), (b, _) in pairs])
-    return torque, reading
+    return Strength(
+        float(np.sqrt(np.mean(torque**2))),
+        float(np.abs(torque).max()),
+        float(np.sqrt(np.mean(reading**2))),
+        float(np.abs(reading).max()),
+    )

@@ -7,14 +7,15 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pendmap.analysis.regimes import kind_of
 from pendmap.comparison.itinerary import LONGEST
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Callable
 
-    from pendmap.comparison.ensemble import Simulated
+    from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
@@ -150,8 +151,6 @@ def folded(
     ``time`` is on the drive's clock; ``closes`` are ``n`` and ``w`` of the cycle, ``since`` (s) is
     when it begins to repeat itself.
     """
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (scipy takes a while)
-
     n, w = closes
     length = n * period
     first = math.ceil(since / period)
@@ -172,18 +171,22 @@ def folded(
 
 
 def reached(
-    model: Simulated, starts: tuple[float, Floats, Floats], period: float
+    simulated: Callable[[Floats, Floats, Floats], Floats],
+    starts: tuple[float, Floats, Floats],
+    period: float,
+    damping: float,
 ) -> tuple[Reached, ...]:
     """Return the cycles that a model ends on, the most frequent first.
 
-    ``starts`` are a time on the run's clock (s), and angles and velocities then (rad, rad/s).
+    ``simulated`` returns readings from angles and velocities (rad, rad/s) at times (s); ``starts``
+    are a time on the run's clock, and angles and velocities then; ``damping`` is ``c/m``, 1/s.
     """
     begin, theta, velocity = starts
-    rate = 0.5 * model.model.c_over_m * period
+    rate = 0.5 * damping * period
     periods = min(max(_DECAY / rate if rate else math.inf, _FOLLOWED[0]), _FOLLOWED[1])
     first = math.ceil(begin / period) + math.ceil(periods)
     times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
-    readings = model.readings(theta, velocity, np.concatenate([[begin], times]))
+    readings = simulated(theta, velocity, np.concatenate([[begin], times]))
     groups: list[tuple[Cycle, int]] = []
     for row in readings[:, 1:]:
         cycle = _closed(row, period)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.data import counted
 from pendmap.diagnosis.candidates import CORE, Candidate
 from pendmap.diagnosis.fitted_model import (
     GENTLE,
@@ -176,7 +175,7 @@ def _start(data: DataSplit) -> Rig:
     free = [(run, k) for run, k in zip(data.fitted, data.fitted_of, strict=True)]
     free = [(run, k) for run, k in free if not run.forced]
     for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
-        good = counted(run)
+        good = run.counted
         rough = rough_start(run.time[good], run.theta[good], data.readings[k].sigma)
         if rough is not None:
             return Rig(
@@ -199,7 +198,7 @@ def _other_starts(data: DataSplit) -> list[Rig]:
     for run, k in zip(data.fitted, data.fitted_of, strict=True):
         if run.forced:
             continue
-        good = counted(run)
+        good = run.counted
         try:
             begin = starting_values(run.time[good], run.theta[good], sigma=data.readings[k].sigma)
         except InputError:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.comparison.data import counted, sigmas
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
@@ -340,8 +339,8 @@ def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
     """
     errors = []
     for run, residual, of in zip(data.fitted, fitted.fit.residuals, data.fitted_of, strict=True):
-        good = np.isfinite(residual) & counted(run)
-        sigma = sigmas(run)[good]
+        good = np.isfinite(residual) & run.counted
+        sigma = run.sigmas[good]
         if run.count is not None:
             sigma = np.hypot(sigma, run.count / math.sqrt(12))
         squares = residual[good] ** 2

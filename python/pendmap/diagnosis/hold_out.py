@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.data import counted
 from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
@@ -88,7 +87,7 @@ def hold_out_losses(
         return (whole - fitted.chi2,)
     windows, back = fitted.fit.windows, dict(zip(data.held_of, data.held, strict=True))
     runs = tuple(
-        dataclasses.replace(run, trusted=counted(run) | counted(back[of])) if of in back else run
+        dataclasses.replace(run, trusted=run.counted | back[of].counted) if of in back else run
         for run, of in zip(data.fitted, data.fitted_of, strict=True)
     )
     whole = _chi2(runs, fitted, windows, level)
@@ -102,7 +101,7 @@ def _less_a_fold(run: FitRun, fold: int) -> FitRun:
     """Return a free run without two of ten stretches of its readings, half the run apart."""
     if run.forced:
         return run
-    kept = counted(run).copy()
+    kept = run.counted.copy()
     samples = np.flatnonzero(kept)
     stretch = np.arange(samples.size) * 2 * FOLDS // max(samples.size, 1)
     kept[samples[stretch % FOLDS == fold]] = False
@@ -113,7 +112,7 @@ def _less_a_third(run: FitRun, *, first: bool) -> FitRun:
     """Return a free run without the first or the last third of its readings."""
     if run.forced:
         return run
-    kept = counted(run).copy()
+    kept = run.counted.copy()
     samples = np.flatnonzero(kept)
     cut = int(samples[samples.size // 3 if first else -(samples.size // 3) - 1])
     kept[slice(0, cut) if first else slice(cut, None)] = False

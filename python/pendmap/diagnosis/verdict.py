@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.comparison.data import counted
 from pendmap.diagnosis.candidates import count_choices
 from pendmap.diagnosis.scores import CONTAINS
 from pendmap.diagnosis.search import fit_alternatives
@@ -138,7 +137,7 @@ def _by_part(fitted: FittedModel) -> np.ndarray:
     """Return the sum of squares of each run, or of each third of a single one."""
     sums = []
     for run, white in zip(fitted.runs, fitted.fit.white, strict=True):
-        sums.append(white[np.isfinite(white) & counted(run)] ** 2)
+        sums.append(white[np.isfinite(white) & run.counted] ** 2)
     parts = sums if len(sums) > 1 else np.array_split(sums[0], THIRDS)
     return np.array([float(np.sum(part)) for part in parts])
 

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import median_filter
 from scipy.special import ellipk
 
 from pendmap.identification.swing_fit import Windows, fit_swings
-from pendmap.identification.turning import End, Outline, median_of_five, outline, stop, zigzags
+from pendmap.identification.turning import End, Outline, outline, stop, zigzags
 from pendmap.records.resolution import levels_shared, step_of
 from pendmap.signal.half_cycles import after_turns
 
@@ -54,7 +55,7 @@ def is_coarse(time: Floats, theta: Floats) -> bool:
     if raw is None or 2 * math.pi / raw >= COARSE * float(np.median(np.diff(time))):
         return False
     # The median removes single spikes; it also removes quick swings, or makes them slower.
-    calm = _natural(time, median_of_five(theta))
+    calm = _natural(time, median_filter(theta, 5, mode="nearest"))
     return calm is None or calm > 0.6 * raw
 
 
@@ -112,11 +113,6 @@ class CoarseFinder:
                 self.sigma = max(self._turns(None)[0].sigma, least)
         self._follow(self.sigma)
 
-    @property
-    def swings(self) -> bool:
-        """Whether the record turns twice or more."""
-        return self.course is not None
-
     def _follow(self, sigma: float) -> None:
         """Outline the curve; the mean over its points has no less noise than a sample."""
         t, x = self.fine
@@ -160,12 +156,9 @@ class CoarseFinder:
         form = np.tile([self.w0**2, 0.01 * self.w0, 0.0, zero], (at.size, 1))
         return fit_swings(windows, (at, size, form), sigma=sigma), begins, held
 
-    def found(self) -> list[End]:
-        """Return all peaks, in order of time."""
-        return list(self._found)
-
     @functools.cached_property
-    def _found(self) -> list[End]:
+    def ends(self) -> list[End]:
+        """All peaks, in order of time."""
         if self.course is None:
             return []
         fit, begins, held = self._turns(self.sigma)
@@ -205,12 +198,10 @@ class CoarseFinder:
         near = np.abs(self.time - instant) <= max(math.pi / 2 / self.w0, 2 * self.step)
         return levels_shared(self.theta[near], self.count)
 
-    def crossings(
-        self, ends: list[End], index: NDArray[np.int64]
-    ) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    def crossings(self, index: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """Return instants of zero angle between peaks, errors and half cycles."""
         spans, at, speed, half, rows = [], [], [], [], []
-        pairs = zip(itertools.pairwise(ends), index[:-1], self.rows, strict=False)
+        pairs = zip(itertools.pairwise(self.ends), index[:-1], self.rows, strict=False)
         for (before, after), k, row in pairs:
             if after.kind == "stop" or before.angle * after.angle >= 0:
                 continue
@@ -231,7 +222,8 @@ class CoarseFinder:
             rows.append(row)
         if not spans:
             return np.empty(0), np.empty(0), np.empty(0, np.int64)
-        known = self.fit.rows(rows)
+        of_form = ("form", "form_covariance", "factor")
+        known = dataclasses.replace(self.fit, **{n: getattr(self.fit, n)[rows] for n in of_form})
         windows = Windows.around(
             (self.time, self.theta), spans, np.sign(speed).tolist(), crossing=True
         )

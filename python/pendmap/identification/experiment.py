@@ -12,11 +12,17 @@ from pendmap.errors import FitDiverged, InputError, check_callable, check_type, 
 from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.joint import JointFit, as_fit_run, fit_together
 from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
-from pendmap.identification.methods.trajectory import OFFSET, TooShortError, identification_of
+from pendmap.identification.methods.trajectory import (
+    OFFSET,
+    JointFit,
+    TooShortError,
+    fit_together,
+    identification_of,
+)
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
+from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
 from pendmap.identification.table1 import table_of, table_of_run
 from pendmap.model import Rig

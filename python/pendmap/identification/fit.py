@@ -62,6 +62,13 @@ class TrajectoryFit:
         """Return the value of one estimate."""
         return self.estimates[name].value
 
+    def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
+        """Return a run's drive; an unknown phase is that fitted for the run at this place, or 0."""
+        if run.drive is None or run.drive.get("phi") is not None:
+            return run.drive
+        names = (f"phi[{place}]", "phi")
+        return {**run.drive, "phi": next((self[n] for n in names if n in self.estimates), 0.0)}
+
 
 def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     runs: Sequence[FitRun],
@@ -70,7 +77,6 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     *,
     start: Mapping[str, float] | None = None,
     profiled: Sequence[str] | None = None,
-    shortest_s: float | None = None,
     windows: Sequence[tuple[int, int, int, float, float]] | None = None,
     sigma_doubt: float = 0.0,
     hold: bool = False,
@@ -84,7 +90,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free parameters
     and an initial state for each window (Bock 1983, Progress in Scientific Computing 2, 95); where
     readings are intervals, ``-2 log P`` of them stands for the square. Windows begin with about one
-    swing (``shortest_s``) and grow by ``growth`` from stage to stage, to the whole record of a free
+    swing and grow by ``growth`` from stage to stage, to the whole record of a free
     decay; ``windows`` of a former fit make one stage. Intervals are those of Venzon & Moolgavkar
     (1988), Applied Statistics 37, 87, for the names in ``profiled``, by default all.
 
@@ -98,15 +104,13 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
-    units = Units(model.w0, si=True)
-    unknown, given = prepared(runs, model, free, start or {}, units)
-    names = unknown.names
+    unknown, given = prepared(runs, model, free, start or {})
+    names, units = unknown.names, unknown.units
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
-    swing = math.tau / model.w0
     choices = {
         "tolerance": tolerance_of(runs),
-        "shortest": units.w0 * (swing if shortest_s is None else shortest_s),
+        "shortest": units.w0 * (math.tau / model.w0),
         "growth": growth,
         "steps": steps,
         "gain": least_gain,
@@ -122,49 +126,13 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     return _result(found, model, unknown, chosen)
 
 
-def score(
-    fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what candidate parameters would gain, without fitting them (the score test).
-
-    ``model`` is that of the fit with the candidates' effects, at the values where they are scored:
-    0 for a size. Returned are ``pull``, shape (k,), half of the slope of the sum of squares by each
-    candidate, fitted parameters and states following, and ``information``, shape (k, k), half of
-    its curvature: candidate ``i`` alone gains ``pull[i]**2 / information[i, i]``, with the size
-    ``pull[i] / information[i, i]`` in SI; sets of candidates likewise.
-    """
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
-
-    units = Units(model.w0, si=True)
-    base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
-    start = {name: fit.estimates[name].value for name in fit.names}
-    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    with core_errors(FitDiverged):
-        windows = bare_windows(fit.windows, units)
-        at = _core.fit_equations(given, unknown.start, tolerance_of(runs), windows)
-    pull = unknown.columns(at.pull[None], at.values)[0]
-    information = unknown.columns(unknown.columns(at.information, at.values).T, at.values)
-    new = np.array([name not in fit.estimates for name in unknown.names])
-    old = ~new
-    through = information[np.ix_(new, old)] @ np.linalg.pinv(
-        information[np.ix_(old, old)], hermitian=True
-    )
-    return (
-        pull[new] - through @ pull[old],
-        information[np.ix_(new, new)] - through @ information[np.ix_(old, new)],
-    )
-
-
 def prepared(
-    runs: Sequence[FitRun],
-    model: Rig,
-    free: Sequence[str],
-    start: Mapping[str, float],
-    units: Units,
+    runs: Sequence[FitRun], model: Rig, free: Sequence[str], start: Mapping[str, float]
 ) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs as the core takes them."""
     if not runs:
         raise InputError("runs must hold one record or more, got none")
+    units = Units(model.w0, si=True)
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
     return Conversion(free_quantities(runs, rigs, free, start), units), given
@@ -256,9 +224,7 @@ FAR: Final = 1.0
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:
     """Refuse a fit in which the residual of a run is as large as its motion."""
     for run, residual in zip(runs, fit.residuals, strict=True):
-        counted = np.isfinite(residual)
-        if run.trusted is not None:
-            counted &= run.trusted
+        counted = np.isfinite(residual) & run.counted
         if not counted.any():
             continue
         rms = float(np.sqrt(np.mean(residual[counted] ** 2)))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
-from pendmap.model.quantities import COUNTERPARTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,22 +17,21 @@ if TYPE_CHECKING:
 
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-    from pendmap.model.effects import Effect
     from pendmap.units import Units
 
     Floats = NDArray[np.float64]
 
 
-PLACES: Final[Mapping[str, str]] = {
-    "w0": "gravity",
-    "c_over_m": "gamma",
-    "Tr": "theta_r",
-    "torque": "torque",
-    "p": "p",
-    "Omega": "omega",
-    "phi": "phase",
+PLACES: Final[Mapping[str, tuple[str, float]]] = {
+    "w0": ("gravity", 1),
+    "c_over_m": ("gamma", 1),
+    "Tr": ("theta_r", 2),
+    "torque": ("torque", 2),
+    "p": ("p", 0),
+    "Omega": ("omega", 1),
+    "phi": ("phase", 0),
 }
-"""Names in the core of a rig's parameters; those of effects have one name in both."""
+"""Name in the core of each parameter of a rig, and the power of ``w0`` of its SI value."""
 
 SENSOR: Final = ("bias", "tilt")
 """Parameters of a sensor on the rod, run by run: they are always fitted."""
@@ -53,11 +51,6 @@ class Quantity:
     unit: float = 1.0  # further factor of the SI value
     less: str | None = None  # free parameter whose value is subtracted from the power
 
-    @property
-    def is_w0(self) -> bool:
-        """Whether it is ``w0``, in the core a factor on gravity."""
-        return self.name == "w0"
-
 
 def free_quantities(
     runs: Sequence[FitRun],
@@ -67,89 +60,59 @@ def free_quantities(
 ) -> list[Quantity]:
     """Return the free parameters of runs whose rigs are given.
 
-    ``free`` has names as of :func:`pendmap.identification.fit.fit_runs`; a phase that a run does
-    not know is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
+    ``free`` has names like those of :func:`pendmap.identification.fit.fit_runs`; the unknown phase
+    of a run is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
     values that replace the rigs'.
     """
     names = list(dict.fromkeys(free))
-    known = f"{', '.join(PLACES)} and effect.parameter of the model's effects"
-    quantities = []
-
-    def add(
-        name: str,
-        places: list[tuple[int, str]],
-        power: float = 0,
-        unit: float = 1.0,
-        less: str | None = None,
-    ) -> None:
-        begin = start.get(name.partition("[")[0], _value_of(name, rigs[places[0][0]]))
-        quantities.append(Quantity(name, power, places, start.get(name, begin), unit, less))
-
     of_run = [f"[{k}]" if len(runs) > 1 else "" for k in range(len(runs))]
+    wanted: list[tuple[str, str, Sequence[int]]] = []
     for name in names:
         if name in PER_RUN:
             driven = [k for k, run in enumerate(runs) if run.drive is not None]
-            parts = [(name + of_run[k], [k]) for k in driven]
+            wanted += [(name, of_run[k], [k]) for k in driven]
         else:
-            parts = [(name, list(range(len(runs))))]
-        for own, where in parts:
-            places = [(k, place) for k in where if (place := _place_of(name, rigs[k])) is not None]
-            if not places:
-                raise InputError(f"free must be among {known}, got {short_repr(name)}")
-            power, less = _power_of(name, rigs[places[0][0]], names)
-            add(own, places, power, less=less)
-    unknown = [k for k, run in enumerate(runs) if run.drive and run.drive.get("phi") is None]
-    for k in unknown if "phi" not in names else []:
-        add("phi" + of_run[k], [(k, PLACES["phi"])])
-    sensors = [(k, run.rod_sensor) for k, run in enumerate(runs) if run.rod_sensor is not None]
-    for k, sensor in sensors:
-        add("bias" + of_run[k], [(k, "bias")], unit=sensor.unit)
-        if sensor.leans:
-            add("tilt" + of_run[k], [(k, "tilt")])
+            wanted.append((name, "", range(len(runs))))
+    if "phi" not in names:
+        unknown = [k for k, run in enumerate(runs) if run.drive and run.drive.get("phi") is None]
+        wanted += [("phi", of_run[k], [k]) for k in unknown]
+    quantities = []
+    for name, suffix, where in wanted:
+        found = {k: each for k in where if (each := _found_in(rigs[k], name, names)) is not None}
+        if not found:
+            known = f"{', '.join(PLACES)} and effect.parameter of the model's effects"
+            raise InputError(f"free must be among {known}, got {short_repr(name)}")
+        _, power, less, value = next(iter(found.values()))
+        begin = start.get(name + suffix, start.get(name, value))
+        places = [(k, place) for k, (place, *_) in found.items()]
+        quantities.append(Quantity(name + suffix, power, places, begin, less=less))
+    for k, run in enumerate(runs):
+        if run.rod_sensor is None:
+            continue
+        units = {"bias": run.rod_sensor.unit, "tilt": 1.0}
+        for name in SENSOR if run.rod_sensor.leans else SENSOR[:1]:
+            begin = start.get(name + of_run[k], start.get(name, 0.0))
+            quantities.append(Quantity(name + of_run[k], 0, [(k, name)], begin, units[name]))
     return quantities
 
 
-def _effect(name: str, rig: Rig) -> tuple[Effect, str] | None:
-    """Return the effect and the parameter of ``effect.parameter``."""
-    effect_name, _, parameter = name.rpartition(".")
-    for effect in rig.effects:
-        if effect.name == effect_name and parameter in effect.parameters:
-            return effect, parameter
-    return None
-
-
-def _place_of(name: str, rig: Rig) -> str | None:
-    return PLACES.get(name, None if _effect(name, rig) is None else name)
-
-
-def _power_of(name: str, rig: Rig, free: Sequence[str]) -> tuple[float, str | None]:
-    """Return a parameter's power of ``w0``, and the free exponent subtracted from it, if any."""
-    if name == "w0":
-        return 1, None
-    own = dict(COUNTERPARTS.values())
-    if name in own:
-        return own[name], None
-    found = _effect(name, rig)
-    if found is None:
-        raise InputError(f"free has {short_repr(name)}: the model has no such effect")
-    effect, parameter = found
-    entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
-    less = entry["power_of_w0_less"]
-    if less is None:
-        return float(entry["power_of_w0"]), None
-    if f"{effect.name}.{less}" in free:
-        return float(entry["power_of_w0"]), f"{effect.name}.{less}"
-    return float(entry["power_of_w0"] - effect.parameters[less]), None
-
-
-def _value_of(name: str, rig: Rig) -> float:
-    name = name.partition("[")[0]
-    if name in SENSOR:
-        return 0.0
+def _found_in(
+    rig: Rig, name: str, free: Sequence[str]
+) -> tuple[str, float, str | None, float] | None:
+    """Return a parameter's name in the core, power of ``w0``, exponent subtracted and value."""
     if name in PLACES:
-        return float(getattr(rig, name))
-    found = _effect(name, rig)
-    return math.nan if found is None else found[0].parameters[found[1]]
+        return *PLACES[name], None, float(getattr(rig, name))
+    own, _, parameter = name.rpartition(".")
+    effects = (e for e in rig.effects if e.name == own and parameter in e.parameters)
+    effect = next(effects, None)
+    if effect is None:
+        return None
+    entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
+    power, less = float(entry["power_of_w0"]), entry["power_of_w0_less"]
+    exponent = None if less is None else f"{own}.{less}"
+    if less is not None and exponent not in free:
+        power, exponent = power - effect.parameters[less], None
+    return name, power, exponent, effect.parameters[parameter]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,7 +139,7 @@ class Conversion:
         starts = [q.start for q in self.quantities]
         scales = self._scales(starts)
         return [
-            (q.places, (q.start / self.units.w0) ** 2 if q.is_w0 else q.start / scale)
+            (q.places, (q.start / self.units.w0) ** 2 if q.name == "w0" else q.start / scale)
             for q, scale in zip(self.quantities, scales, strict=True)
         ]
 
@@ -184,7 +147,7 @@ class Conversion:
         """Return in SI the core's ``values``, shape (k,)."""
         bare = np.asarray(values, np.float64)
         roots = np.sqrt(np.where(bare > 0, bare, np.nan))
-        first = np.array([q.is_w0 for q in self.quantities], bool)
+        first = np.array([q.name == "w0" for q in self.quantities], bool)
         return np.where(first, self.units.w0 * roots, self._scales(bare) * bare)
 
     def jacobian(self, values: ArrayLike) -> Floats:
@@ -192,7 +155,7 @@ class Conversion:
         given = self.given(values)
         slopes = self._scales(values)
         for k, q in enumerate(self.quantities):
-            if q.is_w0:
+            if q.name == "w0":
                 slopes[k] = self.units.w0**2 / (2 * given[k])
         found = np.diag(slopes)
         for size, exponent in self._exponents.items():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -49,8 +51,9 @@ class Finder:
         self.step = float(np.median(np.diff(time)))
         self.bottom, self.top = float(theta.min()), float(theta.max())
 
-    def found(self) -> list[End]:
-        """Return all peaks, in order of time."""
+    @functools.cached_property
+    def ends(self) -> list[End]:
+        """All peaks, in order of time."""
         turns = [int(k) for k in self.course.turns]
         scale = self.w0, self.window(float(self.theta[0]))
         begin = release(self.time, self.theta, self.sigma, scale, self.course)
@@ -106,23 +109,14 @@ class Finder:
                 break
         if fit is None:
             return None
-        end = self._end(fit, time)
-        # An error of the instant above the width of the window: there is no turn.
-        return end if end.stderr_time <= 2 * fit.half else None
-
-    def _end(self, fit: WindowFit, time: float) -> End:
         (value, gain), (_, slope_gain), (bend, _) = (fit.at(time, j) for j in range(3))
-        sigma = self._effective(fit)
-        bend = bend or math.inf
+        sigma, bend = self._effective(fit), bend or math.inf
         slope = slope_gain * sigma
-        return End(
-            time,
-            value + slope**2 / (2 * bend),
-            slope / abs(bend),
-            gain * sigma,
-            "turn",
-            fit.half,
-        )
+        stderr = slope / abs(bend)
+        # An error of the instant above the width of the window: there is no turn.
+        if not stderr <= 2 * fit.half:
+            return None
+        return End(time, value + slope**2 / (2 * bend), stderr, gain * sigma, "turn", fit.half)
 
     def _effective(self, fit: WindowFit) -> float:
         """Return the noise of a sample, where samples share errors of the count."""
@@ -151,12 +145,10 @@ class Finder:
         first, last = np.searchsorted(self.time, (begin, end))
         return slice(int(first), int(last))
 
-    def crossings(
-        self, ends: list[End], index: NDArray[np.int64]
-    ) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    def crossings(self, index: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """Return instants of zero angle between two peaks, their errors and half cycles."""
         found = []
-        for before, after, k in zip(ends, ends[1:], index, strict=False):
+        for (before, after), k in zip(itertools.pairwise(self.ends), index[:-1], strict=True):
             if after.kind == "stop" or before.angle * after.angle >= 0:
                 continue
             inside = self._between(before.time, after.time)

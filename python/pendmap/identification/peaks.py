@@ -195,9 +195,9 @@ def find_peaks(
     if finder is None:
         none = np.empty(0)
         return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
-    ends = finder.found()
+    ends = finder.ends
     index = _numbered(ends, finder.w0)
-    crossings = finder.crossings(ends, index)
+    crossings = finder.crossings(index)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
     instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
     found = Peaks(
@@ -221,7 +221,7 @@ def _finder(
     """Return a finder that suits the sampling, None without swings; and the noise."""
     if is_coarse(time, theta):
         coarse = coarse_finder(time, theta, sigma)
-        return (coarse if coarse.swings else None), coarse.sigma
+        return (None if coarse.course is None else coarse), coarse.sigma
     reading = reading_of(time, theta, sigma)
     course = outline(time, theta, reading.sigma)
     return (None if course is None else Finder(time, theta, reading, course)), reading.sigma

@@ -1,4 +1,4 @@
-"""Standard errors of readings: the noise as estimated without a model, and the sensor's counts."""
+"""Runs as a fit takes them: readings and their standard errors, estimated without a model."""
 
 from __future__ import annotations
 
@@ -9,18 +9,25 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.identification.coarse_finder import coarse_finder, is_coarse
+from pendmap.identification.runs import FitRun, Pivot, RodSensor
 from pendmap.records.noise import noise_of
 from pendmap.records.resolution import step_of
+from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pendmap.records import Run
     from pendmap.records.jitter import SpeedLaw
 
 
 DITHERED: Final = 0.45
 """Noise (rounding included) over the count below which a fit takes readings for intervals. Below,
 the errors of successive readings are no longer independent."""
+
+
+QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
+"""Quantity that a recorded motion of the pivot has, by its unit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,3 +89,59 @@ def reading_of(
         return Reading(sigma, count, each, doubt, coarse, alike)
     each = np.maximum(law.sigma(time, theta), least)
     return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
+
+
+def as_fit_run(run: Run, reading: Reading) -> FitRun:
+    """Return a run as the fit takes it.
+
+    Times count from the first sample; under a drive from 0, for its phase.
+    """
+    time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
+    pivot = None
+    if run.pivot is not None:
+        quantity = QUANTITIES[run.pivot_unit or "m/s2"]
+        pivot = Pivot(
+            time, run.pivot.get("vertical"), run.pivot.get("horizontal"), quantity=quantity
+        )
+    return FitRun(
+        time,
+        as_angles(run) - reading.shift,
+        reading.each,
+        trusted=run.trusted,
+        drive=run.drive,
+        pivot=pivot,
+        lab_time_s=run.lab_time_s + first,
+        name=run.name,
+        rod_sensor=_rod_sensor(run),
+        count=reading.interval,
+    )
+
+
+def as_angles(run: Run) -> NDArray[np.float64]:
+    """Return a run's angles; of a sensor on the rod the readings over the gain of small swings."""
+    return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
+
+
+def reading_of_run(run: Run) -> Reading:
+    """Return the standard errors of a run's readings; see :func:`reading_of`."""
+    time, sensor = from_first(run.time)[0], run.rod_sensor
+    if sensor is None:
+        return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
+    found = reading_of(time, as_angles(run), trusted=run.trusted)
+    law = found.law
+    if law is not None and run.gyroscope is not None:
+        # The error of a late reading of a rate is proportional to the acceleration.
+        law = dataclasses.replace(law, grows_with="acceleration")
+    return dataclasses.replace(found, law=law, gain=abs(sensor.gain), unit=sensor.unit)
+
+
+def _rod_sensor(run: Run) -> RodSensor | None:
+    if run.gyroscope is not None:
+        gain = run.gyroscope.gain
+        return RodSensor(run.theta, rate=1 / gain, unit=gain, leans=False)
+    sensor = run.accelerometer
+    if sensor is None:
+        return None
+    place, gravity = sensor.distance_m / sensor.gain, sensor.gravity / sensor.gain
+    leans = sensor.direction != "angular"
+    return RodSensor(run.theta, place=place, gravity=gravity, unit=sensor.gain, leans=leans)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from pendmap.identification.methods.base import Identification
-    from pendmap.identification.methods.joint import JointFit
+    from pendmap.identification.methods.trajectory import JointFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import Table1
     from pendmap.model import Rig
@@ -36,6 +36,9 @@ COLUMNS: Final = {
 
 STILL: Final = "in which nothing moves"
 """Description of a run without motion."""
+
+PEAKS: Final = "of peaks alone"
+"""Description of a run of turning points."""
 
 COPY: Final = "that copies another"
 """Description of a run whose readings count in another one."""
@@ -72,8 +75,7 @@ class IdentificationReport(Readable):
     with_drag: JointFit | None = None
 
     def __repr__(self) -> str:
-        sound = (found.short for found in self.methods.values() if found.sound)
-        best = next(sound, "no method gives a model")
+        best = "no method gives a model" if self.sound is None else self.sound.short
         more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
         return f"<IdentificationReport {self.run.name}: {best}{more}>"
 
@@ -83,14 +85,15 @@ class IdentificationReport(Readable):
         return tables, list(as_text(self))
 
     @property
-    def best(self) -> Identification:
-        """First method that could be applied and whose search converged.
+    def sound(self) -> Identification | None:
+        """First method that could be applied and whose search converged; None without."""
+        return next((found for found in self.methods.values() if found.sound), None)
 
-        InputError is raised if there is none.
-        """
-        for found in self.methods.values():
-            if found.sound:
-                return found
+    @property
+    def best(self) -> Identification:
+        """Method of :attr:`sound`; InputError is raised if there is none."""
+        if self.sound is not None:
+            return self.sound
         lost = [name for name, found in self.methods.items() if not found.converged]
         if lost:
             raise InputError(
@@ -109,10 +112,10 @@ class IdentificationReport(Readable):
     def passed_over(self) -> str:
         """The better method that the best one replaces, and why; else empty."""
         first = next(iter(self.methods.values()))
-        if first.sound or not any(found.sound for found in self.methods.values()):
+        if first.sound or self.sound is None:
             return ""
         why = "cannot be applied" if first.converged else "did not converge"
-        return f"{first.method} {why}: the model is that of {self.best.method}"
+        return f"{first.method} {why}: the model is that of {self.sound.method}"
 
     @property
     def model(self) -> Rig:
@@ -126,38 +129,40 @@ class IdentificationReport(Readable):
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return how many runs of an experiment were read and which were not; empty if all were."""
     reasons: dict[str, int] = {}
+    held_too = any(each.hold_out for each in read)
     for run in experiment.runs:
         if any(run is each for each in read):
             continue
-        # Where runs held out are read too, being held out is no reason for a forced run.
-        held = run.hold_out and (run.kind == "free" or not any(each.hold_out for each in read))
-        why = "held out" if held else "forced"
-        if run.kind == "free" and not run.hold_out:
-            why = "of peaks alone" if run.peaks_only else "shorter" if run.moves else STILL
-        elif run.kind == "free" and not run.moves:
-            why = STILL
-        elif run.kind == "free" and run.peaks_only and any(each.hold_out for each in read):
-            why = "of peaks alone"
         if run.copied:
             why = COPY
+        elif run.kind == "forced":
+            # Where runs held out are read too, being held out is no reason.
+            why = "held out" if run.hold_out and not held_too else "forced"
+        elif run.peaks_only and not run.hold_out:
+            why = PEAKS
+        elif not run.moves:
+            why = STILL
+        elif not run.hold_out:
+            why = "shorter"
+        else:
+            why = PEAKS if run.peaks_only and held_too else "held out"
         reasons[why] = reasons.get(why, 0) + 1
     if not reasons:
         return ""
-    first, *others = (
+    parts = [
         f"{counted(n, 'run')} {why}"
-        if why in {"held out", "of peaks alone", STILL, COPY}
+        if why in {"held out", PEAKS, STILL, COPY}
         else counted(n, f"{why} run")
         for why, n in reasons.items()
-    )
-    last = f" and {others.pop()}" if others else ""
-    words = ", ".join([first, *others]) + last
+    ]
+    words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
     verb = "is" if sum(reasons.values()) == 1 else "are"
     return f"{counted(len(read), 'run')} read; {words} {verb} not used"
 
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
     """Return the JSON object of ``pendmap identify``, without the paths of files."""
-    run, best = report.run, _best(report)
+    run, best = report.run, report.sound
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
@@ -193,12 +198,8 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
     """Return the runs that a method read; rms and noise are those of the joint fit."""
     entries: list[dict[str, Any]] = []
     for k, run in enumerate(report.runs):
-        time = run.time[run.trusted]
-        rms = noise = None
-        if report.joint is not None:
-            left = report.joint.fit.residuals[k][run.trusted]
-            rms = float((left**2).mean() ** 0.5)
-            noise = report.joint.readings[k].sigma
+        time, joint = run.time[run.trusted], report.joint
+        left = None if joint is None else joint.fit.residuals[k][run.trusted]
         entries.append(
             {
                 "name": run.name,
@@ -207,8 +208,8 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
                 "from_s": float(time[0]),
                 "to_s": float(time[-1]),
                 "samples": int(time.size),
-                "rms": rms,
-                "noise": noise,
+                "rms": None if left is None else float((left**2).mean() ** 0.5),
+                "noise": None if joint is None else joint.readings[k].sigma,
             }
         )
     return entries
@@ -245,7 +246,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     """Yield the lines beside the tables: doubts first, then intervals, warnings, findings."""
     for text in foremost(report):
         yield f"Warning: {text}"
-    best = _best(report)
+    best = report.sound
     if best is not None:
         yield f"{best.method}: {best.used}"
         for name, estimate in {**best.estimates, **best.derived}.items():
@@ -273,7 +274,7 @@ def foremost(report: IdentificationReport) -> list[str]:
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of methods."""
-    best = _best(report)
+    best = report.sound
     extra = [] if best is None else [n for n in best.estimates if n not in COLUMNS]
     names = [*COLUMNS, *extra]
     rows = []
@@ -295,10 +296,3 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
     units = {"period": "s", "peak": "rad"}
     measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows
-
-
-def _best(report: IdentificationReport) -> Identification | None:
-    try:
-        return report.best
-    except InputError:
-        return None

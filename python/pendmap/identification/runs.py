@@ -82,6 +82,16 @@ class FitRun:
         return self.theta if self.rod_sensor is None else self.rod_sensor.angle
 
     @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Samples that count."""
+        return np.ones(self.time.shape, bool) if self.trusted is None else self.trusted
+
+    @property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Standard error of each reading, rad."""
+        return np.broadcast_to(np.asarray(self.sigma, np.float64), self.time.shape)
+
+    @property
     def forced(self) -> bool:
         """Whether the pivot moves."""
         return self.drive is not None or self.pivot is not None
@@ -100,15 +110,13 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     """Return a run as the core takes it."""
     time = _floats("time", run.time)
     theta = _floats("theta", run.theta)
-    sigma = np.broadcast_to(np.asarray(run.sigma, dtype=np.float64), time.shape)
+    sigma = run.sigmas
     if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0)):
         raise InputError("sigma must be finite numbers above 0, it is not everywhere")
     if run.count is not None:  # the noise before readings were rounded
         least = (SHARPEST * run.count) ** 2
         sigma = np.sqrt(np.maximum(sigma**2 - run.count**2 / 12, least))
-    weight = 1.0 / sigma
-    if run.trusted is not None:
-        weight = np.where(np.asarray(run.trusted, dtype=bool), weight, 0.0)
+    weight = np.where(np.asarray(run.counted, dtype=bool), 1.0 / sigma, 0.0)
     longest = run.longest_s
     if longest is None:
         longest = FORCED_WINDOW_SWINGS * math.tau / rig.w0 if run.forced else math.inf

@@ -10,7 +10,6 @@ import numpy as np
 from pendmap.errors import FitDiverged, core_errors
 from pendmap.identification.fit import prepared
 from pendmap.identification.runs import bare_windows, tolerance_of
-from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+
+    Floats = NDArray[np.float64]
 
 STATE: Final = 2
 """Columns of an initial state."""
@@ -36,11 +37,9 @@ class Sensitivities:
     """Derivatives over the standard errors, a row a sample that counts, states projected out."""
 
     names: tuple[str, ...]  # parameters, as in a fit
-    columns: NDArray[np.float64]  # shape (n, k), by the parameters in SI
-    residual: NDArray[np.float64]  # shape (n,), reading less model
-    run: NDArray[np.int64]  # shape (n,): run, sample and window of each row
-    sample: NDArray[np.int64]
-    window: NDArray[np.int64]
+    columns: Floats  # shape (n, k), by the parameters in SI
+    residual: Floats  # shape (n,), reading less model
+    run: NDArray[np.int64]  # shape (n,)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,12 +48,12 @@ class WindowSlopes:
 
     run: int
     first: int  # first sample
-    columns: NDArray[np.float64]  # shape (n, k), by the parameters in SI
-    states: NDArray[np.float64]  # shape (n, 2), by angle and velocity (rad w0)
-    residual: NDArray[np.float64]  # shape (n,), reading less model, or its substitute for intervals
-    weight: NDArray[np.float64]  # shape (n,), one over the standard error, or its substitute
+    columns: Floats  # shape (n, k), by the parameters in SI
+    states: Floats  # shape (n, 2), by angle and velocity (rad w0)
+    residual: Floats  # shape (n,), reading less model, or its substitute for intervals
+    weight: Floats  # shape (n,), one over the standard error, or its substitute
 
-    def columns_as_in(self, other: WindowSlopes) -> NDArray[np.float64]:
+    def columns_as_in(self, other: WindowSlopes) -> Floats:
         """Return the columns with the weights of the same window of another pass.
 
         The weight of a reading that is an interval depends on the motion; that of two passes
@@ -65,24 +64,18 @@ class WindowSlopes:
         )
         return np.asarray(self.columns * ratio[:, None], np.float64)
 
-    def freed(
-        self, further: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-        """Return columns, further ones, residual and places of the samples that count.
-
-        The initial state is projected out.
-        """
+    def freed(self, further: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return columns, further ones and residual where they count, the state projected out."""
         counted = self.states.any(axis=1) | self.columns.any(axis=1)
         basis = _basis(self.states[counted])
 
-        def free(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        def free(values: Floats) -> Floats:
             kept = values[counted]
             rest = kept - basis @ (basis.T @ kept)
             followed = lengths(rest) < FOLLOWED * lengths(kept)
             return np.asarray(np.where(followed, 0.0, rest), np.float64)
 
-        places = np.flatnonzero(counted).astype(np.int64)
-        return free(self.columns), free(further), free(self.residual), places
+        return free(self.columns), free(further), free(self.residual)
 
 
 def window_slopes(
@@ -91,13 +84,12 @@ def window_slopes(
     """Return the parameters' names and the derivatives window by window."""
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
-    units = Units(model.w0, si=True)
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}
-    unknown, given = prepared(runs, model, [*base, *candidates], start, units)
-    begin = unknown.start
+    unknown, given = prepared(runs, model, [*base, *candidates], start)
+    begin, windows = unknown.start, bare_windows(fit.windows, unknown.units)
     with core_errors(FitDiverged):
-        found = _core.fit_rows(given, begin, tolerance_of(runs), bare_windows(fit.windows, units))
+        found = _core.fit_rows(given, begin, tolerance_of(runs), windows)
     ends = np.cumsum([len(one.rows) for one in found])
     bare = np.zeros((int(ends[-1]), len(begin)))
     for one, end in zip(found, ends, strict=True):
@@ -121,23 +113,18 @@ def sensitivities(
 
 def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> Sensitivities:
     """Return the derivatives of all windows, initial states projected out."""
-    columns, residuals, labels = [], [], []
-    for index, window in enumerate(windows):
-        own, _, residual, counted = window.freed(np.zeros((len(window.residual), 0)))
-        columns.append(own)
-        residuals.append(residual)
-        run = np.full(counted.size, window.run, np.int64)
-        labels.append(np.stack([run, window.first + counted, np.full(counted.size, index)]))
-    run, sample, of = np.concatenate(labels, axis=1)
-    return Sensitivities(names, np.concatenate(columns), np.concatenate(residuals), run, sample, of)
+    parts = [window.freed(window.columns[:, :0]) for window in windows]
+    columns, _, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
+    run = np.repeat([window.run for window in windows], [len(own) for _, _, own in parts])
+    return Sensitivities(names, columns, residual, run)
 
 
-def lengths(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengths(columns: Floats) -> Floats:
     """Return the length of each column, in one pass through the rows as they are stored."""
     return np.asarray(np.sqrt(np.einsum("n...,n...->...", columns, columns)), np.float64)
 
 
-def _basis(states: NDArray[np.float64]) -> NDArray[np.float64]:
+def _basis(states: Floats) -> Floats:
     """Return an orthonormal basis of the changes that the initial state can make."""
     sizes = np.linalg.norm(states, axis=0)
     seen = states[:, sizes > BLIND * max(float(sizes.max(initial=0.0)), 1e-300)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -43,15 +43,6 @@ class SwingFit:
     form_covariance: Floats  # shape (W, 4, 4)
     sigma: float  # noise of a sample, rad, as given or fitted
     factor: Floats  # noise of each block over sigma: above 1 by the form's misfit
-    points: NDArray[np.intp]  # samples that were used
-
-    def rows(self, which: Sequence[int]) -> SwingFit:
-        """Return some of the windows, in the order given, repeated where asked."""
-        parts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        some: dict[str, Any] = {
-            name: part[list(which)] if name != "sigma" else part for name, part in parts.items()
-        }
-        return SwingFit(**some)
 
 
 def fit_swings(
@@ -71,35 +62,25 @@ def fit_swings(
     the quiet half of the blocks. ``known`` forms are not fitted, and count with their errors.
     """
     instant, state, form = (part.copy() for part in start)
-    blocks = _blocks(instant.size)
+    edges = np.linspace(0, instant.size, max(round(instant.size / BLOCK), 1) + 1).round()
+    blocks = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
     prior = None if known is not None else _prior(instant, state, form, blocks)
-    used = windows.used.copy()
-    trial = dataclasses.replace(windows, used=used)
-    scale = np.ones(instant.size)
+    trial = windows
     for turn in range(_ROUNDS):
         local, shared, residual = _rows(trial, instant, state, form)
         if turn in {3, _SETTLED}:
-            scale = _scales(residual, used, blocks)
+            scale = _scales(residual, trial.used, blocks)
             far = np.abs(residual) > _OUTLIER * np.maximum(scale, sigma or 0.0)[:, None]
-            far &= (used & ~far).sum(axis=1, keepdims=True) > 2  # noqa: PLR2004 (unknowns)
-            used &= ~far
-            trial = dataclasses.replace(windows, used=used)
+            far &= (trial.used & ~far).sum(axis=1, keepdims=True) > 2  # noqa: PLR2004 (unknowns)
+            used = trial.used & ~far
+            trial = dataclasses.replace(trial, used=used)
             local, shared, residual = (
-                part * used[..., None] for part in (local, shared, residual[..., None])
+                local * used[..., None],
+                shared * used[..., None],
+                residual * used,
             )
-            residual = residual[..., 0]
-        move, _ = _step(
-            (local, shared, residual),
-            blocks,
-            None
-            if prior is None
-            else (
-                prior[0],
-                prior[1],
-                form,
-                _scales(residual, used, blocks),
-            ),
-        )
+        held = None if prior is None else (*prior, form, _scales(residual, trial.used, blocks))
+        move, _ = _step((local, shared, residual), blocks, held)
         instant += np.clip(move[:, 0], -0.1 / np.sqrt(form[:, 0]), 0.1 / np.sqrt(form[:, 0]))
         reach = 0.2 * np.abs(state) + 1e-9
         state += np.clip(move[:, 1], -reach, reach)
@@ -109,13 +90,7 @@ def fit_swings(
         if turn > _SETTLED and np.all(np.abs(move[:, 0]) * np.sqrt(form[:, 0]) < 1e-5):  # noqa: PLR2004
             break
     rows = _rows(trial, instant, state, form)
-    return _errors(rows, blocks, (instant, state, form), used, prior, sigma, known)
-
-
-def _blocks(count: int) -> list[slice]:
-    parts = max(round(count / BLOCK), 1)
-    edges = np.linspace(0, count, parts + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+    return _errors(rows, blocks, (instant, state, form), trial.used, prior, sigma, known)
 
 
 def _prior(
@@ -237,15 +212,9 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     instant, state, form = found
     points = used.sum(axis=1)
     square = np.sum(rows[2] ** 2, axis=1)
-    freedom = np.array(
-        [
-            max(
-                float(points[b].sum()) - 2 * (b.stop - b.start) - (FORM if known is None else 0),
-                1.0,
-            )
-            for b in blocks
-        ]
-    )
+    sizes = np.array([block.stop - block.start for block in blocks])
+    freedom = np.add.reduceat(points, [block.start for block in blocks]) - 2 * sizes
+    freedom = np.maximum(freedom - (FORM if known is None else 0), 1.0)
     noise = np.sqrt(np.array([float(square[b].sum()) for b in blocks]) / freedom)
     if known is not None:
         sigma, factor = known.sigma, known.factor
@@ -259,9 +228,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
         sigma = max(sigma, 1e-15)
         doubt = noise / sigma > 1 + _DOUBT * np.sqrt(0.5 / freedom)
         each = np.where(doubt, noise / sigma, 1.0)
-        factor = np.concatenate(
-            [np.full(b.stop - b.start, f) for b, f in zip(blocks, each, strict=True)]
-        )
+        factor = np.repeat(each, sizes)
     held = None if prior is None else (*prior, form, np.full(points.size, sigma))
     _, (inverse, follows, form_inverse) = _step(rows, blocks, held)
     scale = (sigma * factor) ** 2
@@ -271,7 +238,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     # Too few samples determine nothing.
     open_ = points < 2  # noqa: PLR2004 (instant and state)
     error[open_] = np.inf
-    return SwingFit(instant, state, error[:, 0], error[:, 1], form, shared, sigma, factor, points)
+    return SwingFit(instant, state, error[:, 0], error[:, 1], form, shared, sigma, factor)
 
 
 FORM: Final = 4

@@ -82,22 +82,12 @@ class PeakErrors:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """A row of table 1.
+    """A row of table 1."""
 
-    Parameters
-    ----------
-    what : str
-        ``period`` or ``peak``.
-    asked, measured : float
-        Value in the paper's table, and the nearest one in this record, s or rad.
-    errors : mapping of str to float
-        By method: the error's absolute value, percent; NaN where the simulation rests by then.
-    """
-
-    what: str
-    asked: float
-    measured: float
-    errors: Mapping[str, float]
+    what: str  # period or peak
+    asked: float  # value in the paper's table, s or rad
+    measured: float  # nearest value in this record
+    errors: Mapping[str, float]  # by method, absolute, percent; NaN where the simulation rests
 
 
 @dataclasses.dataclass(frozen=True)
@@ -258,18 +248,14 @@ def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | Non
     """Return the row of the value nearest to ``asked``, None where no model has any."""
     column, measured = {}, math.nan
     for name, each in errors.items():
-        there, wrong = (
-            (each.period, each.period_error) if what == "period" else (each.peak, each.peak_error)
-        )
+        peak = what == "peak"
+        there, wrong = (each.peak, each.peak_error) if peak else (each.period, each.period_error)
         if there.size == 0:
             return None
         # An asked period below all measured ones would select the last, noisiest ones.
-        near = int(
-            np.argmin(np.abs(there - max(asked, float(np.median(there[there.size // 2 :])))))
-        )
-        if what == "peak":
-            near = int(np.argmin(np.abs(there - asked)))
-            if near == 0:  # where the simulation starts: it has no error there
-                return None
+        least = -math.inf if peak else float(np.median(there[there.size // 2 :]))
+        near = int(np.argmin(np.abs(there - max(asked, least))))
+        if peak and near == 0:  # where the simulation starts: it has no error there
+            return None
         measured, column[name] = float(there[near]), abs(float(wrong[near]))
     return Row(what, asked, measured, column) if column else None

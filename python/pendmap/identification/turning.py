@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar, nnls
 from scipy.special import ellipe, ellipk
 
 from pendmap.records.resolution import step_of
@@ -49,7 +50,8 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     """
     if time.size < _FEWEST:
         return None
-    calm = median_of_five(theta)
+    # The median of five neighbours removes outliers and keeps monotone runs.
+    calm = median_filter(theta, 5, mode="nearest")
     step = step_of(theta)
     span = float(np.ptp(calm))
     steps = np.diff(time)
@@ -78,12 +80,6 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     away = np.abs(theta - float(np.median(theta[:3]))) > _SURE * sigma + step
     runs = away[:-2] & away[1:-1] & away[2:]
     return Outline(turns, period, smooth, noise, rest, int(np.argmax(runs)))
-
-
-def median_of_five(x: Floats) -> Floats:
-    """Return the median of five neighbours: outliers vanish, monotone runs stay."""
-    padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
 def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
@@ -276,9 +272,7 @@ QUIET: Final = 10.0
 """Standard errors within which readings at rest lie."""
 
 
-def rough_start(
-    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
-) -> dict[str, float] | None:
+def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
     """Return starting values of ``w0``, ``c_over_m`` and ``Tr``, None of fewer than two swings.
 
     A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
@@ -302,10 +296,8 @@ def rough_start(
     return {"w0": w0, "c_over_m": max(viscous, 1e-4) * w0, "Tr": max(friction, 1e-5) * w0**2}
 
 
-def rough_damping(peaks: NDArray[np.float64]) -> tuple[float, float]:
+def rough_damping(peaks: Floats) -> tuple[float, float]:
     """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from 3 peaks or more."""
-    from scipy.optimize import nnls  # noqa: PLC0415 (heavy)
-
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     action = 8 * (ellipe(m) - (1 - m) * ellipk(m))
     columns = np.stack([0.5 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)

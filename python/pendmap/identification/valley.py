@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -104,15 +104,10 @@ def _step(
 def _with(model: Rig, exponent: str, step: float) -> Rig:
     """Return a model whose exponent is changed by a step, within its range."""
     name, _, parameter = exponent.rpartition(".")
-    effects: list[Any] = []
-    for effect in model.effects:
-        if effect.name != name:
-            effects.append(effect)
-            continue
-        (entry,) = (e for e in effect.definition["parameters"] if e["name"] == parameter)
-        low, high = entry["range"]
-        value = min(max(effect.parameters[parameter] + step, low), high)
-        effects.append(
-            dataclasses.replace(effect, parameters={**effect.parameters, parameter: value})
-        )
-    return dataclasses.replace(model, effects=tuple(effects))
+    effect = next(e for e in model.effects if e.name == name)
+    (entry,) = (e for e in effect.definition["parameters"] if e["name"] == parameter)
+    low, high = entry["range"]
+    value = min(max(effect.parameters[parameter] + step, low), high)
+    other = dataclasses.replace(effect, parameters={**effect.parameters, parameter: value})
+    effects = tuple(other if e is effect else e for e in model.effects)
+    return dataclasses.replace(model, effects=effects)

@@ -14,7 +14,7 @@ from pendmap.charts.methods import MEASURED, NOISE, look
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.formatting import counted
-from pendmap.identification.methods.joint import as_angles
+from pendmap.identification.readings import as_angles
 from pendmap.render import blocks, forced, sides, style
 from pendmap.render import sheet as sheets
 from pendmap.render.decays import MOST, draw_residuals

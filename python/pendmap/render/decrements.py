@@ -17,8 +17,7 @@ from matplotlib.patches import Patch
 from pendmap.charts.identification import MINUS
 from pendmap.charts.methods import EVEN, MEASURED, NOISE, ODD, look
 from pendmap.formatting import Estimate, estimate_text
-from pendmap.identification.methods.combined import CUT
-from pendmap.identification.methods.decrement import triplets
+from pendmap.identification.methods.combined import CUT, triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.render import blocks, sides, style
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.comparison.data import counted, sigmas
 from pendmap.diagnosis.result import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Name, Picture, Section, Strong, Table
@@ -219,9 +218,9 @@ def noise_of(found: Discrepancy) -> Iterator[Text]:
     """Yield which noise is meant, and where chi-squared shows more than root mean squares."""
     residuals, noise = [], []
     for run, own in zip(found.data.fitted, found.best.fitted.fit.residuals, strict=False):
-        good = np.isfinite(own) & counted(run)
+        good = np.isfinite(own) & run.counted
         residuals.append(own[good])
-        noise.append(sigmas(run)[good])
+        noise.append(run.sigmas[good])
     residual, sigma = np.concatenate(residuals), np.concatenate(noise)
     low, high = (float(end) for end in np.percentile(sigma, (5, 95)))
     uneven = high > UNEVEN * low

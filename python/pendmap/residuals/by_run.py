@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.special import chdtrc
 
 from pendmap.identification.sensitivity import sensitivities
 
@@ -46,8 +47,6 @@ class RunByRun:
         By DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 where fewer than two
         runs determine it, or noise alone explains the difference (Cochran's Q).
         """
-        from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
-
         shown = self.shown(name)
         if len(shown) < 2:  # noqa: PLR2004 (nothing to compare)
             return 0.0

@@ -35,6 +35,9 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy import stats
+from scipy.fft import dct
+from scipy.special import fdtr, fdtrc
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,8 +119,6 @@ class ResidualNoise:
         By Fisher's F, mean over all laws; levels below ``least`` count as ``least``; 1 without
         parameters. The gain is a fall of the sum of squares, in standard errors squared.
         """
-        from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
-
         if count == 0:
             return 1.0
         levels, weights = np.maximum(self.laws[0], least), self.laws[1]
@@ -146,16 +147,13 @@ def estimate_noise(
     # Of each law and run: the slow part over its expectation from noise.
     left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
     laws = _posterior(laws, left, degrees, sizes)
-    excess, stderr, chance = _excess(left, degrees, sizes, laws)
-    by_run, chances = [], [chance]
-    for k in range(len(runs)):
-        own = slice(k, k + 1)
-        above, error, chance = _excess(
-            left[:, own], degrees[own], sizes[own], dataclasses.replace(laws, sizes=laws.sizes[own])
-        )
-        by_run.append(above / error if error > 0 else 0.0)
-        chances.append(chance)
-    chance = min(min(chances) * len(chances), 1.0)
+    parts = [slice(None), *(slice(k, k + 1) for k in range(len(runs)))]
+    found = [
+        _excess(left[:, own], degrees[own], sizes[own], laws.weights, laws.sizes[own])
+        for own in parts
+    ]
+    (excess, stderr, _), *each = found
+    chance = min(min(chance for *_, chance in found) * len(found), 1.0)
     # The noise's density where the motion is.
     levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
     return ResidualNoise(
@@ -163,7 +161,7 @@ def estimate_noise(
         float(laws.weights @ (laws.colours * laws.shares)),
         excess,
         stderr,
-        tuple(by_run),
+        tuple(above / error if error > 0 else 0.0 for above, error, _ in each),
         chance,
         np.stack([levels, laws.weights]),
         float(spectra.quick_sizes.sum()),
@@ -177,39 +175,39 @@ def _posterior(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws
     Errors of a model only add to noise. With equal odds, the model errs and the likelihood is the
     probability that noise leaves less, or it does not and the likelihood is the density.
     """
-    from scipy.special import fdtr  # noqa: PLC0415 (where it is needed)
-    from scipy.stats import f  # noqa: PLC0415
-
     free = float(degrees.sum())
     if laws.weights.size == 1 or free <= 0:
         return laws
     mean = left.sum(axis=1) / free
-    others = _denominator_degrees(laws, sizes)
-    weights = laws.weights * (fdtr(free, others, mean) + mean * f.pdf(mean, free, others))
+    others = _denominator_degrees(sizes, laws.sizes)
+    weights = laws.weights * (fdtr(free, others, mean) + mean * stats.f.pdf(mean, free, others))
     # All laws exceed the slow part where parameters took up noise: then only the quick part counts.
     if not weights.sum() > 0:
         return laws
     return dataclasses.replace(laws, weights=weights / weights.sum())
 
 
-def _denominator_degrees(laws: Laws, sizes: Floats) -> float:
+def _denominator_degrees(sizes: Floats, quick: Floats) -> float:
     """Return the degrees of freedom of the noise level of slow parts (Satterthwaite)."""
-    return float(sizes.sum() ** 2 / np.sum(sizes**2 / laws.sizes))
+    return float(sizes.sum() ** 2 / np.sum(sizes**2 / quick))
 
 
-def _excess(left: Floats, degrees: Floats, sizes: Floats, laws: Laws) -> tuple[float, float, float]:
-    """Return the excess of runs over noise, its standard error, and the probability by chance."""
-    from scipy.special import fdtrc  # noqa: PLC0415 (where it is needed)
+def _excess(
+    left: Floats, degrees: Floats, sizes: Floats, weights: Floats, quick: Floats
+) -> tuple[float, float, float]:
+    """Return the excess of runs over noise, its standard error, and the probability by chance.
 
+    ``sizes`` and ``quick`` are the numbers of slow amplitudes and of those of the noise, by run.
+    """
     number, free = float(sizes.sum()), float(degrees.sum())
     if number == 0 or free <= 0:
         return 0.0, 0.0, 1.0
     total = left.sum(axis=1)
-    mean = float(laws.weights @ total)
-    scatter = 2 * number + 2 * float(np.sum(sizes**2 / laws.sizes))
-    stderr = math.sqrt(scatter + float(laws.weights @ (total - mean) ** 2))
-    chances = fdtrc(free, _denominator_degrees(laws, sizes), total / free)
-    return mean - free, stderr, float(laws.weights @ chances)
+    mean = float(weights @ total)
+    scatter = 2 * number + 2 * float(np.sum(sizes**2 / quick))
+    stderr = math.sqrt(scatter + float(weights @ (total - mean) ** 2))
+    chances = fdtrc(free, _denominator_degrees(sizes, quick), total / free)
+    return mean - free, stderr, float(weights @ chances)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,17 +232,13 @@ class Spectra:
 
 def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
     """Return the spectra of a fit's residuals."""
-    from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
-
     slow, quick, slow_sizes, quick_sizes, motion = np.zeros((5, len(runs), BINS))
     states = np.zeros(len(runs))
     total, fourth = 0.0, 0.0
     for run, first, last, *_ in fit.windows:
         record = runs[run]
         residual = fit.white[run][first:last]
-        good = np.isfinite(residual)
-        if record.trusted is not None:
-            good &= record.trusted[first:last]
+        good = np.isfinite(residual) & record.counted[first:last]
         if np.count_nonzero(good) < LEAST:
             continue
         time = record.time[first:last][good]

@@ -52,25 +52,18 @@ class Response:
     cosine: Floats  # Of the angle
     residual: Floats  # Over the standard errors, orthogonal to the basis
     states: Floats  # Derivatives by the initial angle and velocity, over the standard errors
-    weight: Floats  # One over the standard errors
-    wronskian: Floats
-    basis: Floats  # Orthonormal basis of what the initial state does
-
-    @property
-    def _kernel(self) -> Floats:
-        """The factors ``-b/W`` and ``a/W`` of later ``a`` and ``b``."""
-        a, b = (self.states / self.weight[:, None]).T
-        return np.stack([-b, a], axis=1) / self.wronskian[:, None]
+    kernel: Floats  # Factors ``-b/W`` and ``a/W`` of later ``a`` and ``b``
+    basis: Floats  # Orthonormal basis of the changes by the initial state
 
     def pull(self, residual: Floats) -> Floats:
         """Return the product of residuals with the response to a torque at each time."""
         later = _later(self.states * residual[:, None])
-        return np.asarray(np.einsum("nk,nk->n", self._kernel, later), np.float64)
+        return np.asarray(np.einsum("nk,nk->n", self.kernel, later), np.float64)
 
     def answer(self, impulse: NDArray[np.complex128]) -> Floats:
         """Return responses to real and imaginary part of impulses, with the start fitted."""
         parts = np.stack([impulse.real, impulse.imag], axis=1)
-        sums = np.cumsum(self._kernel[:, :, None] * parts[:, None, :], axis=0)
+        sums = np.cumsum(self.kernel[:, :, None] * parts[:, None, :], axis=0)
         columns = np.einsum("nk,nkp->np", self.states, sums)
         return np.asarray(columns - self.basis @ (self.basis.T @ columns), np.float64)
 
@@ -79,7 +72,7 @@ class Response:
         gram = _later(np.einsum("nj,nk->njk", self.states, self.states))
         whole = np.linalg.pinv(self.states.T @ self.states, hermitian=True)
         free = gram - gram @ whole @ gram
-        left = np.einsum("nj,njk,nk->n", self._kernel, free, self._kernel)
+        left = np.einsum("nj,njk,nk->n", self.kernel, free, self.kernel)
         return np.asarray(left, np.float64)
 
     def noise(self, rng: np.random.Generator) -> Floats:
@@ -100,28 +93,29 @@ def calm_responses(
 
     In others the response is large, and wrong to first order. ``damping`` is ``c/m``, 1/s.
     """
-    every = []
+    every, growth = [], []
     for window in windows:
         run = runs[window.run]
         kept = np.flatnonzero(window.weight > 0)
         if kept.size < KEPT:
             continue
         time = run.time[window.first + kept]
-        states, weight = window.states[kept], window.weight[kept]
+        states, residual = window.states[kept], window.residual[kept]
         basis, _ = np.linalg.qr(states)
-        residual = window.residual[kept]
+        angles = states / window.weight[kept, None]
+        a, b = angles.T
+        wronskian = np.exp(damping * (time[0] - time))
         every.append(
             Response(
-                run.lab_time_s + time,
-                np.cos(run.theta[window.first + kept]),
-                residual - basis @ (basis.T @ residual),
-                states,
-                weight,
-                np.exp(damping * (time[0] - time)),
-                basis,
+                time=run.lab_time_s + time,
+                cosine=np.cos(run.theta[window.first + kept]),
+                residual=residual - basis @ (basis.T @ residual),
+                states=states,
+                kernel=np.stack([-b, a], axis=1) / wronskian[:, None],
+                basis=basis,
             )
         )
-    growth = [float(np.abs(own.states / own.weight[:, None]).max()) for own in every]
+        growth.append(float(np.abs(angles).max()))
     least = GROWTH * min(growth, default=0.0)
     return [own for own, by in zip(every, growth, strict=True) if by <= least]
 

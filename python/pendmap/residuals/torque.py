@@ -19,6 +19,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from scipy.fft import dct
 
 from pendmap.identification.sensitivity import window_slopes
 
@@ -101,39 +102,32 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     further, residual = project_out(runs, windows, columns)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
-    joint = _solved(further, residual)
-    # Errors from the residuals of all bins together.
-    wide = math.sqrt(max(noise.level, _level(residual - further @ joint.torque)))
+    torques, errors, _ = _solved(further, residual)
+    # Errors by the sum of squares over the number of independent readings (residuals.noise).
+    power = dct(residual - further @ torques, norm="ortho") ** 2
+    level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
+    errors *= math.sqrt(max(noise.level, level))
     first = 0
     for name in names:
-        last = first + edges[name].size - 1
-        own = _solved(further[:, first:last], residual)
-        gains[name] = (own.gain, own.rank)
-        torque, errors = joint.torque[first:last], wide * joint.errors[first:last]
+        lows, highs = edges[name][:-1], edges[name][1:]
+        own = slice(first, first + lows.size)
+        gains[name] = _solved(further[:, own], residual)[2]
+        columns_of = (lows, highs, torques[own], errors[own])
         found[name] = [
             {
                 "over": name,
                 "unit": OVER[name],
                 "along_motion": name in ALONG,
-                "from": float(edges[name][k]),
-                "to": float(edges[name][k + 1]),
-                "torque": float(torque[k]),
-                "stderr": float(errors[k]),
-                "z": float(torque[k] / errors[k]) if errors[k] > 0 else 0.0,
+                "from": low,
+                "to": high,
+                "torque": torque,
+                "stderr": error,
+                "z": torque / error if error > 0 else 0.0,
             }
-            for k in range(torque.size)
+            for low, high, torque, error in np.stack(columns_of, axis=1).tolist()
         ]
-        first = last
+        first = own.stop
     return Torque(found, gains, noise)
-
-
-def _level(residual: Floats) -> float:
-    """Return the sum of squares over the number of independent readings (residuals.noise)."""
-    from scipy.fft import dct  # noqa: PLC0415 (where it is needed)
-
-    power = dct(residual, norm="ortho") ** 2
-    total = float(power.sum())
-    return float(np.sum(power**2)) / (3 * total) if total > 0 else 0.0
 
 
 def window_derivatives(
@@ -154,11 +148,9 @@ def project_out(
     """
     parts = []
     for window, own in zip(windows, columns, strict=True):
-        run = runs[window.run]
-        if run.trusted is not None:
-            lost = ~run.trusted[window.first : window.first + len(window.residual)]
-            for values in (own, window.columns, window.states, window.residual):
-                values[lost] = 0.0
+        lost = ~runs[window.run].counted[window.first : window.first + len(window.residual)]
+        for values in (own, window.columns, window.states, window.residual):
+            values[lost] = 0.0
         parts.append(window.freed(own))
     base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
     sizes = np.linalg.norm(base, axis=0)
@@ -184,12 +176,10 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
         np.arccos(np.clip(1 - energy, -1, 1)),
     )
     phase = np.full(theta.shape, math.nan)
-    if run.drive:
-        names = (f"phi[{window.run}]", "phi")
-        fitted = next((fit[n] for n in names if n in fit.estimates), 0.0)
-        known = run.drive.get("phi")
-        turned = float(run.drive.get("Omega") or 0.0) * run.time[own]
-        phase = np.angle(np.exp(1j * (turned + (fitted if known is None else known))))
+    drive = fit.drive_of(run, window.run)
+    if drive:
+        turned = (drive.get("Omega") or 0.0) * run.time[own] + (drive["phi"] or 0.0)
+        phase = np.angle(np.exp(1j * turned))
     return {
         "angle": np.angle(np.exp(1j * theta)),
         "velocity": velocity,
@@ -235,18 +225,12 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     return np.asarray(response * weight[:, None], np.float64)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Solution:
-    """Torques of bins that are fitted together."""
+def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[float, int]]:
+    """Return the least-squares torques of bins, of least norm where they are not unique.
 
-    torque: Floats
-    errors: Floats  # For a noise level of 1
-    gain: float  # Fall of the sum of squares
-    rank: int
-
-
-def _solved(columns: Floats, residual: Floats) -> _Solution:
-    """Return the least-squares torques of bins, of least norm where they are not unique."""
+    With them are their errors for a noise level of 1, the fall of the sum of squares, and the
+    number of combinations of bins that are determined.
+    """
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     scale[scale == 0] = 1.0
@@ -257,4 +241,4 @@ def _solved(columns: Floats, residual: Floats) -> _Solution:
     pull = columns.T @ residual
     torque = inverse @ pull
     errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    return _Solution(torque, errors, float(pull @ torque), int(np.count_nonzero(known)))
+    return torque, errors, (float(pull @ torque), int(np.count_nonzero(known)))

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from pendmap.formatting import Estimate, counted, estimate_text
-from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.uncertainty import Z95
 from pendmap.model import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+
+MISFIT: Final = 2.0
+"""chi^2 per degree of freedom above which a method of peaks warns."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -28,7 +32,7 @@ class Identification:
         Its name in the registry, as in the JSON of ``pendmap identify``.
     estimates : mapping of str to Estimate
         By the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr`` in
-        rad/s^2, ...) and ``offset`` (rad), whatever the method knows. ``zeta`` and ``theta_r``
+        rad/s^2, ...) and ``offset`` (rad), those that the method gives. ``zeta`` and ``theta_r``
         follow from them. Empty where the method is not applicable.
     used : str
         Data that it used, in words.
@@ -96,20 +100,13 @@ class Identification:
                 made[name] = Estimate(value)
                 continue
             lever = -power * value / w0.value
-            shared = self._shared(numerator, "w0")
+            names, matrix = self.covariance or ((), np.empty((0, 0)))
+            both = {numerator, "w0"} <= set(names)
+            shared = float(matrix[names.index(numerator), names.index("w0")]) if both else 0.0
             variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
             error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
             made[name] = Estimate(value, error, (value - Z95 * error, value + Z95 * error))
         return made
-
-    def _shared(self, one: str, other: str) -> float:
-        """The covariance of two estimates."""
-        if self.covariance is None:
-            return 0.0
-        names, matrix = self.covariance
-        if one not in names or other not in names:
-            return 0.0
-        return float(matrix[names.index(one), names.index(other)])
 
     @property
     def rig(self) -> Rig:
@@ -127,39 +124,19 @@ class Identification:
         return Rig(**known)
 
 
-def on_record(from_peaks: Callable[..., Identification]) -> Callable[..., Identification]:
-    """Return a method of peaks as one of a record, whose peaks are found unless they are given."""
-
-    def identify(
-        time: ArrayLike,
-        theta: ArrayLike,
-        *,
-        sigma: float | None = None,
-        trusted: ArrayLike | None = None,
-        peaks: Peaks | None = None,
-        **choices: Any,  # noqa: ANN401 (those of the method)
-    ) -> Identification:
-        """Identify damping from a record, s and rad; ``choices`` are those of ``from_peaks``."""
-        if peaks is None:
-            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-        return from_peaks(peaks, **choices)
-
-    return identify
-
-
-def too_few(  # noqa: PLR0913 (what is counted, and how it is worded)
+def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
     count: int,
     least: int,
-    *,
-    of: int | None = None,
+    total: int | None = None,
     where: str = "",
     warnings: Sequence[str] = (),
     because: str = "",
 ) -> Identification:
-    """Return that a method needs ``least`` peaks ``where`` a record of ``of`` has ``count``."""
-    peaks = counted(count, "peak") if of is None else f"{count} of {counted(of, 'peak')}"
-    text = " ".join(part for part in (peaks, where) if part)
-    text = f"not applicable: {text}, {least} are needed" + (f": {because}" if because else "")
+    """Return that a method needs ``least`` peaks ``where`` a record of ``total`` has ``count``."""
+    peaks = counted(count, "peak") if total is None else f"{count} of {counted(total, 'peak')}"
+    text = f"not applicable: {f'{peaks} {where}'.strip()}, {least} are needed" + (
+        f": {because}" if because else ""
+    )
     return Identification(warnings=(*warnings, text), applicable=False)
 
 

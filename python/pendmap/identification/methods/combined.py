@@ -1,28 +1,36 @@
 """The combined decrement of viscous damping and Coulomb friction, as the paper prints it.
 
-Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
+Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2, eqs. 2.4 to 2.10.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from pendmap.identification.methods.base import Identification, too_few, unphysical
-from pendmap.identification.methods.decrement import Reading, from_amplitudes
-from pendmap.identification.peaks import Peaks, find_peaks, samples
+from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import bootstrap, estimates, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+    from pendmap.identification.peaks import Peaks
 
     Floats = NDArray[np.float64]
 
 
+Reading = Literal["all", "odd_ends", "odd_triplets"]
+"""Peaks that the printed method uses."""
+
 CUT: Final = math.radians(12.0)
 """Peaks above this are dropped, rad: there the pendulum is not linear."""
+
+ENDS_ABOVE: Final = "the record ends above it"
+"""Reason why a record has no peaks below the cut."""
 
 _FEWEST: Final = 4
 """Peaks below the cut that are needed."""
@@ -32,6 +40,92 @@ _USES: Final[dict[Reading, str]] = {
     "odd_triplets": "the mean over all triplets that begin at an odd peak",
 }
 """How each reading uses the peaks, in words of the result."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Decrement:
+    """Result of the combined method for a small decay."""
+
+    delta: float  # zeta / sqrt(1 - zeta^2), eq. 2.7
+    theta_r: float  # Tr / w0^2, rad, eq. 2.10
+    mean_period: float  # of all overlapping full cycles, s
+
+    @property
+    def zeta(self) -> float:
+        """Damping ratio."""
+        return self.delta / math.sqrt(1 + self.delta**2)
+
+    @property
+    def w0(self) -> float:
+        """Natural frequency ``2 pi / (mean_period sqrt(1 - zeta^2))``, rad/s."""
+        return 2 * math.pi / (self.mean_period * math.sqrt(1 - self.zeta**2))
+
+    @property
+    def Tr(self) -> float:  # noqa: N802 (the paper's name)
+        """Coulomb friction over inertia, rad/s^2."""
+        return self.w0**2 * self.theta_r
+
+    @property
+    def si(self) -> Floats:
+        """``w0, c_over_m, Tr``."""
+        return np.array([self.w0, 2 * self.zeta * self.w0, self.Tr])
+
+
+def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
+    """Return the absolute values of peaks by eqs. 2.4 to 2.6, shape (count,).
+
+    ``abs(th_k) = -theta_r (E + 1) + E abs(th_{k-1})``, ``E = exp(-delta pi)``. Negative values,
+    from the peak on that does not reach zero, mean nothing.
+    """
+    shrink = math.exp(-delta * math.pi)
+    result = np.empty(count)
+    result[0] = first
+    for k in range(1, count):
+        result[k] = -theta_r * (shrink + 1) + shrink * result[k - 1]
+    return result
+
+
+def decrement(peaks: Floats) -> float:
+    """Return ``delta`` by eq. 2.7, from the first two and the last two absolute peaks.
+
+    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``; all peaks between cancel. NaN
+    where the ratio is not above 0.
+    """
+    ratio = (peaks[0] - peaks[1]) / (peaks[-2] - peaks[-1])
+    if not ratio > 0:
+        return math.nan
+    return float(math.log(ratio) / ((peaks.size - 2) * math.pi))
+
+
+def coulomb(peaks: Floats) -> float:
+    """Return ``theta_r = Tr / w0^2`` by eq. 2.10, from the same four absolute peaks, rad."""
+    first, second, last_but_one, last = peaks[0], peaks[1], peaks[-2], peaks[-1]
+    below = second + first - last_but_one - last
+    return float((second * last_but_one - first * last) / below) if below else math.nan
+
+
+def triplets(peaks: Floats) -> tuple[Floats, Floats]:
+    """Return ``delta`` and ``theta_r`` of each three peaks in a row, shape (P - 2,): figure 5."""
+    first, second, third = peaks[:-2], peaks[1:-1], peaks[2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        delta = np.log((first - second) / (second - third)) / math.pi
+        theta_r = (second**2 - first * third) / (first - third)
+    return delta, theta_r
+
+
+def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
+    """Apply eqs. 2.7 and 2.10 to absolute peaks; ``parity`` is that of the first one's number."""
+    if reading == "odd_triplets":
+        deltas, thetas = (each[1 - parity :: 2] for each in triplets(peaks))
+        delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
+    else:
+        used = peaks
+        if reading == "odd_ends":
+            # Both pairs of neighbours that 2.7 uses begin at an odd peak.
+            used = used[1 - parity :]
+            used = used[: used.size - used.size % 2]
+        delta, theta_r = decrement(used), coulomb(used)
+    return Decrement(delta, theta_r, mean_period(times))
 
 
 def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
@@ -50,7 +144,11 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
 
 
 def from_peaks(
-    peaks: Peaks, *, reading: Reading = "all", cut: float = CUT, why: str = ""
+    peaks: Peaks,
+    record: tuple[Floats, Floats] | None = None,
+    *,
+    reading: Reading = "all",
+    cut: float = CUT,
 ) -> Identification:
     """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
@@ -60,8 +158,8 @@ def from_peaks(
     cycles": ``odd_ends`` takes 2.7 between the first and the last pair of peaks that begin at an
     odd one, ``odd_triplets`` the mean over the triplets that do. The method is biased: by the
     nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
-    four peaks of all; the module ``repaired`` corrects that. ``why`` is the reason where a record
-    has no peaks below the cut, if it is not the record's end.
+    four peaks of all; the module ``repaired`` corrects that. The samples of the ``record``, s and
+    rad, show why there is no peak below the cut.
     """
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
@@ -73,15 +171,12 @@ def from_peaks(
         small = small.select(np.arange(len(small)) < size.size)
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
-        none = len(peaks) and not len(small)
-        return too_few(
-            size.size,
-            least,
-            of=len(peaks.turned),
-            where=f"under {math.degrees(cut):.3g} degrees",
-            warnings=warnings,
-            because=(why or "the record ends above it") if none else "",
-        )
+        why = ""
+        if len(peaks) and not len(small):
+            lost = record is not None and _unresolved(*record, peaks, cut)
+            why = "peaks are not resolved: too few samples a period" if lost else ENDS_ABOVE
+        where = f"under {math.degrees(cut):.3g} degrees"
+        return too_few(size.size, least, len(peaks.turned), where, warnings, why)
     parity = int(small.index[0]) % 2
     count = len(small)
 
@@ -117,35 +212,15 @@ def from_peaks(
     )
 
 
-def identify(  # noqa: PLR0913 (record, then what may be chosen)
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-    reading: Reading = "all",
-    cut: float = CUT,
-) -> Identification:
-    """Identify damping by the printed method from a record, s and rad; see :func:`from_peaks`."""
-    if peaks is None:
-        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    why = _unresolved(*samples(time, theta, trusted), peaks, cut)
-    return from_peaks(peaks, reading=reading, cut=cut, why=why)
-
-
-def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> str:
-    """Return that peaks were lost, in words, where a record continues below a cut."""
+def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> bool:
+    """Return whether a record continues below a cut, and its peaks there are lost."""
     if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
-        return ""
+        return False
     size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
     above = np.flatnonzero(size >= cut)
     first = int(above[-1]) + 1 if above.size else 0
     # Within a half swing after the last large peak no peak is lost: turns are noise.
     if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
-        return ""
-    late = theta[first:]
-    turns = np.count_nonzero(np.diff(np.sign(np.diff(late))))
-    if turns < _FEWEST:
-        return ""
-    return "peaks are not resolved: too few samples a period"
+        return False
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(theta[first:]))))
+    return bool(turns >= _FEWEST)

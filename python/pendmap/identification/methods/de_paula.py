@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
@@ -30,8 +30,6 @@ SLOW: Final = (0.0, CUT)
 """Amplitudes between which it is taken as linear, rad."""
 _FEWEST: Final = 3
 """Peaks that each window needs."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 
 
 def from_peaks(
@@ -48,7 +46,7 @@ def from_peaks(
     windows = {"fast": fast, "slow": slow}
     chosen = {n: turned.select((size >= low) & (size < high)) for n, (low, high) in windows.items()}
     lacking = [
-        too_few(len(some), _FEWEST, of=len(turned), where=_between(windows[name]))
+        too_few(len(some), _FEWEST, len(turned), _between(windows[name]))
         for name, some in chosen.items()
         if len(some) < _FEWEST
     ]
@@ -67,7 +65,7 @@ def from_peaks(
     error = np.maximum(slack.stderr_amplitude, 1e-12)
     fall, fall_cov, fall_misfit = least_squares_line(slack.time, np.abs(slack.amplitude), error)
     for name, misfit in (("exponential", rate_misfit), ("linear", fall_misfit)):
-        if misfit > _MISFIT and turned.known:
+        if misfit > MISFIT and turned.known:
             warnings.append(
                 f"the decay is not {name} where it is taken for it: chi^2 per degree of freedom "
                 f"is {misfit:.3g}; the errors are widened by it, and yet too small"
@@ -92,9 +90,6 @@ def from_peaks(
         warnings=tuple(warnings),
         covariance=(names, covariance),
     )
-
-
-identify = on_record(from_peaks)
 
 
 def _between(window: tuple[float, float]) -> str:

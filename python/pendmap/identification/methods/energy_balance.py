@@ -11,22 +11,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few, unphysical
-from pendmap.identification.peaks import Peaks, find_peaks, samples
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
 from pendmap.identification.period import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
 from pendmap.signal.local_polynomial import smoothed_velocity
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+    from pendmap.identification.peaks import Peaks
 
     Floats = NDArray[np.float64]
 
 
 _FEWEST: Final = 5
 """Peaks that are needed."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 _LARGEST: Final = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
 _PHASE: Final = 0.5
@@ -35,14 +34,7 @@ _SAMPLES: Final = 25
 """Samples a period below which a warning comes: the nine of a quartic smooth the velocity then."""
 
 
-def identify(
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    peaks: Peaks | None = None,
-) -> Identification:
+def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     """Identify viscous damping and Coulomb friction by the energy that each half cycle loses.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
@@ -50,22 +42,18 @@ def identify(
     over the measured cycle: velocities by local quartics, less the noise's share; across a gap it
     is that of a pendulum. Neighbouring half cycles share a peak: least squares are generalised.
     """
-    if peaks is None:
-        peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    t, x = samples(time, theta, trusted)
     turned = peaks.turned
     if len(turned) < _FEWEST:
         return too_few(len(turned), _FEWEST)
     pairs = np.flatnonzero(np.diff(turned.index) == 1)
     small = turned.select(np.abs(turned.amplitude) < _LARGEST)
     if len(small) < _FEWEST:
-        where = f"under {_LARGEST:g} rad"
-        return too_few(len(small), _FEWEST, of=len(turned), where=where)
+        return too_few(len(small), _FEWEST, len(turned), f"under {_LARGEST:g} rad")
     if pairs.size < _FEWEST - 1:
         text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
         return Identification(warnings=(text,), applicable=False)
     w0 = frequency(small).w0
-    work = _measured_work((t, x), turned, pairs, w0)
+    work = _measured_work(record, turned, pairs, w0)
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
     for _ in range(5):
         w0 = frequency(small, offset=zero).w0
@@ -81,13 +69,13 @@ def identify(
     lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
     full += np.outer(lever, lever) * period.stderr**2
     warnings = unphysical(dict(zip(names, found, strict=True)))
-    period_samples = 2 * math.pi / w0 / float(np.median(np.diff(t)))
+    period_samples = 2 * math.pi / w0 / float(np.median(np.diff(record[0])))
     if period_samples < _SAMPLES:
         warnings.append(
             f"{period_samples:.3g} samples a period: below {_SAMPLES} velocities are smoothed, and "
             "the errors are too small"
         )
-    if misfit > _MISFIT:
+    if misfit > MISFIT:
         warnings.append(
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "
             "are widened by it"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 Reading = Literal["ends", "line"]
 _FEWEST: Final = 3
 """Peaks below the cut that are needed."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 
 
 def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> Identification:
@@ -39,7 +37,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     small = small.select(np.abs(small.amplitude) < cut)
     under = "" if math.isinf(cut) else f" under {math.degrees(cut):.3g} degrees"
     if len(small) < _FEWEST:
-        return too_few(len(small), _FEWEST, of=len(peaks.turned), where=under.strip())
+        return too_few(len(small), _FEWEST, len(peaks.turned), under.strip())
     count, warnings = len(small), []
     half_cycles = (small.index - small.index[0]).astype(float)
     size = np.abs(small.amplitude)
@@ -73,9 +71,9 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     covariance = propagated(compute, values, stderr)
     if not small.known:
         misfit = math.nan
-    if misfit > _MISFIT and reading == "line":
+    if misfit > MISFIT and reading == "line":
         covariance = covariance * np.array([[1.0, misfit**0.5], [misfit**0.5, misfit]])
-    if misfit > _MISFIT:
+    if misfit > MISFIT:
         warnings.append(
             f"the decay is not exponential: chi^2 per degree of freedom is {misfit:.3g} about a "
             f"straight line of decrement {-decrements[1] / math.pi:.3g}; what is not viscous is "
@@ -94,6 +92,3 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
         covariance=(names, np.asarray(covariance)),
         misfit=misfit if small.known else None,
     )
-
-
-identify = on_record(from_peaks)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Final
+import functools
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -28,59 +29,68 @@ if TYPE_CHECKING:
 
     from pendmap.identification.peaks import Peaks
 
+    Floats = NDArray[np.float64]
+
 
 @dataclasses.dataclass(frozen=True)
 class Method:
-    """A method: a record in, an identification that bears its name out.
+    """A method of identification."""
 
-    Parameters
-    ----------
-    identify : callable
-        Of ``time``, ``theta``, ``sigma=`` and ``trusted=``, as :func:`identify` has them, and of
-        ``peaks=`` where it reads peaks.
-    from_peaks : callable or None
-        Of :class:`Peaks`, for records of peaks alone; none where it needs every sample.
-    reads_peaks : bool
-        Whether it takes the peaks of the record, which are then found once for all methods.
-    """
+    name: str  # in results and in JSON
+    compute: Callable[..., Identification]  # of peaks, of peaks and samples, or of samples alone
+    reads_peaks: bool = True  # found once for all methods
+    reads_samples: bool = False
+    needs_samples: bool = False  # whether it cannot be applied to peaks alone
 
-    identify: Callable[..., Identification]
-    from_peaks: Callable[[Peaks], Identification] | None = None
-    reads_peaks: bool = True
+    def identify(
+        self,
+        time: ArrayLike,
+        theta: ArrayLike,
+        *,
+        sigma: float | None = None,
+        trusted: ArrayLike | None = None,
+        peaks: Peaks | None = None,
+    ) -> Identification:
+        """Identify the damping of a record, arguments as for :func:`identify`."""
+        if not self.reads_peaks:
+            found = self.compute(time, theta, sigma=sigma, trusted=trusted)
+            return dataclasses.replace(found, method=self.name)
+        if peaks is None:
+            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+        return self.from_peaks(peaks, samples(time, theta, trusted))
 
-
-def _named(
-    name: str, compute: Callable[..., Identification], choices: dict[str, Any]
-) -> Callable[..., Identification]:
-    """Return a method's function with some choices made and the name in its results."""
-
-    def computed(*given: Any, **known: Any) -> Identification:  # noqa: ANN401 (as compute has them)
-        return dataclasses.replace(compute(*given, **choices, **known), method=name)
-
-    return computed
-
-
-def _method(name: str, module: Any, **choices: Any) -> Method:  # noqa: ANN401 (a module)
-    from_peaks = getattr(module, "from_peaks", None)
-    return Method(
-        _named(name, module.identify, choices),
-        None if from_peaks is None else _named(name, from_peaks, choices),
-        reads_peaks=module is not trajectory,
-    )
+    def from_peaks(
+        self, peaks: Peaks, record: tuple[Floats, Floats] | None = None
+    ) -> Identification:
+        """Identify the damping of peaks, and of samples (s, rad) where there are any."""
+        if self.needs_samples and record is None:
+            text = (
+                "not applicable: the record holds peaks alone, and this method needs every sample"
+            )
+            return Identification(self.name, warnings=(text,), applicable=False)
+        given = {"record": record} if self.reads_samples else {}
+        found = self.compute(peaks, **given)
+        return dataclasses.replace(found, method=self.name)
 
 
 BEST: Final = "trajectory"
 """The default method."""
 
-METHODS: Final[dict[str, Method]] = {
-    BEST: _method(BEST, trajectory),
-    "combined": _method("combined", combined),
-    "combined_odd_ends": _method("combined_odd_ends", combined, reading="odd_ends"),
-    "combined_odd_triplets": _method("combined_odd_triplets", combined, reading="odd_triplets"),
-    "combined_repaired": _method("combined_repaired", repaired),
-    "log_decrement": _method("log_decrement", log_decrement),
-    "de_paula": _method("de_paula", de_paula),
-    "energy_balance": _method("energy_balance", energy_balance),
+_ODD_ENDS = functools.partial(combined.from_peaks, reading="odd_ends")
+_ODD_TRIPLETS = functools.partial(combined.from_peaks, reading="odd_triplets")
+
+METHODS: Final = {
+    method.name: method
+    for method in (
+        Method(BEST, trajectory.identify, reads_peaks=False, needs_samples=True),
+        Method("combined", combined.from_peaks, reads_samples=True),
+        Method("combined_odd_ends", _ODD_ENDS, reads_samples=True),
+        Method("combined_odd_triplets", _ODD_TRIPLETS, reads_samples=True),
+        Method("combined_repaired", repaired.from_peaks),
+        Method("log_decrement", log_decrement.from_peaks),
+        Method("de_paula", de_paula.from_peaks),
+        Method("energy_balance", energy_balance.from_peaks, reads_samples=True, needs_samples=True),
+    )
 }
 """Every method by its name, the default first, then in the order of the paper's tables."""
 
@@ -156,7 +166,6 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
 
     Peaks without standard errors get those of their own scatter; of too few there are no intervals.
     """
-    found = {}
     peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
     if not peaks.known:
         size = peaks.time.shape
@@ -165,15 +174,8 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
             stderr_time=np.full(size, scatter(peaks.time)),
             stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
         )
-    for name in check_names(methods):
-        from_peaks = METHODS[name].from_peaks
-        if from_peaks is None:
-            text = (
-                "not applicable: the record holds peaks alone, and this method needs every sample"
-            )
-            found[name] = Identification(name, warnings=(text,), applicable=False)
-            continue
-        found[name] = one = from_peaks(peaks)
+    found = {name: METHODS[name].from_peaks(peaks) for name in check_names(methods)}
+    for name, one in found.items():
         # Errors of 0 are none; a fit estimates its own from its residuals.
         if not peaks.known and not any(each.stderr for each in one.estimates.values()):
             bare = {n: Estimate(each.value) for n, each in one.estimates.items()}
@@ -188,7 +190,7 @@ _DIFFERENCE: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 """Fourth difference, which is 0 of a cubic."""
 
 
-def scatter(values: NDArray[np.float64]) -> float:
+def scatter(values: Floats) -> float:
     """Return the standard deviation of the noise of values in a row; 0 where there are few.
 
     The median of fourth differences counts, of every second value, since a zero error moves odd and
@@ -197,7 +199,7 @@ def scatter(values: NDArray[np.float64]) -> float:
     if values.size < FEWEST:
         return 0.0
     size = values.size - 8
-    differences: NDArray[np.float64] = sum(
+    differences: Floats = sum(
         weight * values[2 * k : 2 * k + size] for k, weight in enumerate(_DIFFERENCE)
     )
     return normal_scale(np.asarray(differences)) / float(np.sqrt(np.sum(_DIFFERENCE**2)))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from pendmap.identification.methods.base import Identification, on_record, too_few, unphysical
-from pendmap.identification.methods.combined import CUT, small_peaks
-from pendmap.identification.methods.decrement import recursion
+from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.combined import CUT, recursion, small_peaks
 from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, jacobian
 
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 _FEWEST: Final = 6
 """Peaks below the cut that are needed."""
-_MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a warning comes."""
 
 
 def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
@@ -43,8 +40,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     count = len(small)
     if count < _FEWEST:
         under = f"under {math.degrees(cut):.3g} degrees"
-        total = len(peaks.turned)
-        return too_few(count, _FEWEST, of=total, where=under, warnings=warnings)
+        return too_few(count, _FEWEST, len(peaks.turned), under, warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
     # Peaks measured elsewhere may come without errors: then all weigh the same.
@@ -69,7 +65,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     )
     misfit = 2 * float(fit.cost) / (count - 4)
     covariance = np.linalg.inv(fit.jac.T @ fit.jac) * (max(misfit, 1.0) if known else misfit)
-    if known and misfit > _MISFIT:
+    if known and misfit > MISFIT:
         warnings.append(
             f"the recursion does not fit the peaks: chi^2 per degree of freedom is {misfit:.3g}; "
             "the errors are widened by it"
@@ -112,6 +108,3 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         covariance=(names, np.asarray(outer)),
         misfit=misfit,
     )
-
-
-identify = on_record(from_peaks)

@@ -36,25 +36,13 @@ _MOST_PEAKS: Final = 80
 
 @dataclasses.dataclass(frozen=True)
 class StartingValues:
-    """Starting values of a fit.
+    """Starting values of a fit."""
 
-    Parameters
-    ----------
-    w0 : float
-        Natural frequency, rad/s.
-    c_over_m, Tr : float
-        Damping, 1/s and rad/s^2; 0 or more.
-    offset : float
-        Zero error of the angle, rad.
-    source : str
-        How they were found: the name of a method, ``global`` or ``guess``.
-    """
-
-    w0: float
-    c_over_m: float
-    Tr: float
-    offset: float
-    source: str
+    w0: float  # rad/s
+    c_over_m: float  # 1/s, 0 or more
+    Tr: float  # rad/s^2, 0 or more
+    offset: float  # zero error of the angle, rad
+    source: str  # name of a method, ``global`` or ``guess``
 
 
 def starting_values(
@@ -67,53 +55,28 @@ def starting_values(
     """Find starting values: energy balance, else the repaired decrement, else a global search.
 
     A method counts if it is applicable, its damping is not negative by more than its errors, and
-    its model of the peaks is not far off. A record with two peaks or fewer gives a guess.
-
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        s, and rad from the downward rest, unwrapped.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used.
-
-    Raises
-    ------
-    InputError
-        If the record does not swing at all.
+    its model of the peaks is not far off. A record with two peaks or fewer gives a guess; one that
+    does not swing raises InputError.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    balance = energy_balance.identify(time, theta, sigma=sigma, trusted=trusted, peaks=peaks)
-    start = _start_of(balance, "energy_balance")
+    record = samples(time, theta, trusted)
+    start = _start_of(energy_balance.from_peaks(peaks, record), "energy_balance")
     if start is None:
         start = _start_of(repaired.from_peaks(peaks), "combined_repaired")
     if start is not None:
         return start
     if len(peaks.turned) > 3:  # noqa: PLR2004 (four unknowns)
         return global_start(peaks)
-    return _guess(*samples(time, theta, trusted), peaks)
+    return _guess(*record, peaks)
 
 
 def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
-    """Search all of the plausible damping for the envelope of the peaks.
+    """Search all of the plausible damping for the envelope of four peaks or more.
 
     Differential evolution over ``c_over_m / w0``, ``Tr / w0^2``, the first peak and the zero error
     on :func:`pendmap.identification.period.envelope`; distances count by
     ``2 (sqrt(1 + r^2) - 1)``, so that false peaks cannot lead it away. ``w0`` is the median over
     half cycles of the amplitude-corrected one of each.
-
-    Parameters
-    ----------
-    peaks : Peaks
-        Four or more that turned.
-    seed : int
-        Of the search.
-
-    Raises
-    ------
-    InputError
-        If there are fewer peaks.
     """
     turned = peaks.turned
     if len(turned) < 4:  # noqa: PLR2004

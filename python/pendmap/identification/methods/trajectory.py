@@ -18,11 +18,11 @@ from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import starting_values
 from pendmap.identification.parameters import SENSOR
-from pendmap.identification.readings import reading_of
-from pendmap.identification.runs import FitRun
+from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect, opposes
+from pendmap.records import Run
 from pendmap.signal.robust import from_first, span
 
 if TYPE_CHECKING:
@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
+    from pendmap.identification.runs import FitRun
+
+    Floats = NDArray[np.float64]
 
 
 TOO_GOOD: Final = 0.7
@@ -50,8 +53,8 @@ class TooShortError(InputError):
 
 
 def identify(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
     """Identify the damping of a free decay by fitting its whole trajectory.
@@ -98,8 +101,8 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
 
 
 def fit_decay(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     *,
     sigma: float | None = None,
     trusted: NDArray[np.bool_] | None = None,
@@ -122,16 +125,8 @@ def fit_decay(
     good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if good.shape != time.shape:
         raise InputError("trusted and time differ in length: they must be as many")
-    elapsed, first = from_first(time)
-    reading = reading_of(elapsed, theta, sigma, trusted=good)
-    run = FitRun(
-        elapsed,
-        theta - reading.shift,
-        reading.each,
-        trusted=good,
-        lab_time_s=first,
-        count=reading.interval,
-    )
+    reading = reading_of(from_first(time)[0], theta, sigma, trusted=good)
+    run = as_fit_run(Run("", "", "free", time, theta, good), reading)
     found, (reading,) = fit_from_start([run], [reading], **choices)
     return found, reading
 
@@ -146,14 +141,9 @@ def _warnings(
     for name in ("c_over_m", "Tr", *opposing):
         if name in estimates and estimates[name].value < 0:
             low, high = estimates[name].ci95 or (-math.inf, math.inf)
-            found.append(
-                f"{name} is {estimates[name].value:.3g}, which no pendulum has: "
-                + (
-                    "its interval reaches 0"
-                    if low <= 0 <= high
-                    else "an effect is missing in the model"
-                )
-            )
+            reaches = low <= 0 <= high
+            why = "its interval reaches 0" if reaches else "an effect is missing in the model"
+            found.append(f"{name} is {estimates[name].value:.3g}, which no pendulum has: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         found.append(
@@ -180,15 +170,13 @@ def _warnings(
     return found
 
 
-def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
+def fit_from_start(
     runs: Sequence[FitRun],
     readings: Sequence[Reading],
     *,
     start: Rig | Mapping[str, float] | None = None,
-    offset: bool = True,
     friction: bool = True,
     effects: Sequence[Effect | str] = (),
-    free: Sequence[str] | None = None,
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
     """Return the fit to several records, from a start that the first gives, and their readings.
 
@@ -196,17 +184,16 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     peaks, or of a global search over their envelope; the better one counts. Readings whose noise
     grows with speed count by it, unless the model lacks an effect: then they count alike.
     ``start`` comes by default from zero crossings and the energy of each half swing; TooShortError
-    is raised where the first record gives none. ``offset`` fits the sensor's zero, ``friction``
-    Coulomb friction; ``effects`` act besides (SI), and begin small if given by name. ``free`` names
-    their fitted parameters (``effect.parameter``), by default all but exponents, orders and widths.
+    is raised where the first record gives none. ``friction`` fits Coulomb friction; ``effects`` act
+    besides (SI), and begin small if given by name. Fitted are all their parameters but exponents,
+    orders and widths.
     """
     first = runs[0]
-    good = np.ones(first.time.shape, bool) if first.trusted is None else first.trusted
-    time, theta = first.time[good], first.angle[good]
+    time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
     # A sensor on the rod has a bias instead of a zero.
-    zeroed = offset and any(run.rod_sensor is None for run in runs)
+    zeroed = any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
         model = _start_of(begin, time, theta, readings[0].sigma)
@@ -214,11 +201,11 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
             model = dataclasses.replace(model, Tr=0.0)
         named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
         known = [*model.effects, *named]
-        zero = [OFFSET] if zeroed and OFFSET not in {e.name for e in known} else []
-        more = [Effect(name, {"d": 0.0}) for name in zero]
-        model = dataclasses.replace(model, effects=(*known, *more))
-        wanted = _sizes(known) if free is None else free
-        return fit_runs(runs, model, [*names, *wanted, *_sizes(more)], sigma_doubt=doubt)
+        if zeroed and OFFSET not in {e.name for e in known}:
+            known.append(Effect(OFFSET, {"d": 0.0}))
+        sizes = [f"{effect.name}.{size}" for effect in known for size in effect.sizes]
+        model = dataclasses.replace(model, effects=tuple(known))
+        return fit_runs(runs, model, [*names, *sizes], sigma_doubt=doubt)
 
     found = fitted(start)
     if found.widening > LACKING and any(reading.law for reading in readings):
@@ -239,16 +226,8 @@ def fit_from_start(  # noqa: PLR0913 (records, and what is known of them)
     return again if better else found, tuple(readings)
 
 
-def _sizes(effects: Sequence[Effect]) -> list[str]:
-    """Return the names of effects' parameters, without those of shape."""
-    return [f"{effect.name}.{size}" for effect in effects for size in effect.sizes]
-
-
 def _start_of(
-    start: Rig | Mapping[str, float] | None,
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    sigma: float,
+    start: Rig | Mapping[str, float] | None, time: Floats, theta: Floats, sigma: float
 ) -> Rig:
     """Return where a search starts: given values, the others from the record's half swings."""
     if isinstance(start, Rig):
@@ -259,9 +238,7 @@ def _start_of(
     return Rig(**known)
 
 
-def _by_peaks(
-    time: NDArray[np.float64], theta: NDArray[np.float64], sigma: float
-) -> dict[str, float]:
+def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
     """Return a start from the methods of peaks, which handle rotations too."""
     try:
         start = starting_values(time, theta, sigma=sigma)
@@ -273,3 +250,44 @@ def _by_peaks(
             " must be given: w0 = 6.2 under [rig] in experiment.toml"
         )
     return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}
+
+
+@dataclasses.dataclass(frozen=True)
+class JointFit:
+    """A pendulum fitted to several runs, in the order of its curves and residuals."""
+
+    fit: TrajectoryFit
+    runs: tuple[Run, ...]
+    readings: tuple[Reading, ...]
+
+    @property
+    def noise(self) -> float:
+        """Root mean square of the noise of the readings that count, rad."""
+        counts = [int(run.trusted.sum()) for run in self.runs]
+        square = np.average([reading.sigma**2 for reading in self.readings], weights=counts)
+        return math.sqrt(square)
+
+
+def fit_together(
+    runs: Sequence[Run],
+    *,
+    start: Rig | None = None,
+    known: dict[str, float] | None = None,
+    effects: Sequence[Effect | str] = (),
+) -> JointFit:
+    """Fit natural frequency, damping, the sensor's zero and effects to one run or more.
+
+    ``start``, with its effects, or ``known`` parameters are where the search begins, else it is
+    found from the first run: TooShortError is raised where that gives none. Sizes of ``effects``
+    are fitted.
+    """
+    if not runs:
+        raise InputError("runs must hold one record or more, got none")
+    readings = [reading_of_run(run) for run in runs]
+    fit, worth = fit_from_start(
+        [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
+        readings,
+        start=start or known,
+        effects=effects,
+    )
+    return JointFit(fit, tuple(runs), worth)
