@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import sys
 from pathlib import Path
 
 import click
@@ -11,7 +10,6 @@ import click
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     json_option,
-    keep_inputs,
     plot_option,
     quiet_option,
     rate_option,
@@ -19,7 +17,15 @@ from pendmap.cli.options import (
     simd_option,
     threads_option,
 )
-from pendmap.cli.show import Written, progress_bar, write_all, write_json, write_table
+from pendmap.cli.show import (
+    Written,
+    keep_inputs,
+    progress_bar,
+    shows_progress,
+    write_all,
+    write_json,
+    write_table,
+)
 from pendmap.cli.types import NUMBER, Whole, default_file
 from pendmap.errors import instruction_set
 
@@ -79,7 +85,7 @@ def command(  # noqa: PLR0913 (an option each)
     keep_inputs([model, *files_of(path)], {"--plot": [plot]})
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
-    with progress_bar("compare", shown=sys.stderr.isatty() and not quiet) as progress:
+    with progress_bar("compare", shown=shows_progress(quiet=quiet)) as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = Written()

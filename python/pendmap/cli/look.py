@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import functools
-import sys
 from pathlib import Path
 
 import click
 
-from pendmap.cli.options import (
-    json_option,
+from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
+from pendmap.cli.show import (
+    Written,
     keep_inputs,
-    plot_option,
-    quiet_option,
-    rate_option,
+    progress_bar,
+    shows_progress,
+    write_all,
+    write_json,
 )
-from pendmap.cli.show import Written, progress_bar, write_all, write_json
 
 
 @click.command("look")
@@ -39,7 +39,7 @@ def command(
     from pendmap.records.summary import as_text
 
     keep_inputs(files_of(path), {"--plot": [plot]})
-    with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
+    with progress_bar("read", shown=shows_progress(quiet=quiet)):
         experiment = read_experiment(path, rate_hz=rate_hz)
     written = Written()
     if plot is not None:

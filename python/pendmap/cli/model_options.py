@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import Outputs
+from pendmap.cli.show import Outputs
 from pendmap.cli.types import NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
@@ -73,22 +73,13 @@ def varied_model_options(function: Command) -> Command:
         " model in SI also Omega, c_over_m, Tr, phi, frequency_hz (p is kept), stroke_mm (Omega"
         " is).",
     )
-    return _options(vary(with_ranges), NUMBER_OR_RANGE)
+    return model_options(vary(with_ranges), NUMBER_OR_RANGE)
 
 
-def model_options(function: Command) -> Command:
-    """Add the parameters of the pendulum, the presets and the model file."""
-    return _options(function, NUMBER)
-
-
-def model_options_without(*left_out: str) -> Callable[[Command], Command]:
-    """Return what adds the model's options without those that the command takes otherwise."""
-    return functools.partial(_options, kind=NUMBER, left_out=left_out)
-
-
-def _options(
-    function: Command, kind: click.ParamType[Any], left_out: tuple[str, ...] = ()
+def model_options(
+    function: Command, kind: click.ParamType[Any] = NUMBER, left_out: tuple[str, ...] = ()
 ) -> Command:
+    """Add the model's parameters, presets and file, without those that a command takes itself."""
     model = click.option(
         "--model",
         "model",

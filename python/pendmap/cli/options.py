@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
-import sys
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,14 +13,11 @@ from pendmap.cli.types import (
     InstructionSet,
     OutputFile,
     Whole,
-    default_file,
 )
 from pendmap.errors import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
-from pendmap.files import check_room
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-    from pathlib import Path
+    from collections.abc import Callable
 
     Command = Callable[..., Any]
     Decorator = Callable[[Command], Command]
@@ -139,87 +134,3 @@ def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") ->
     kinds = " or ".join(suffixes)
     out = click.option("--out", type=OutputFile(suffixes), help=f"{what}: {kinds}.")
     return added(out, plot_option, rerun_option, view_option, json_option("; alone, no files"))
-
-
-def check_view() -> None:
-    """Refuse --view before anything is computed where no window can open."""
-    from pendmap import viewer
-
-    try:
-        viewer.check_display()
-    except viewer.ViewerError as error:
-        raise click.UsageError(f"--view: {error}") from error
-
-
-@dataclasses.dataclass(frozen=True)
-class Outputs:
-    """Outputs that a command writes."""
-
-    out: Path | None
-    plot: Path | None
-    rerun: Path | None
-    view: bool
-    as_json: bool
-    quiet: bool
-
-    @classmethod
-    def take(
-        cls,
-        given: dict[str, Any],
-        name: str,
-        suffix: str = RESULTS[0],
-        reads: Iterable[Path | None] = (),
-    ) -> Outputs:
-        """Take the output options out of ``given``; without any, three files ``name.*``."""
-        fields = {field.name: given.pop(field.name) for field in dataclasses.fields(cls)}
-        outputs = cls(**fields)
-        asked = (outputs.out, outputs.plot, outputs.rerun, outputs.view, outputs.as_json)
-        if not any(asked):
-            outputs = dataclasses.replace(
-                outputs,
-                out=default_file(f"{name}{suffix}"),
-                plot=default_file(f"{name}.png"),
-                rerun=default_file(f"{name}.rrd"),
-            )
-        if outputs.view and outputs.rerun is None:
-            outputs = dataclasses.replace(outputs, rerun=default_file(f"{name}.rrd"))
-        places = {"--out": outputs.out, "--plot": outputs.plot, "--rerun": outputs.rerun}
-        keep_inputs(reads, {option: [path] for option, path in places.items()})
-        if outputs.view:
-            check_view()
-        return outputs
-
-    def check_room(self, cells: int) -> None:
-        """Refuse a map for which the disk has no space: half a byte a cell at least, compressed."""
-        for path in (self.out, self.rerun):
-            if path is not None:
-                check_room(path, cells // 2)
-
-    @property
-    def draws(self) -> bool:
-        """Whether a file, a figure or a recording is written."""
-        return bool(self.out or self.plot or self.rerun or self.view)
-
-    @property
-    def shows_progress(self) -> bool:
-        """Whether stderr is a terminal and --quiet is not given."""
-        return sys.stderr.isatty() and not self.quiet
-
-
-def keep_inputs(
-    inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
-) -> None:
-    """Refuse outputs, by their option, that are inputs, or folders that hold one."""
-
-    def lost(path: Path, output: Path) -> bool:
-        places = [path, *path.resolve().parents] if output.is_dir() else [path]
-        return any(output.samefile(place) for place in places)
-
-    read = [path for path in inputs if path is not None and path.exists()]
-    for option, paths in outputs.items():
-        for output in paths:
-            if output is not None and output.exists() and any(lost(path, output) for path in read):
-                raise click.UsageError(
-                    f"Invalid value for '{option}': {str(output)!r}: is an input, which would be "
-                    "lost: it must be another file"
-                )

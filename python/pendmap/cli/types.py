@@ -80,6 +80,8 @@ class _Axis(click.ParamType[AxisText]):
     name = "A:B:N"
     says = "N cells between A and B, like -pi:pi:1000"
     counts = "cells"
+    single = False
+    """Whether A:A:1 is an axis, of one value."""
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
@@ -94,7 +96,8 @@ class _Axis(click.ParamType[AxisText]):
             low, high, count = _number(parts[0]), _number(parts[1]), int(parts[2])
         except (ValueError, ZeroDivisionError):
             self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        one = self.single and count == 1 and low == high
+        if not (math.isfinite(low) and math.isfinite(high) and (low < high or one)):
             self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
         if not 1 <= count <= MOST_CELLS:
             self.fail(
@@ -106,6 +109,7 @@ class _Axis(click.ParamType[AxisText]):
 class _Range(_Axis):
     says = "N values from A to B, both included, like 0.5:2:100"
     counts = "values"
+    single = True
 
 
 class _NumberOrRange(click.ParamType[float | AxisText]):
@@ -128,24 +132,11 @@ class _Values(click.ParamType[list[float]]):
         """Return N values from A to B, both included, or the only one."""
         if isinstance(value, list):
             return value
-        wanted = "must be A:B:N, N values from A to B, both included, or a single value"
-        parts = str(value).split(":")
-        try:
-            ends = [_number(part) for part in parts[:2]]
-            count = int(parts[2]) if len(parts) == 3 else 1  # noqa: PLR2004
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if len(parts) not in {1, 3}:
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if not all(math.isfinite(end) for end in ends) or ends[0] > ends[-1]:
-            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
-        if not 1 <= count <= MOST_CELLS:
-            self.fail(f"must have 1 to {MOST_CELLS} values, got {count}: {value!r}", param, ctx)
-        low, high = ends[0], ends[-1]
-        if count == 1 and low != high:
+        if ":" not in str(value):
+            return [NUMBER.convert(value, param, ctx)]
+        low, high, count = RANGE.convert(value, param, ctx)
+        if count == 1 and low < high:
             self.fail(f"{value!r}: one value has one bound", param, ctx)
-        if count > 1 and low == high:
-            self.fail(f"{value!r}: {count} values need two bounds", param, ctx)
         return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
 
 
