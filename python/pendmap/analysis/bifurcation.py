@@ -12,7 +12,7 @@ from pendmap.analysis import result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.analysis.regimes import kind_of
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
 from pendmap.errors import check_number, core_errors
@@ -42,12 +42,9 @@ _LISTED = 12
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
+    keys = {key: f"branch_{key}" for key in ("kind", "w", "first", "last")}
     kinds = dataset["kind"].values
-    names = ("branch_kind", "branch_w", "branch_first", "branch_last")
-    return [
-        {"kind": str(kinds[kind]), "w": int(w), "first": float(first), "last": float(last)}
-        for kind, w, first, last in zip(*(dataset[name].values for name in names), strict=True)
-    ]
+    return [one | {"kind": str(kinds[one["kind"]])} for one in records(dataset, **keys)]
 
 
 SCHEMA = Schema(
@@ -73,15 +70,15 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Stroboscopic points of the attractors against one parameter.
+    """Compute the stroboscopic points of the attractors against one parameter.
 
-    At every value all attractors are searched as by :func:`pendmap.parameter_map`: from several
-    starts, and from what neighbouring values have. Besides, one motion is followed as the parameter
-    slowly grows, and one as it falls: at each value it goes on from where it was, moved by 1e-6,
-    until it has arrived on an attractor. Where the two differ there is hysteresis.
+    At every value all attractors are searched as by :func:`pendmap.parameter_map`, from several
+    starts and from the attractors at neighbouring values. Besides, one motion is followed as the
+    parameter slowly grows, and one as it falls: at each value it goes on from where it was, moved
+    by 1e-6, until it has arrived on an attractor. Where the two differ there is hysteresis.
 
-    Attractors at neighbouring values that are alike (same kind, period and winding, points near one
-    another) make a branch. At a bifurcation one branch ends and others begin.
+    Attractors at neighbouring values with the same kind, period and winding and with points near
+    one another make a branch. At a bifurcation one branch ends and others begin.
 
     Parameters
     ----------
@@ -111,10 +108,6 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a parameter or value is not allowed, the model has an effect that no map can have, or no
         step reaches ``tol``.
-    MemoryError
-        If there is too little memory for the values.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     Examples
     --------

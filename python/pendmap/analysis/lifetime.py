@@ -17,7 +17,7 @@ from pendmap.analysis.draws.lifetime import lifetime_over
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, summarised
+from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, records, summarised
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
@@ -45,16 +45,8 @@ _DRAWN: Final = 4000
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
-    rows = zip(
-        dataset["attractor"].values,
-        dataset["fraction"].values,
-        dataset["captured"].values[:, -1],
-        strict=True,
-    )
-    return [
-        {"name": str(name), "fraction": float(share), "captured": int(count)}
-        for name, share, count in rows
-    ]
+    last = dataset.isel(elapsed=-1)
+    return records(last, name="attractor", fraction="fraction", captured="captured")
 
 
 SCHEMA = Schema(
@@ -111,19 +103,19 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Mean lifetime of transient chaos: the exponential tail of the times until capture.
+    """Estimate the mean lifetime of transient chaos from the exponential tail of capture times.
 
-    Starts drawn from a window run until an attractor captures them. Chaos that does not last is a
-    chaotic saddle: what is still on it after ``t`` periods decays as ``exp(-t / mean)``. The mean
-    is the maximum of the likelihood, the sum of all times beyond ``from_period``, those cut off at
-    the bound included, over the number of captures; its standard error is ``mean /
+    Starts drawn from a window run until an attractor captures them. Transient chaos is a chaotic
+    saddle: the number of trajectories still on it after ``t`` periods decays as ``exp(-t / mean)``.
+    The mean is the maximum of the likelihood, the sum of all times beyond ``from_period``, those
+    cut off at the bound included, over the number of captures; its standard error is ``mean /
     sqrt(captured)``.
 
     An exponential tail alone is no chaos: starts near the edge of a smooth basin leave the saddle
-    on it at a rate ``kappa`` too. There ``kappa`` is the saddle's own exponent ``lambda``; on a
+    on it at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a
     chaotic saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
-    entropy (Kantz & Grassberger 1985). So growth is measured along trajectories while they live,
-    and where ``lambda`` does not exceed ``kappa`` there is no transient chaos, and no lifetime.
+    entropy (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories
+    before their capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
 
     Parameters
     ----------
@@ -135,8 +127,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     starts : int
         How many are drawn; 100 to ten million.
     from_period : int, optional
-        Where the tail begins. By default where the data say so: twice the earliest period from
-        which two tests (of a Weibull shape, and of a rate that changes) find it exponential.
+        Beginning of the tail. By default twice the earliest period from which two tests (of a
+        Weibull shape, and of a rate that changes) find it exponential.
     seed : int
         Draws the starts, and the models of ``draws``.
     draws : int, optional
@@ -160,10 +152,6 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
-    MemoryError
-        If there is too little memory for the starts.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     References
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -141,18 +142,14 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
 
 def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """Return mean, standard deviation and ends of the 95 % interval of the finite values."""
-    known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    filled = np.where(known, values, 0.0)
-    mean = np.where(count > 0, filled.sum(axis=-1) / np.maximum(count, 1), np.nan)
-    away = np.where(known, values - mean[..., None], 0.0)
-    spread = np.sqrt((away**2).sum(axis=-1) / np.maximum(count - 1, 1))
-    spread = np.where(count > 1, spread, np.nan)
-    if not values.size:  # which numpy gives no quantiles of
-        return mean, spread, mean, mean
-    safe = np.where((count > 0)[..., None], values, 0.0)
-    low, high = np.nanquantile(safe, _LEVELS, axis=-1)
-    return mean, spread, np.where(count > 0, low, np.nan), np.where(count > 0, high, np.nan)
+    if not values.size:  # numpy has no quantiles of nothing
+        none = np.full(values.shape[:-1], np.nan)
+        return none, none, none, none
+    known = np.where(np.isfinite(values), values, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # no value, or one: nan
+        low, high = np.nanquantile(known, _LEVELS, axis=-1)
+        return np.nanmean(known, axis=-1), np.nanstd(known, axis=-1, ddof=1), low, high
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
