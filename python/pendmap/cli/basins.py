@@ -8,7 +8,7 @@ import click
 
 from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.options import draws_option, max_periods_option, seed_option, tol_option
+from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
 from pendmap.cli.types import AXIS, Whole
 from pendmap.errors import MOST_CELLS, MOST_PERIODS
 
@@ -19,21 +19,17 @@ if TYPE_CHECKING:
 
 @analysis_command(
     "basins",
-    click.option("--theta", type=AXIS, help="Initial angles, rad.  [default: -pi:pi:1000]"),
-    click.option(
-        "--velocity",
-        type=AXIS,
-        help="Initial velocities, in SI rad/s.  [default: -3:3:1000, in SI times w0]",
+    option("--theta", AXIS, "Initial angles, rad.  [default: -pi:pi:1000]"),
+    option(
+        "--velocity", AXIS, "Initial velocities, in SI rad/s.  [default: -3:3:1000, in SI times w0]"
     ),
-    click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the window."),
+    option("--grid", Whole(1, MOST_CELLS), "Cells on each side of the window."),
     tol_option,
     max_periods_option(
         "Bound after which a start is undecided.  [default: 4000; more where damping"
         " is small, less beside chaos]"
     ),
-    click.option(
-        "--layer-periods", type=Whole(1, MOST_PERIODS), help="Periods of the finite-time layers."
-    ),
+    option("--layer-periods", Whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),
     draws_option,
 )

@@ -8,14 +8,14 @@ import click
 
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.model_options import varied_model_options
-from pendmap.cli.options import search_options
+from pendmap.cli.options import option, search_options
 from pendmap.cli.types import NUMBER
 
 
 @analysis_command(
     "bifurcation",
-    click.option("--theta", type=NUMBER, help="Angle from which both sweeps start, rad."),
-    click.option("--velocity", type=NUMBER, help="Velocity of that start, in SI rad/s."),
+    option("--theta", NUMBER, "Angle from which both sweeps start, rad."),
+    option("--velocity", NUMBER, "Velocity of that start, in SI rad/s."),
     search_options,
     model=varied_model_options,
 )

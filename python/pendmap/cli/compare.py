@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     json_option,
+    option,
     plot_option,
     quiet_option,
     rate_option,
@@ -26,26 +27,19 @@ from pendmap.cli.show import (
     write_json,
     write_table,
 )
-from pendmap.cli.types import NUMBER, Whole, default_file
+from pendmap.cli.types import FILE, NUMBER, Whole, default_file
 from pendmap.errors import instruction_set
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command("compare")
-@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.argument("model", type=FILE, metavar="MODEL")
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
 @plot_option
-@click.option(
-    "--members",
-    type=Whole(20, 100_000),
-    default=400,
-    help="Starts of the model beside each forced run.  [default: 400]",
-)
-@click.option(
-    "--spread",
-    type=NUMBER,
-    default=0.01,
-    help="Of these about the measured start, rad, and over w0.  [default: 0.01]",
-)
+@option("--members", Whole(20, 100_000), "Starts of the model beside each forced run.", 400)
+@option("--spread", NUMBER, "Of these about the measured start, rad, and over w0.", 0.01)
 @seed_option("Draws them.")
 @threads_option
 @json_option("; alone, no files")

@@ -7,7 +7,6 @@ import functools
 import os
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,6 +14,7 @@ import click
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     json_option,
+    option,
     plot_option,
     quiet_option,
     rate_option,
@@ -23,47 +23,39 @@ from pendmap.cli.options import (
     view_option,
 )
 from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import OutputFile, ReportFile, Whole
+from pendmap.cli.types import FILE, OutputFile, ReportFile, Whole
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 
 @click.command("diagnose")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
-@click.option(
-    "--model",
-    "model_path",
-    type=click.Path(path_type=Path),
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
+@option(
+    "--model model_path",
+    FILE,
+    "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
     metavar="FILE",
-    help="Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
 )
-@click.option(
-    "--max-effects",
-    type=Whole(0, 6),
-    default=3,
-    help="Effects added at most, 0 to 6.  [default: 3]",
-)
+@option("--max-effects", Whole(0, 6), "Effects added at most, 0 to 6.", 3)
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
-@click.option(
-    "--effects",
-    "effects_path",
-    type=click.Path(path_type=Path),
+@option(
+    "--effects effects_path",
+    FILE,
+    "Candidates of your own beside the library's: [[formula]] of a .toml.",
     metavar="FILE",
-    help="Candidates of your own beside the library's: [[formula]] of a .toml.",
 )
-@click.option(
-    "--out", type=OutputFile([".toml"]), help="New model: .toml.  [default: diagnose.toml]"
-)
+@option("--out", OutputFile([".toml"]), "New model: .toml.  [default: diagnose.toml]")
 @plot_option
-@click.option(
+@option(
     "--report",
-    type=ReportFile(),
+    ReportFile(),
+    "Report: .html with its figures in it, .md with them beside it, or a folder with both.",
     metavar="FILE|DIR",
-    help="Report: .html with its figures in it, .md with them beside it, or a folder with both.",
 )
 @rerun_option
 @view_option

@@ -5,16 +5,18 @@ from __future__ import annotations
 import functools
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.options import output_options, quiet_option, rate_option, simd_option
 from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import FILE
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pendmap.identification import IdentificationReport
 
 
@@ -22,7 +24,7 @@ SUFFIX = ".toml"
 
 
 @click.command("identify")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
 @click.option(
     "--method", "methods", multiple=True, metavar="NAME", help="One of them alone; may be repeated."
 )

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.options import draws_option, max_periods_option, seed_option, tol_option
+from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
 from pendmap.cli.types import Whole
 from pendmap.errors import MOST_PERIODS
 
@@ -21,17 +19,16 @@ _STARTS = (100, 10_000_000)
 
 @analysis_command(
     "lifetime",
-    click.option(
+    option(
         "--starts",
-        type=Whole(*_STARTS),
-        default=40_000,
-        help="How many are drawn, from -pi to pi and velocities -3 to 3, in SI times w0."
-        "  [default: 40000]",
+        Whole(*_STARTS),
+        "How many are drawn, from -pi to pi and velocities -3 to 3, in SI times w0.",
+        40_000,
     ),
-    click.option(
+    option(
         "--from-period",
-        type=Whole(0, MOST_PERIODS),
-        help="Where the exponential tail begins.  [default: where the data say so]",
+        Whole(0, MOST_PERIODS),
+        "Where the exponential tail begins.  [default: where the data say so]",
     ),
     max_periods_option(
         "Bound after which a start is given up.  [default: 4000; more where damping"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,10 +16,14 @@ from pendmap.cli.show import (
     write_all,
     write_json,
 )
+from pendmap.cli.types import FILE
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command("look")
-@click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
+@click.argument("path", type=FILE, metavar="FILE|FOLDER")
 @plot_option
 @rate_option
 @json_option()

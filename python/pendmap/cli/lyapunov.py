@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
-
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.options import max_periods_option, seed_option, start_options, tol_option
+from pendmap.cli.options import max_periods_option, option, seed_option, start_options, tol_option
 from pendmap.cli.types import NUMBER
 
 
 @analysis_command(
     "lyapunov",
     start_options,
-    click.option(
-        "--precision",
-        type=NUMBER,
-        default=1e-3,
-        help="Standard error over exponent that chaos is averaged for.  [default: 1e-3]",
-    ),
+    option("--precision", NUMBER, "Standard error over exponent that chaos is averaged for.", 1e-3),
     tol_option,
     max_periods_option(
         "Bound after which the start is undecided, and of each trajectory averaged."

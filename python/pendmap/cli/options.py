@@ -30,6 +30,22 @@ RESULTS = (".nc", ".zarr")
 """Suffixes of files that a dataset is written to."""
 
 
+def option(
+    names: str,
+    kind: click.ParamType[Any] | type[int],
+    text: str,
+    default: float | None = None,
+    **more: Any,  # noqa: ANN401 (of click)
+) -> Decorator:
+    """Return an option, by its names, with the type of its values; its help ends with the default.
+
+    Names are separated by spaces, that of the parameter last where it is another.
+    """
+    if default is not None:
+        text += f"  [default: {default:g}]".replace("e-0", "e-")
+    return click.option(*names.split(), type=kind, default=default, help=text, **more)
+
+
 def simd_option(function: Command) -> Command:
     """Add the instruction set, which applies until the command has ended."""
 
@@ -53,27 +69,22 @@ def simd_option(function: Command) -> Command:
     return add(function)
 
 
-tol_option = click.option(
-    "--tol", type=NUMBER, default=1e-6, help="Error after 5 periods.  [default: 1e-6]"
-)
-threads_option = click.option(
-    "--threads", type=Whole(1, MOST_THREADS), help="Threads.  [default: one a processor]"
-)
+tol_option = option("--tol", NUMBER, "Error after 5 periods.", 1e-6)
+threads_option = option("--threads", Whole(1, MOST_THREADS), "Threads.  [default: one a processor]")
 quiet_option = click.option("--quiet", is_flag=True, help="No progress, no summary.")
-draws_option = click.option(
+draws_option = option(
     "--draws",
-    type=Whole(2, MOST_DRAWS),
-    help="Draw so many models from the [covariance] of --model: the doubt of the result.",
+    Whole(2, MOST_DRAWS),
+    "Draw so many models from the [covariance] of --model: the doubt of the result.",
 )
-rate_option = click.option(
-    "--rate",
-    "rate_hz",
-    type=NUMBER,
+rate_option = option(
+    "--rate rate_hz",
+    NUMBER,
+    "Readings a second, for files without a column of times.",
     metavar="HZ",
-    help="Readings a second, for files without a column of times.",
 )
-plot_option = click.option("--plot", type=OutputFile(PICTURES), help="Figure: .png .svg .pdf.")
-rerun_option = click.option("--rerun", type=OutputFile([".rrd"]), help="Rerun recording: .rrd.")
+plot_option = option("--plot", OutputFile(PICTURES), "Figure: .png .svg .pdf.")
+rerun_option = option("--rerun", OutputFile([".rrd"]), "Rerun recording: .rrd.")
 view_option = click.option(
     "--view", is_flag=True, help="Write the recording and open the viewer on it."
 )
@@ -108,20 +119,11 @@ def added(*options: Decorator) -> Decorator:
 
 progress_options = added(threads_option, simd_option, quiet_option)
 start_options = added(
-    click.option(
-        "--theta", type=NUMBER, default=1.0, help="Angle at the start, rad.  [default: 1]"
-    ),
-    click.option(
-        "--velocity",
-        type=NUMBER,
-        default=0.0,
-        help="Velocity at the start, in SI rad/s.  [default: 0]",
-    ),
+    option("--theta", NUMBER, "Angle at the start, rad.", 1.0),
+    option("--velocity", NUMBER, "Velocity at the start, in SI rad/s.", 0.0),
 )
 search_options = added(
-    click.option(
-        "--starts", type=Whole(1, MOST_CELLS), default=9, help="Starts each.  [default: 9]"
-    ),
+    option("--starts", Whole(1, MOST_CELLS), "Starts each.", 9),
     tol_option,
     max_periods_option("Bound after which a start is watched.  [default: as damping asks]"),
     seed_option("Shifts the starts, and draws the models of --draws."),

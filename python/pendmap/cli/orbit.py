@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.options import draws_option, seed_option
+from pendmap.cli.options import draws_option, option, seed_option
 from pendmap.cli.types import AXIS, Whole
 from pendmap.errors import MOST_CELLS
 
@@ -19,22 +17,11 @@ _LONGEST = 64
 
 @analysis_command(
     "orbit",
-    click.option(
-        "--n", type=Whole(1, _LONGEST), default=1, help="Smallest period, in drive's.  [default: 1]"
-    ),
-    click.option(
-        "--w",
-        type=Whole(-MOST_CELLS, MOST_CELLS),
-        default=0,
-        help="Net turns over it, forward positive.  [default: 0]",
-    ),
-    click.option("--theta", type=AXIS, help="Angles of the box, rad.  [default: -pi:pi:200]"),
-    click.option(
-        "--velocity",
-        type=AXIS,
-        help="Velocities of the box, in SI rad/s.  [default: as n, w and p ask]",
-    ),
-    click.option("--grid", type=Whole(1, MOST_CELLS), help="Cells on each side of the box."),
+    option("--n", Whole(1, _LONGEST), "Smallest period, in drive's.", 1),
+    option("--w", Whole(-MOST_CELLS, MOST_CELLS), "Net turns over it, forward positive.", 0),
+    option("--theta", AXIS, "Angles of the box, rad.  [default: -pi:pi:200]"),
+    option("--velocity", AXIS, "Velocities of the box, in SI rad/s.  [default: as n, w and p ask]"),
+    option("--grid", Whole(1, MOST_CELLS), "Cells on each side of the box."),
     draws_option,
     seed_option("Draws the models."),
 )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.options import json_option, seed_option, simd_option
+from pendmap.cli.options import json_option, option, seed_option, simd_option
 from pendmap.cli.show import write_all
 from pendmap.cli.types import PICTURES, OutputFile
 
@@ -21,17 +21,16 @@ if TYPE_CHECKING:
 
 @click.command("paper")
 @click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
-@click.option(
+@option(
     "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=None,
+    click.Path(path_type=Path, file_okay=False),
+    "Folder for the files, made if it is not there.  [default: the current one]",
     metavar="DIR",
-    help="Folder for the files, made if it is not there.  [default: the current one]",
 )
-@click.option(
+@option(
     "--plot",
-    type=OutputFile(PICTURES),
-    help="File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
+    OutputFile(PICTURES),
+    "File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
 )
 @seed_option("Of the rig's noise.")
 @json_option()

@@ -9,7 +9,7 @@ import click
 
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.model_options import model_options
-from pendmap.cli.options import draws_option, seed_option
+from pendmap.cli.options import draws_option, option, seed_option
 from pendmap.cli.types import NUMBER, VALUES
 
 if TYPE_CHECKING:
@@ -18,13 +18,8 @@ if TYPE_CHECKING:
 
 @analysis_command(
     "tongues",
-    click.option(
-        "--omega",
-        "omegas",
-        type=VALUES,
-        help="Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
-    ),
-    click.option("--p-max", type=NUMBER, default=6.0, help="Largest amplitude.  [default: 6]"),
+    option("--omega omegas", VALUES, "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]"),
+    option("--p-max", NUMBER, "Largest amplitude.", 6.0),
     click.option(
         "--plane",
         type=click.Choice(["omega-p", "e-alpha2"]),

@@ -244,6 +244,7 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
+FILE: click.Path = click.Path(path_type=Path)
 NUMBER = _Number()
 AXIS = _Axis()
 RANGE = _Range()
