@@ -182,10 +182,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "undecided": (axis.name, raw.undecided),
         "failed": (axis.name, raw.failed),
         "chaos_periods": (axis.name, raw.chaos_periods, {"comment": CHAOS_PERIODS}),
-        "loose_sweep": (
-            "loose",
-            np.repeat([1, -1], [raw.up.value.size, raw.down.value.size]),
-        ),
+        "loose_sweep": ("loose", np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
         "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),

@@ -17,7 +17,15 @@ from pendmap.analysis.draws.lifetime import lifetime_over
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, records, summarised
+from pendmap.analysis.result import (
+    Field,
+    Schema,
+    drawn_field,
+    none_below_0,
+    records,
+    summarised,
+    variable,
+)
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
@@ -253,29 +261,17 @@ def _curves(
     ]
     captured = np.array(by, dtype=np.int64).reshape(len(by), elapsed.size)
     tails = survival.residual(times, censored, bound) if times.size else []
+    rows = [(t.begin, t.mean, t.stderr, min(t.weibull, t.steady)) for t in tails]
+    begin, mean, stderr, chance = np.array(rows, dtype=float).reshape(-1, 4).T
+    within = "starts captured within so many periods"
+    unlike = "chance of times as unlike an exponential's, the lesser of two tests"
     return {
-        "captured": (
-            ("attractor", "elapsed"),
-            captured,
-            {"long_name": "starts captured within so many periods"},
-        ),
-        "elapsed": ("elapsed", elapsed, {"long_name": "periods"}),
-        "tail_mean": (
-            "tail_begin",
-            np.array([t.mean for t in tails], dtype=float),
-            {"long_name": "mean time left, periods"},
-        ),
-        "tail_stderr": ("tail_begin", np.array([t.stderr for t in tails], dtype=float)),
-        "tail_exponential": (
-            "tail_begin",
-            np.array([min(t.weibull, t.steady) for t in tails], dtype=float),
-            {"comment": "chance of times as unlike an exponential's, the lesser of two tests"},
-        ),
-        "tail_begin": (
-            "tail_begin",
-            np.array([t.begin for t in tails], dtype=np.int64),
-            {"long_name": "periods"},
-        ),
+        "captured": variable(("attractor", "elapsed"), captured, long_name=within),
+        "elapsed": variable("elapsed", elapsed, long_name="periods"),
+        "tail_mean": variable("tail_begin", mean, long_name="mean time left, periods"),
+        "tail_stderr": ("tail_begin", stderr),
+        "tail_exponential": variable("tail_begin", chance, comment=unlike),
+        "tail_begin": variable("tail_begin", begin.astype(np.int64), long_name="periods"),
     }
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, none_below_0, summarised
+from pendmap.analysis.result import Field, Schema, none_below_0, summarised, variable
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.formatting import counted
@@ -251,28 +251,24 @@ def _growth(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
     averaged = np.arange(1, windows + 1)
     means: Floats = np.cumsum(growth, axis=1) / (averaged * time)
     deviation = means.std(axis=0, ddof=1) if count > 1 else np.zeros(windows)
+    stderr = deviation / math.sqrt(max(count, 1))
     mean = means.mean(axis=0) if count else np.zeros(windows)
-    rate = {"units": units.of_rate}
+    elapsed = np.arange(course.size, dtype=np.int32)
+    periods = (averaged * raw.window).astype(np.int32)
+    rate, lasting = units.of_rate, "periods that each trajectory has been averaged for"
     text = "logarithm of the growth of a deviation along the start's own trajectory"
     return {
-        "growth": ("elapsed", course, {"units": "1", "long_name": text}),
-        "elapsed": (
-            "elapsed",
-            np.arange(course.size, dtype=np.int32),
-            {"long_name": "periods since the start"},
-        ),
-        "finite_time_exponent": (
+        "growth": variable("elapsed", course, "1", text),
+        "elapsed": variable("elapsed", elapsed, long_name="periods since the start"),
+        "finite_time_exponent": variable(
             ("trajectory", "window"),
             units.given(growth / time, RATE),
-            rate | {"long_name": f"finite-time exponent over {raw.window} periods"},
+            rate,
+            f"finite-time exponent over {raw.window} periods",
         ),
-        "running_exponent": ("window", units.given(mean, RATE), rate),
-        "running_stderr": ("window", units.given(deviation / math.sqrt(max(count, 1)), RATE), rate),
-        "averaged": (
-            "window",
-            (averaged * raw.window).astype(np.int32),
-            {"long_name": "periods that each trajectory has been averaged for"},
-        ),
+        "running_exponent": variable("window", units.given(mean, RATE), rate),
+        "running_stderr": variable("window", units.given(stderr, RATE), rate),
+        "averaged": variable("window", periods, long_name=lasting),
     }
 
 

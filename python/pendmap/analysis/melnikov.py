@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
@@ -153,14 +153,12 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     first = at["loop"] if sense else min(known, default=math.nan)
     dataset = xr.Dataset(
         {
-            "p_melnikov": (
-                ("omega", "branch"),
-                np.array(curve),
-                {"units": "1", "long_name": "amplitude of the drive over gravity"},
+            "p_melnikov": variable(
+                ("omega", "branch"), np.array(curve), "1", "amplitude of the drive over gravity"
             )
         },
         coords={
-            "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+            "omega": variable("omega", frequencies, "1", "Omega/w0"),
             "branch": ("branch", np.array(list(orbits))),
         },
     )

@@ -16,7 +16,7 @@ from pendmap.analysis.draws.parameter_map import fields as drawn_fields
 from pendmap.analysis.draws.parameter_map import regimes_over
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised
+from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import (
     SEARCH,
@@ -239,18 +239,10 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
         "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
         "winding": (dims, winding.reshape(shape), {"units": "turns"}),
-        "exponent": (
-            dims,
-            units.given(exponent, RATE).reshape(shape),
-            {"units": units.of_rate},
-        ),
+        "exponent": variable(dims, units.given(exponent, RATE).reshape(shape), units.of_rate),
         "undecided": (dims, raw.undecided.reshape(shape)),
         "failed": (dims, raw.failed.reshape(shape)),
-        "chaos_periods": (
-            dims,
-            raw.chaos_periods.reshape(shape),
-            {"comment": CHAOS_PERIODS},
-        ),
+        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": CHAOS_PERIODS}),
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
         **entries(raw, which, units),
     }

@@ -12,7 +12,7 @@ from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.errors import (
     MOST_PERIODS,
     MOST_SAMPLES,
@@ -221,12 +221,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
     dataset = xr.Dataset(
         {
-            "theta": ("time", raw.theta, {"units": "rad", "long_name": "angle, not wrapped"}),
-            "velocity": (
-                "time",
-                speed,
-                {"units": units.of_velocity, "long_name": units.derivative},
-            ),
+            "theta": variable("time", raw.theta, "rad", "angle, not wrapped"),
+            "velocity": variable("time", speed, units.of_velocity, units.derivative),
             "energy": (
                 "time",
                 energy(raw.theta, speed, model.attributes),

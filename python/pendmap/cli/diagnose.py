@@ -23,7 +23,7 @@ from pendmap.cli.options import (
     view_option,
 )
 from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import FILE, OutputFile, ReportFile, Whole
+from pendmap.cli.types import FILE, REPORT, OutputFile, Whole
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @plot_option
 @option(
     "--report",
-    ReportFile(),
+    REPORT,
     "Report: .html with its figures in it, .md with them beside it, or a folder with both.",
     metavar="FILE|DIR",
 )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.types import (
+    INSTRUCTION_SET,
     NUMBER,
     PICTURES,
-    InstructionSet,
     OutputFile,
     Whole,
 )
@@ -61,7 +61,7 @@ def simd_option(function: Command) -> Command:
 
     add = click.option(
         "--simd",
-        type=InstructionSet(),
+        type=INSTRUCTION_SET,
         callback=use,
         expose_value=False,
         help="Instruction set: avx512, avx2, sse or portable.  [default: the quickest here]",

@@ -11,7 +11,7 @@ import click
 
 from pendmap.cli.options import json_option, option, seed_option, simd_option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import PICTURES, OutputFile
+from pendmap.cli.types import PICTURES, OutputFile, default_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -64,7 +64,7 @@ def command(  # noqa: PLR0913 (an option each)
         out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
     folder = out or Path()
     for key in keys if plot is None else ():  # before anything is computed
-        OutputFile((".png", ".csv")).convert(folder / _name(key), None, None)
+        default_file(folder / _name(key))
     written = write_all(_files(keys, folder, plot, seed))
     if as_json:
         click.echo(json.dumps({"files": written}))
