@@ -140,8 +140,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed : int
         Draws the starts, and the models of ``draws``.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]``, each computed too: the interval
-        of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
+        As for :func:`pendmap.basins`; adds the interval of the mean lifetime
+        (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
     max_periods, tol, threads, progress
         As for :func:`pendmap.basins`.
 
@@ -244,8 +244,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 def _chaotic(found: xr.Dataset) -> float:
     """Return the share of the starts that end on a chaotic attractor."""
-    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
-    return float(found["fraction"].values[chaos].sum())
+    return float(found["fraction"][found["kind"].str.endswith("chaos")].sum())
 
 
 def _curves(
@@ -339,11 +338,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     else:
         lines.append(_why_not(dataset, exponent))
     if a["chaotic_share"] and not a["persistent"]:
-        names = [
-            str(name)
-            for name, kind in zip(found["attractor"].values, found["kind"].values, strict=True)
-            if str(kind).endswith("chaos")
-        ]
+        names = found["attractor"].values[found["kind"].str.endswith("chaos").values]
         lines.append(
             f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
             f"left out: nothing captured chaos there within {a['chaos_bound']} periods."

@@ -114,9 +114,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     grid : Grid, optional
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
-        how far orbits move, and in how many draws they exist and are stable
-        (:func:`pendmap.analysis.draws.orbits.orbits_over`).
+        As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
+        and are stable (:func:`pendmap.analysis.draws.orbits.orbits_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 

@@ -132,8 +132,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]``, each computed too: the
-        probability of each regime in each cell
+        As for :func:`pendmap.basins`; adds the probability of each regime in each cell
         (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
     threads, progress
         As for :func:`pendmap.basins`.

@@ -136,7 +136,7 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
-    if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
+    if chosen and dataset["kind"].str.endswith("chaos").any():
         text += " (beside chaos ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
 

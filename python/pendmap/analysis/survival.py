@@ -173,7 +173,7 @@ def growth_on_saddle(
     settle, label = found["settle_periods"].values, found["label"].values
     end = np.where(settle >= 0, settle, found.attrs["max_periods"])
     end = end - _settling(found, pendulum.period)
-    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
+    chaos = found["kind"].str.endswith("chaos").values
     never = (label < 0) | np.concatenate([[False], chaos])[np.maximum(label, 0)]
     # The natural measure of the saddle is where those are that live for long.
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)

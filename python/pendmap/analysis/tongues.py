@@ -152,8 +152,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Whether to add frequencies where curves begin, end, turn or bend between two given ones, for
         figures.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
-        the band of each critical amplitude
+        As for :func:`pendmap.basins`; adds the band of each critical amplitude
         (:func:`pendmap.analysis.draws.tongues.tongues_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
