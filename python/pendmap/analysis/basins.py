@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_CELLS = 1000
-"""Cells on each side of a map where nothing is given."""
+"""Default number of cells on each side of a map."""
 RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 _LAYERS: Final = {
@@ -109,7 +109,7 @@ SCHEMA = Schema(
     *result.END,
     drawn_field(drawn_fields),
     result.SECTION,
-    Field("layers", "", "labels or finite_time: which layers tell the plane", json=False),
+    Field("layers", "", "labels or finite_time: layers that describe the plane", json=False),
     Field("boundary_boxes", "1", "boxes with more than one label", None, json=False),
     Field("labels_reliable", "", "1 where labels of single cells are reliable", json=False),
     Field("uncertainty_exponent_stderr", "1", "its standard error", None, json=False),
@@ -229,27 +229,17 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
         own = same(pendulum, check=check, progress=part(progress, 0, len(several) + 1))
         return basins_over(own, several, partial(same, check=False), progress)
-    low, high, count = grid.velocity.as_tuple
-    axes = grid.theta.as_tuple, (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.basins_grid(bare, *axes, choices, progress)
+        raw = _core.basins_grid(bare, *grid.bare(units), choices, progress)
+    angle, speed = grid.theta, grid.velocity
+    shape, unit = (speed.count, angle.count), units.of_velocity
+    said = f"initial velocity {units.derivative}"
     dataset = xr.Dataset(
-        {
-            **_cells(raw, ("velocity", "theta"), (count, grid.theta.count), units),
-            **_uncertain_starts(raw),
+        {**_cells(raw, ("velocity", "theta"), shape, units), **_uncertain_starts(raw)},
+        coords={
+            **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
+            **coordinate("velocity", speed.centres, speed.edges, unit, said),
         },
-        coords=coordinate(
-            "theta",
-            grid.theta.centres,
-            grid.theta.edges,
-            {"units": "rad", "long_name": "initial angle"},
-        )
-        | coordinate(
-            "velocity",
-            grid.velocity.centres,
-            grid.velocity.edges,
-            {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"},
-        ),
     )
     return _complete(dataset, raw, pendulum, numerics)
 
@@ -411,7 +401,7 @@ def _complete(
 
 
 def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
-    """Return the measures of a fractal boundary that there are."""
+    """Return the measures of the boundary, none without a boundary."""
     found: dict[str, float | None] = {}
     if raw.texture.boundary_boxes:
         entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr

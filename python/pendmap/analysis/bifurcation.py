@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import find_objects, label
 
 from pendmap import _core
 from pendmap.analysis import result
@@ -226,7 +227,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
-    """Say where the sweeps are on attractors of two kinds, or on two of one kind."""
+    """Return lines on where the two sweeps are on different attractors."""
     up, down = dataset["up"].values, dataset["down"].values
     kind = np.append(dataset["entry_kind"].values, -1)
     differ = kind[up] != kind[down]
@@ -245,13 +246,13 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
 
 def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
     """Return the widest ranges of values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
-    spans = sorted(zip(edges[::2], edges[1::2] - 1, strict=True), key=lambda s: s[0] - s[1])[:3]
+    every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
+    spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
     said = ", ".join(
         f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
         for i, j in sorted(spans)
     )
-    return said + (" and less" if len(edges) > 2 * len(spans) else "")
+    return said + (" and less" if len(every) > len(spans) else "")
 
 
 def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:

@@ -42,13 +42,13 @@ if TYPE_CHECKING:
 
 
 _STARTS: Final = 40_000
-"""Starts drawn where no number is given."""
+"""Default number of starts."""
 _MOST_STARTS: Final = 10_000_000
-"""Starts that may be drawn."""
+"""Largest number of starts."""
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape for transient chaos."""
 _DRAWN: Final = 4000
-"""Periods of a survival curve that are kept."""
+"""Largest number of periods of a stored survival curve."""
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -281,7 +281,7 @@ def _measures(
     pendulum: Pendulum,
     units: Units,
 ) -> dict[str, Any]:
-    """Return what the tail, the saddle or lasting chaos tell, as attributes."""
+    """Return the measures of the tail, the saddle or persistent chaos as attributes."""
     period = pendulum.period
     growth, error, followed = saddle
     persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)

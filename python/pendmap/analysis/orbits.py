@@ -151,10 +151,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
         own = same(model, progress=part(progress, 0, len(several) + 1))
         return orbits_over(own, several, same, progress)
-    low, high, count = grid.velocity.as_tuple
-    box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.orbits(pendulum, (n, w), grid.theta.as_tuple, box, numerics.workers, progress)
+        box = grid.bare(units)
+        raw = _core.orbits(pendulum, (n, w), *box, numerics.workers, progress)
         paths = _paths(pendulum, raw.orbits, units)
     found = raw.orbits
     dataset = xr.Dataset(

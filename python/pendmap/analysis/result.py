@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 OF_TIME: Final = "1/w0 or s"
 """Unit of times: without dimensions or in SI, as the model is."""
 OF_RATE: Final = "1/tau or 1/s"
-"""Unit of exponents, likewise."""
+"""Unit of exponents: without dimensions or in SI."""
 OF_VELOCITY: Final = "1 or rad/s"
-"""Unit of velocities, likewise."""
+"""Unit of velocities: without dimensions or in SI."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,7 +127,7 @@ def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
         common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
         return common | own(dataset)
 
-    return Field("draws", "", "models drawn from the covariance and what they say", read=read)
+    return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
 
 UNITS: Final = Field("units", "", "SI or nondimensional", None)

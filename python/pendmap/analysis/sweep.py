@@ -71,7 +71,7 @@ class Varied:
             return {self.name: (self.name, x, self.attributes)}
         half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
         edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
-        return coordinate(self.name, x, edges, self.attributes)
+        return coordinate(self.name, x, edges, **self.attributes)
 
 
 def varied(

@@ -296,7 +296,7 @@ def _folds_to_their_ends(
     looked: NDArray[np.bool_],
     solve: Callable[[Floats], list[_Row]],
 ) -> NDArray[np.bool_]:
-    """Bisect for the ends of folds among frequencies that were added; tell where was looked."""
+    """Bisect for the ends of folds among added frequencies; return where folds were sought."""
     looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 _SAMPLES = 64
-"""Samples a period where no number is given."""
+"""Default number of samples a period."""
 _APART = 0.1
 """Angle between two samples, rad, that looks smooth in the phase plane."""
 _SMOOTH_SAMPLES = 200_000
@@ -347,7 +347,7 @@ def advance(  # noqa: PLR0913
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Advance many starts by the same number of periods, and nothing else.
+    """Advance many starts by the same number of periods.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ _LEAST_SECONDS: Final = 0.05
 
 
 def say(model: Pendulum | Rig, count: int, given: Mapping[str, Any], *, quiet: bool) -> None:
-    """Say periods and time of ``count`` starts where damping raises the bound."""
+    """Report periods and time of ``count`` starts where damping raises the bound."""
     if quiet or given["max_periods"] is not None:
         return
     from pendmap import _core

@@ -220,7 +220,7 @@ class Written(list[str]):
         return str(path) if str(path) in self else None
 
     def say(self) -> None:
-        """Say which files are complete, if any are."""
+        """Report the files that are complete, if any are."""
         if self:
             click.echo("Written: " + ", ".join(map(one_line, self)))
 

@@ -72,7 +72,7 @@ def basins_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of a basin map says of draws."""
+    """Return the draws of a basin map for the JSON object."""
     outcomes = [
         {"name": str(name), "fraction": mean, "ci95": [low, high], "exists": exists}
         for name, mean, low, high, exists in rows(dataset, *_SHARES)
@@ -83,7 +83,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
 
 @dataclasses.dataclass
 class _End:
-    """An end of starts, and what is counted of it over draws."""
+    """An end of starts with its counts over draws."""
 
     points: Floats
     """Its stroboscopic points, shape (L, 2)."""
@@ -98,7 +98,7 @@ class _End:
 def _counted(
     dataset: xr.Dataset, drawn: Iterable[xr.Dataset]
 ) -> tuple[dict[str, _End], Floats, NDArray[np.int64]]:
-    """Return the ends by name, the sums of the boxes' entropies, and in how many draws known."""
+    """Return ends by name, sums of the boxes' entropies, and numbers of draws with known ends."""
     own = dataset["label"]
     none = _in_boxes(own, own.values > 0).values * 0.0
 

@@ -77,7 +77,7 @@ def orbits_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of closed orbits says of draws."""
+    """Return the draws of closed orbits for the JSON object."""
     spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
     orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
     return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
