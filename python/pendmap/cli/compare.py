@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,16 +17,8 @@ from pendmap.cli.options import (
     simd_option,
     threads_option,
 )
-from pendmap.cli.show import (
-    Written,
-    keep_inputs,
-    progress_bar,
-    shows_progress,
-    write_all,
-    write_json,
-    write_table,
-)
-from pendmap.cli.types import FILE, NUMBER, Whole, default_file
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import FILE, NUMBER, Whole
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -50,14 +41,12 @@ def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
     path: Path,
-    plot: Path | None,
     members: int,
     spread: float,
     seed: int,
     threads: int | None,
     rate_hz: float | None,
-    as_json: bool,
-    quiet: bool,
+    **given: Any,  # noqa: ANN401 (outputs)
 ) -> None:
     """Simulate a MODEL beside every run of an EXPERIMENT.
 
@@ -68,30 +57,23 @@ def command(  # noqa: PLR0913 (an option each)
     wells visited, escapes, angle covered, time to settle and greatest velocity, and by the steady
     state that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
-    if plot is None and not as_json:
-        plot = default_file("compare.png")
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.free import as_json as fields
     from pendmap.comparison.free import as_text, tables
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubts_said
 
-    keep_inputs([model, *files_of(path)], {"--plot": [plot]})
+    outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
-    with progress_bar("compare", shown=shows_progress(quiet=quiet)) as progress:
+    with progress_bar("compare", shown=outputs.shows_progress) as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = Written()
-    if plot is not None:
-        from pendmap import render
-
-        draw = functools.partial(render.draw_comparison, comparison)
-        written = write_all([(draw, plot)], keep=True)
-    if as_json:
+    written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
+    if outputs.as_json:
         more = {"model": str(model), "simd": instruction_set()}
         write_json(fields(comparison) | more)
-    elif not quiet:
+    elif not outputs.quiet:
         doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
         for line in doubts:
             click.echo(line)

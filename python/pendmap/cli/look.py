@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
-from pendmap.cli.show import (
-    Written,
-    keep_inputs,
-    progress_bar,
-    shows_progress,
-    write_all,
-    write_json,
-)
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json
 from pendmap.cli.types import FILE
 
 if TYPE_CHECKING:
@@ -28,9 +20,7 @@ if TYPE_CHECKING:
 @rate_option
 @json_option()
 @quiet_option
-def command(
-    *, path: Path, plot: Path | None, rate_hz: float | None, as_json: bool, quiet: bool
-) -> None:
+def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
     """Say what a record holds and what is odd about it, before anything is fitted.
 
     A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
@@ -42,17 +32,13 @@ def command(
     from pendmap.records.summary import as_json as fields
     from pendmap.records.summary import as_text
 
-    keep_inputs(files_of(path), {"--plot": [plot]})
-    with progress_bar("read", shown=shows_progress(quiet=quiet)):
+    outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
+    with progress_bar("read", shown=outputs.shows_progress):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    written = Written()
-    if plot is not None:
-        from pendmap import render
-
-        written = write_all([(functools.partial(render.draw_record, experiment), plot)])
-    if as_json:
+    written = write_all(outputs.files(experiment, None, "draw_record"))
+    if outputs.as_json:
         write_json(fields(experiment))
-    elif not quiet:
+    elif not outputs.quiet:
         click.echo(as_text(experiment))
         written.say()
     written.check()

@@ -53,22 +53,17 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
         yield report
 
 
-def shows_progress(*, quiet: bool) -> bool:
-    """Return whether stderr is a terminal and --quiet is not given."""
-    return sys.stderr.isatty() and not quiet
-
-
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Outputs that a command writes."""
 
-    out: Path | None
-    plot: Path | None
-    rerun: Path | None
-    view: bool
-    as_json: bool
-    quiet: bool
+    out: Path | None = None
+    plot: Path | None = None
     report: Path | None = None
+    rerun: Path | None = None
+    view: bool = False
+    as_json: bool = False
+    quiet: bool = False
 
     @classmethod
     def take(
@@ -77,14 +72,16 @@ class Outputs:
         name: str,
         suffix: str = RESULTS[0],
         reads: Iterable[Path | None] = (),
+        *,
+        default: bool = True,
     ) -> Outputs:
-        """Take the output options out of ``given``; without any, one file ``name.*`` of each."""
+        """Take the output options out of ``given``; where none is given, by default all files."""
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
         taken = {field: given.pop(field) for field in fields}
-        if not any(value for field, value in taken.items() if field != "quiet"):
+        if default and not any(value for field, value in taken.items() if field != "quiet"):
             taken |= {field: default_file(name + files[field]) for field in files if field in taken}
-        if taken["view"] and taken["rerun"] is None:
+        if taken.get("view") and taken["rerun"] is None:
             taken["rerun"] = default_file(f"{name}.rrd")
         if "report" in taken and taken["out"] is None:
             taken["out"] = default_file(name + suffix)
@@ -109,17 +106,17 @@ class Outputs:
     @property
     def shows_progress(self) -> bool:
         """Whether stderr is a terminal and --quiet is not given."""
-        return shows_progress(quiet=self.quiet)
+        return sys.stderr.isatty() and not self.quiet
 
     def files(
         self,
         result: Any,  # noqa: ANN401 (a dataset or a report)
-        save: Write,
+        save: Write | None,
         draw: str = "draw",
         record: str = "record",
     ) -> Iterator[tuple[Write, Path]]:
         """Give what writes each file; matplotlib and Rerun are imported when their turn comes."""
-        if self.out is not None:
+        if self.out is not None and save is not None:
             yield save, self.out
         if self.plot is not None:
             from pendmap import render
