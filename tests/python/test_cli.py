@@ -93,7 +93,7 @@ def test_chaos_has_nulls_and_no_nan(pendmap_command: Run) -> None:
         assert chaos[key] is None
 
 
-def test_what_nothing_settles_on_has_no_settling_time(pendmap_command: Run) -> None:
+def test_maps_without_settling_have_no_settling_time(pendmap_command: Run) -> None:
     run = pendmap_command("basins", "--max-periods", 1, "--grid", 9, "--json")
     result = json.loads(run.stdout)
     assert result["mean_settle"] is None

@@ -70,7 +70,7 @@ def test_a_sweep_starts_where_it_is_told() -> None:
     assert kinds == ["rotation 1:1", "oscillation period 2"]
 
 
-def test_sweeps_on_mirror_images_are_told() -> None:
+def test_sweeps_on_mirror_images_are_reported() -> None:
     found = pendmap.bifurcation(Pendulum(), {"p": (1.0, 1.5, 26)})
     at = np.flatnonzero(found["p"].values > 1.4)
     on = [found[sweep].values[at] for sweep in ("up", "down")]
@@ -78,7 +78,7 @@ def test_sweeps_on_mirror_images_are_told() -> None:
     assert "mirror images of one another at p = 1.36 to 1.5" in found.attrs["summary"]
 
 
-def test_in_si_it_is_the_same() -> None:
+def test_results_in_si_agree() -> None:
     bare = pendmap.bifurcation(Pendulum(), {"omega": (1.9, 2.1, 5)})
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     si = pendmap.bifurcation(rig, {"Omega": (9.5, 10.5, 5)})
@@ -170,7 +170,7 @@ def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_kn
     assert found.sizes["loose"] == 0
 
 
-def test_without_damping_nothing_attracts_and_it_says_so() -> None:
+def test_the_summary_reports_that_nothing_attracts_without_damping() -> None:
     found = pendmap.bifurcation(Pendulum(gamma=0.0), {"p": (0.2, 2.0, 5)})
     assert found.sizes["branch"] == 0
     assert "Without damping (gamma = 0) nothing attracts" in found.attrs["summary"]

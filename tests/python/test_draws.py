@@ -52,7 +52,7 @@ def test_a_few_draws_are_the_first_of_many() -> None:
 
 
 @pytest.mark.parametrize("name", ["c_over_m", "Tr", "quadratic_drag.q"])
-def test_what_opposes_the_motion_is_drawn_from_the_gaussian_cut_off_at_0(name: str) -> None:
+def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) -> None:
     own = {"c_over_m": 0.01, "Tr": 0.01} | noted([name], [[4e-4]])
     notes = {"covariance": own.pop("covariance")}
     drag = Effect("quadratic_drag", {"q": 0.01})
@@ -64,7 +64,7 @@ def test_what_opposes_the_motion_is_drawn_from_the_gaussian_cut_off_at_0(name: s
     assert values.std() == pytest.approx(expected.std(), rel=0.08)
 
 
-def test_what_may_have_either_sign_is_drawn_with_both() -> None:
+def test_parameters_of_either_sign_are_drawn_with_both() -> None:
     bias = Effect("bias_torque", {"torque": 0.0})
     rig = Rig(w0=6.2, effects=(bias,), notes=noted(["bias_torque.torque"], [[1e-4]]))
     values = drawn(rig, 400, SEED).values
@@ -83,12 +83,12 @@ def test_what_may_have_either_sign_is_drawn_with_both() -> None:
         (noted(["w0"], [[1e20]]), "must leave room for allowed values"),
     ],
 )
-def test_what_cannot_be_drawn_from_is_refused(notes: dict[str, Any], said: str) -> None:
+def test_invalid_covariances_are_refused(notes: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
         drawn(Rig(w0=1e-3, notes=notes), 200, SEED)
 
 
-def test_what_is_typed_is_known_exactly(tmp_path: Any) -> None:  # noqa: ANN401
+def test_typed_parameters_are_not_drawn(tmp_path: Any) -> None:  # noqa: ANN401
     notes = noted(["w0", "c_over_m", "p", "Omega"], np.diag([1.0, 2.0, 3.0, 4.0]) * 1e-6)
     path = tmp_path / "model.toml"
     pendmap.save_model(Rig(w0=6.2, c_over_m=0.1, p=0.5, Omega=12.0, notes=notes), path)
@@ -162,7 +162,7 @@ def painted(label: np.ndarray, names: Sequence[str]) -> xr.Dataset:
 
 
 def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
-    """What is gathered of these maps, one a draw."""
+    """Return the map over draws of these maps, one for each draw."""
     models = tuple(Pendulum(gamma=0.1 + 0.001 * k) for k in range(len(maps)))
     values = np.array([[one.gamma] for one in models])
     draws = Draws(("gamma",), values, models, 0)
@@ -170,7 +170,7 @@ def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
     return basins_over(maps[0], draws, lambda model, **_: own[model], None)
 
 
-def test_what_is_fractal_is_told_from_what_the_parameters_do() -> None:
+def test_fractal_boundaries_and_parameters_cause_separate_doubt() -> None:
     random = np.random.default_rng(SEED)
     still = np.where(np.arange(50) < 23, 1, 2)[None].repeat(50, axis=0)
     names = ["rest", "rotation 1:+1"]

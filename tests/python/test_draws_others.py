@@ -140,7 +140,7 @@ WITHOUT = ("bifurcation", "lyapunov")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_map_says_what_its_model_is_worth(
+def test_results_report_a_model_that_misses_its_record(
     command: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -246,7 +246,7 @@ def test_a_number_of_cells_is_the_default_window_in_the_model_s_own_units() -> N
     ("name", "own", "factor"),
     [("stroke_mm", "p", 1e-3 * 12.4**2 / 9.81), ("frequency_hz", "Omega", math.tau)],
 )
-def test_what_a_laboratory_varies_is_the_rig_s_own_number(
+def test_quantities_of_the_laboratory_vary_the_rigs_numbers(
     name: str, own: str, factor: float
 ) -> None:
     rig = Rig(w0=6.2, c_over_m=1.0, p=0.9, Omega=12.4)
@@ -270,7 +270,7 @@ def test_what_a_laboratory_varies_is_the_rig_s_own_number(
         ),
     ],
 )
-def test_what_a_laboratory_cannot_vary_is_refused(ranges: Any, said: str) -> None:  # noqa: ANN401
+def test_invalid_laboratory_ranges_are_refused(ranges: Any, said: str) -> None:  # noqa: ANN401
     with pytest.raises(InputError) as error:
         pendmap.parameter_map(Rig(w0=6.2, c_over_m=1.0, p=0.9, Omega=12.4), ranges)
     assert said in str(error.value)

@@ -53,7 +53,7 @@ REFUSED = {
     ("a direct drive", "tongues"): "a sideways drive or an effect moves it",
     ("a direct drive", "melnikov"): "not proportional to p",
 }
-"""What has no meaning, and why."""
+"""Combinations without a meaning, with the reason."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -89,7 +89,7 @@ def test_every_output_of_every_command_takes_every_model(
     render.draw(result, tmp_path / "again.png")
 
 
-def test_what_is_refused_while_files_are_written_leaves_none(
+def test_refused_files_leave_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def refused(*_: object) -> None:

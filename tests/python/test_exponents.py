@@ -92,7 +92,7 @@ def test_transient_chaos_has_the_exponent_of_what_captures_it(settled: xr.Datase
     assert "rounding decides" in a["summary"]
 
 
-def test_the_transient_is_that_of_the_course_beside_it(settled: xr.Dataset) -> None:
+def test_the_transient_agrees_with_the_growth_of_its_trajectory(settled: xr.Dataset) -> None:
     a, growth = settled.attrs, settled["growth"].values
     at = a["transient_periods"]
     assert growth.size == at + 101
@@ -121,7 +121,7 @@ def test_the_points_of_figure_2_are_tumbling_chaos(name: str) -> None:
     assert found.attrs["exponent"] > 20 * found.attrs["stderr"]
 
 
-def test_another_seed_is_another_sample_and_threads_are_not(chaos: xr.Dataset) -> None:
+def test_the_seed_changes_the_sample_and_threads_do_not(chaos: xr.Dataset) -> None:
     few = pendmap.lyapunov(CHAOS, precision=0.01, threads=1)
     same = pendmap.lyapunov(CHAOS, precision=0.01, threads=2)
     other = pendmap.lyapunov(CHAOS, precision=0.01, seed=1)
@@ -132,7 +132,7 @@ def test_another_seed_is_another_sample_and_threads_are_not(chaos: xr.Dataset) -
     assert few.attrs["stderr"] > chaos.attrs["stderr"]
 
 
-def test_friction_that_holds_has_none_and_says_so() -> None:
+def test_a_pendulum_held_by_friction_has_no_exponent() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2))
     assert found.attrs["end"] == "captured"
     assert str(found["attractor"].values[0]) == "rest"
@@ -148,7 +148,7 @@ def test_a_cycle_with_turns_under_friction_has_the_sum_of_its_turns() -> None:
     assert -0.12 < a["exponent_sum"] < -0.101
 
 
-def test_in_si_it_is_per_second(chaos: xr.Dataset) -> None:
+def test_exponents_of_a_rig_are_per_second(chaos: xr.Dataset) -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=2.0, Omega=10.0)
     si = pendmap.lyapunov(rig)
     assert si.attrs["exponent"] == pytest.approx(5 * chaos.attrs["exponent"], rel=1e-9)
@@ -166,7 +166,7 @@ def test_without_damping_or_drive() -> None:
     assert found.attrs["exponent"] == pytest.approx(-0.05)
 
 
-def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
+def test_effects_act_and_unmappable_ones_are_refused() -> None:
     drag = Effect("quadratic_drag", {"q": 0.3})
     found = pendmap.lyapunov(Pendulum(p=1.0, effects=(drag,)))
     assert found.attrs["end"] == "captured"
@@ -188,7 +188,7 @@ def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
         ({"seed": -1}, "seed must be .*, got -1"),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], match: str) -> None:
+def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.lyapunov(CHAOS, **given)
 
@@ -222,7 +222,7 @@ def test_figures_say_what_they_show(chaos: xr.Dataset, settled: xr.Dataset) -> N
 
 
 @pytest.mark.usefixtures("strict_recordings")
-def test_recordings_hold_it(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
+def test_recordings_hold_the_result(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(chaos, tmp_path)
     wanted = {"/average/data/own", "/average/data/band", "/distribution/data/density"}
     assert wanted | {"/growth/data/own", "/attractor/data/points", "/summary"} <= set(back.columns)
@@ -230,7 +230,7 @@ def test_recordings_hold_it(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Pa
     assert {"/exponent/data/own", "/exponent/data/value"} <= set(back.columns)
 
 
-def test_files_hold_it(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
+def test_files_hold_the_result(chaos: xr.Dataset, settled: xr.Dataset, tmp_path: Path) -> None:
     for number, dataset in enumerate((chaos, settled)):
         path = pendmap.save(dataset, tmp_path / f"{number}.nc")
         assert pendmap.load(path).equals(dataset)

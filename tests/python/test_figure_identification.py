@@ -21,7 +21,7 @@ from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.methods.combined import recursion
 from pendmap.paper import drawings
-from pendmap.paper.draw import draw_pendulum
+from pendmap.paper import figures as paper_figures
 from pendmap.records import Experiment, Run
 from pendmap.render import identification as drawing
 from pendmap.render import style
@@ -136,7 +136,7 @@ def test_files_are_whole(tmp_path: Path) -> None:
 
 
 def test_the_pendulum(tmp_path: Path) -> None:
-    assert draw_pendulum(tmp_path / "a.png").stat().st_size > 5000
+    assert paper_figures.draw("3", tmp_path / "a.png").stat().st_size > 5000
     for size in (None, (9.0, 5.6), (5.6, 8.0)):
         with rc_context(style.RC):
             figure = drawings.figure(size=size, dpi=100.0)

@@ -82,9 +82,7 @@ def test_unknown_ends_and_broken_boxes_are_left_out() -> None:
     "labels", [np.zeros(5, int), np.ones((3, 3)), np.zeros((0, 3), int), [["a"]]]
 )
 @pytest.mark.parametrize("measure", [pendmap.basin_entropy, pendmap.uncertainty_exponent])
-def test_what_is_no_plane_of_labels_is_refused(
-    measure: Callable[[object], object], labels: object
-) -> None:
+def test_invalid_labels_are_refused(measure: Callable[[object], object], labels: object) -> None:
     with pytest.raises(InputError, match="labels"):
         measure(labels)
 
@@ -195,14 +193,14 @@ def test_three_basins_of_the_paper_s_kind_pass_the_log2_criterion() -> None:
 @pytest.mark.parametrize(
     "model", [Pendulum(gamma=0, p=0.5), pendmap.PRESETS["fig2b"], Pendulum(p=0.1)]
 )
-def test_where_labels_tell_nothing_there_is_none(model: Pendulum) -> None:
+def test_maps_without_meaningful_labels_have_no_exponent(model: Pendulum) -> None:
     result = pendmap.basins(model, Grid.square(20))
     assert "uncertainty_exponent" not in result.attrs
     with pytest.raises(InputError, match="uncertain"):
         pendmap.uncertainty_exponent(result)
 
 
-def test_the_command_says_them(tmp_path: Path, pendmap_command: Run) -> None:
+def test_the_command_reports_both_measures(tmp_path: Path, pendmap_command: Run) -> None:
     words = ("basins", "--p", "1", "--theta-r", "0.02", "--grid", "100", "--json")
     result = json.loads(pendmap_command(*words).stdout)
     exponent = result["uncertainty_exponent"]

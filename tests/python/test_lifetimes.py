@@ -44,7 +44,7 @@ def test_the_mean_of_drawn_times_is_found_and_its_error_holds() -> None:
     assert 0.7 < np.std(off) < 1.4
 
 
-def test_times_cut_off_do_not_bias_it() -> None:
+def test_censored_times_do_not_bias_the_mean() -> None:
     draw = np.random.default_rng(3)
     times = np.ceil(draw.exponential(3000.0, 20_000)).astype(int)
     early = times[times <= 1000]
@@ -57,7 +57,7 @@ def test_times_cut_off_do_not_bias_it() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_no_exponential_is_not_taken_for_one(seed: int) -> None:
+def test_other_distributions_are_rejected(seed: int) -> None:
     draw = np.random.default_rng(seed)
     for times in (draw.uniform(0, 300, 20_000), 50 * draw.weibull(2.0, 20_000)):
         whole = np.ceil(times).astype(int)
@@ -144,7 +144,7 @@ def test_chaos_that_persists() -> None:
     assert 0.02 < beside["chaotic_share"] < 0.06
 
 
-def test_a_little_friction_ends_what_persisted() -> None:
+def test_weak_friction_ends_persistent_chaos() -> None:
     found = pendmap.lifetime(Pendulum(p=2.0, theta_r=0.05), starts=2000)
     a = found.attrs
     assert (a["persistent"], a["transient_chaos"]) == (0, 1)
@@ -168,7 +168,7 @@ def test_in_si_the_time_is_in_seconds() -> None:
     assert " s)" in si["summary"]
 
 
-def test_threads_do_not_count_and_lists_of_starts_do() -> None:
+def test_the_result_depends_on_starts_and_not_on_threads() -> None:
     model = Pendulum(p=1.2, effects=(Effect("quadratic_drag", {"q": 0.01}),))
     one = pendmap.lifetime(model, starts=2000, threads=1)
     two = pendmap.lifetime(model, starts=2000, threads=2)
@@ -191,7 +191,7 @@ def test_threads_do_not_count_and_lists_of_starts_do() -> None:
         ({"tol": 2.0}, "tol must be .*, got 2"),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], match: str) -> None:
+def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.lifetime(Pendulum(), **given)
 
@@ -211,14 +211,14 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert refused.returncode == 2
 
 
-def test_the_figure_says_who_captures(long: xr.Dataset) -> None:
+def test_the_figure_names_the_attractors(long: xr.Dataset) -> None:
     said = " ".join(named(made(long)))
     assert "rotation 8:+8 captures" in said
     assert f"tail from period {long.attrs['from_period']}: mean lifetime" in said
 
 
 @pytest.mark.usefixtures("strict_recordings")
-def test_recordings_and_files_hold_it(long: xr.Dataset, tmp_path: Path) -> None:
+def test_recordings_and_files_hold_the_result(long: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(long, tmp_path)
     wanted = {"/survival/data/0", "/survival/data/1", "/survival/data/tail", "/tail/data/mean"}
     assert wanted | {"/legend", "/summary"} <= set(back.columns)

@@ -81,7 +81,7 @@ def test_multipliers_multiply_to_the_damping(smooth: Any) -> None:  # noqa: ANN4
     assert np.abs(product - expected).max() < 1e-12
 
 
-def test_settling_really_ends_near_the_attractor(smooth: Any) -> None:  # noqa: ANN401
+def test_settled_trajectories_are_near_their_attractor(smooth: Any) -> None:  # noqa: ANN401
     """From each cell, the settling time and 60 periods more lead to a point of its attractor."""
     picks = np.linspace(0, 3599, 200).astype(int)
     theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
@@ -105,7 +105,7 @@ def test_net_turns_are_those_of_the_trajectory(smooth: Any) -> None:  # noqa: AN
         assert int(smooth.net_turns[j, i]) == round(turns)
 
 
-def test_threads_do_not_show() -> None:
+def test_results_do_not_depend_on_threads() -> None:
     runs = [pendmap.basins(Pendulum(p=1.2), Grid.square(50), threads=n) for n in (1, 2)]
     for name in ("label", "settle_periods", "net_turns"):
         assert np.array_equal(runs[0][name], runs[1][name])
@@ -134,7 +134,7 @@ def test_without_damping_there_are_no_attractors() -> None:
     assert "there are no attractors" in result.attrs["summary"]
 
 
-def test_unreliable_labels_are_called_so() -> None:
+def test_unreliable_labels_are_reported() -> None:
     result = pendmap.basins(Pendulum(p=1.7), Grid.square(60))
     assert result.attrs["unreliable"] > 0.05
     assert result.attrs["labels_reliable"] == 0
@@ -195,7 +195,7 @@ def test_bad_lists_are_refused() -> None:
         pendmap.basins_of(Pendulum(), [], [])
 
 
-def test_other_threads_run_meanwhile_and_progress_is_told() -> None:
+def test_other_threads_run_and_progress_is_reported() -> None:
     ticks: list[float] = []
     told: list[tuple[int, int]] = []
     stop = threading.Event()
@@ -263,7 +263,7 @@ def test_every_instruction_set_gives_the_same_smooth_map(
     assert np.array_equal(again.label, smooth.label)
 
 
-def test_an_instruction_set_that_is_asked_for_counts_for_one_command(
+def test_the_option_simd_applies_to_one_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("PENDMAP_SIMD", raising=False)
@@ -348,7 +348,7 @@ def test_slow_settling_is_not_called_chaos(p: float) -> None:
     assert result.attrs["undecided"] > 0.5
 
 
-def test_a_start_on_an_unstable_rest_is_told_from_one_that_takes_long() -> None:
+def test_starts_on_an_unstable_rest_are_named() -> None:
     alone = pendmap.basins(Pendulum(p=1.0), Grid.square(1))
     assert "stand exactly on an unstable rest" in alone.attrs["summary"]
     assert "--max-periods" not in alone.attrs["summary"]

@@ -125,7 +125,7 @@ def loop_by_scipy(gamma: float, omega: float, theta_r: float, torque: float) -> 
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_loop_of_any_torque_is_scipys(seed: int) -> None:
+def test_the_loop_agrees_with_scipy(seed: int) -> None:
     random = np.random.default_rng(seed)
     torque = float(random.uniform(0.1, 0.97)) * (-1) ** seed
     gamma, omega = float(random.uniform(0.001, 0.06)), float(random.uniform(0.5, 2.5))
@@ -210,7 +210,7 @@ def gap_of_manifolds(p: float, gamma: float, omega: float, torque: float) -> flo
     return float((heights[0] - heights[1]).max())
 
 
-def test_the_manifolds_of_the_loop_touch_where_it_says() -> None:
+def test_the_manifolds_touch_at_the_computed_threshold() -> None:
     low, high = (gap_of_manifolds(p, 0.02, 2.0, 0.5) for p in (0.0672, 0.0680))
     assert low < 0 < high
     touching = 0.0672 - low * 0.0008 / (high - low)
@@ -248,7 +248,7 @@ def test_a_bias_torque_is_a_torque_and_a_weak_one_a_perturbation() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_loop_stands_beside_what_a_weak_torque_perturbs(seed: int) -> None:
+def test_a_weak_torque_has_both_thresholds(seed: int) -> None:
     random = np.random.default_rng(seed)
     gamma, omega = float(random.uniform(0.02, 0.2)), float(random.uniform(0.5, 2.5))
     torque = 4 * gamma / math.pi * float(random.uniform(0.1, 1.0)) * (-1) ** seed
@@ -270,7 +270,7 @@ def test_losses_that_a_torque_makes_up_for_are_losses_still() -> None:
     assert "Without damping" in free.attrs["summary"]
 
 
-def test_the_figure_names_what_it_shows() -> None:
+def test_the_figure_names_its_curves() -> None:
     # Heteroclinic thresholds lie above what is shown.
     found = pendmap.melnikov(Pendulum(gamma=0.02, p=0.1, torque=0.5), np.linspace(1.5, 2.5, 11))
     assert found["p_melnikov"].sel(branch="forward").values.min() > 1
@@ -280,7 +280,7 @@ def test_the_figure_names_what_it_shows() -> None:
 
 
 @pytest.mark.parametrize("torque", [1.0, -1.0, 1.3])
-def test_no_rest_no_loop(torque: float) -> None:
+def test_a_torque_without_a_rest_is_refused(torque: float) -> None:
     with pytest.raises(pendmap.InputError, match="torque must be above -1 and below 1"):
         pendmap.melnikov(Pendulum(torque=torque), [1.0])
 
@@ -294,12 +294,12 @@ def test_thresholds_that_rounding_hides_are_not_given() -> None:
     assert "rounding hides" in said["summary"]
 
 
-def test_in_si_it_is_the_same() -> None:
+def test_results_in_si_agree() -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     assert pendmap.melnikov(rig, [1.0]).attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0))
 
 
-def test_what_is_refused() -> None:
+def test_invalid_models_are_refused() -> None:
     with pytest.raises(pendmap.InputError, match="ascending"):
         pendmap.melnikov(Pendulum(), [2.0, 1.0])
 

@@ -99,7 +99,7 @@ def test_the_path_is_the_motion() -> None:
             assert np.abs(gap).max() < 1e-7
 
 
-def test_in_si_they_are_the_same() -> None:
+def test_results_in_si_agree() -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     bare, si = pendmap.orbit(DRIVEN, 1, 1), pendmap.orbit(rig, 1, 1)
     assert np.allclose(si["theta_point"], bare["theta_point"], atol=1e-10)
@@ -110,7 +110,7 @@ def test_in_si_they_are_the_same() -> None:
     assert "rad/s" in si.attrs["summary"]
 
 
-def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
+def test_effects_act_and_unmappable_ones_are_refused() -> None:
     drag = Effect("quadratic_drag", {"q": 0.02})
     plain = pendmap.orbit(DRIVEN, 1, 1)
     slowed = pendmap.orbit(Pendulum(gamma=0.1, p=1.0, omega=2.0, effects=(drag,)), 1, 1)
@@ -132,7 +132,7 @@ def test_effects_count_and_what_no_map_can_have_is_refused() -> None:
         ({"threads": 0}, "threads must be .*, got 0"),
     ],
 )
-def test_what_is_refused(given: dict[str, Any], match: str) -> None:
+def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.orbit(DRIVEN, **given)
 
@@ -153,7 +153,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert "1 to 64" in refused.stderr
 
 
-def test_none_is_an_answer_too(tmp_path: Path) -> None:
+def test_a_result_may_have_no_orbit(tmp_path: Path) -> None:
     found = pendmap.orbit(Pendulum(gamma=0.5, p=0.1, omega=2.0), 3, 1)
     assert found.sizes["orbit"] == 0
     assert found.attrs["summary"].startswith("No orbit of period 3 and 1 net turn forward, 0")
@@ -167,7 +167,7 @@ def oscillations() -> xr.Dataset:
     return pendmap.orbit(Pendulum(gamma=0.1, p=1.3, omega=2.0), 2, 0)
 
 
-def test_the_figure_names_them_and_says_which_attract(oscillations: xr.Dataset) -> None:
+def test_the_figure_names_orbits_and_their_stability(oscillations: xr.Dataset) -> None:
     figure = made(oscillations)
     said = named(figure)
     assert len(said) == oscillations.sizes["orbit"]

@@ -40,7 +40,7 @@ def test_a_figure_has_several_names(name: str) -> None:
         ("x", "'x'"),
     ],
 )
-def test_what_is_not_there_is_refused_in_one_line(
+def test_unknown_figures_are_refused_in_one_line(
     pendmap_command: Run, tmp_path: Path, name: str, says: str
 ) -> None:
     run = pendmap_command("paper", name)

@@ -79,7 +79,7 @@ def test_a_cell_is_the_pendulum_with_its_parameters(plane: xr.Dataset) -> None:
     assert set(said) == closed
 
 
-def test_in_si_it_is_the_same(plane: xr.Dataset) -> None:
+def test_results_in_si_agree(plane: xr.Dataset) -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     si = pendmap.parameter_map(rig, {"p": (0.2, 2.0, 10), "Omega": (7.0, 12.0, 6)})
     assert np.mean(by_cell(si) == by_cell(plane)) > 0.9  # long transients end otherwise
@@ -119,7 +119,7 @@ def test_parameters_of_effects_vary_too() -> None:
         ([1, 2], "must be a mapping"),
     ],
 )
-def test_what_is_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (whatever was given)
+def test_invalid_ranges_are_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (whatever was given)
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.parameter_map(Pendulum(), ranges)
 
@@ -136,7 +136,7 @@ def test_what_is_refused(ranges: Any, match: str) -> None:  # noqa: ANN401 (what
         ({"box": 3}, "box"),
     ],
 )
-def test_what_is_refused_of_the_search(given: dict[str, Any], match: str) -> None:
+def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.parameter_map(Pendulum(), {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)}, **given)
 
@@ -216,7 +216,7 @@ def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: P
     assert "- rest: multiplier +1: grey" in legend
 
 
-def test_it_comes_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
+def test_a_map_is_read_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:
     for name in ("map.nc", "map.zarr"):
         back = pendmap.load(pendmap.save(plane, tmp_path / name))
         assert back.equals(plane)
@@ -273,7 +273,7 @@ def test_titles_leave_out_an_effects_parameter_that_varies() -> None:
     assert "0.2" not in drawn.chart(found).subtitle
 
 
-def test_what_no_damping_holds_has_no_attractors() -> None:
+def test_undamped_motion_has_no_attractors() -> None:
     found = pendmap.parameter_map(Pendulum(omega=1.0), {"p": (0.0, 1.0, 3), "gamma": (0.0, 0.2, 3)})
     assert (found["undecided"].values[0] == 1.0).all()
     assert found["entry_cell"].values.min() >= 3

@@ -1,4 +1,4 @@
-"""What README.md and the pages in docs promise is run."""
+"""Commands and examples of README.md and of the pages in docs run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PATIENCE = 120.0
-"""So much processor time, s, a command may take: what else the machine does is not in it."""
+"""Processor time that a command may take, s."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 

@@ -1,4 +1,4 @@
-"""Where damping is small, motions are given time to settle, and the price is said before."""
+"""Small damping: motions have time to settle, and costs are reported before a computation."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_bound_that_is_given_stays_as_it_is() -> None:
     assert found.attrs["undecided"] > 0
 
 
-def test_the_price_is_said_before_where_it_is_more_than_usual(pendmap_command: Run) -> None:
+def test_unusual_costs_are_reported_before_the_computation(pendmap_command: Run) -> None:
     given = ["basins", "--p", "0.3", "--grid", "4", "--json"]
     done = pendmap_command(*given, "--gamma", "0.02")
     assert SMALL in done.stderr

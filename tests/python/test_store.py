@@ -29,7 +29,7 @@ def results() -> list[xr.Dataset]:
 
 
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
-def test_what_is_written_is_read_back(
+def test_written_results_are_read_back(
     tmp_path: Path, results: list[xr.Dataset], suffix: str
 ) -> None:
     for result in results:

@@ -138,7 +138,7 @@ def test_inverted_rest_is_stable_where_its_motions_decay(seed: int) -> None:
             assert (largest_multiplier(p, omega, gamma, -1.0) < 1 + 1e-6) == bool(yes), p
 
 
-def test_where_upright_is_no_rest_hanging_rest_is_looked_at_alone() -> None:
+def test_hanging_rest_alone_is_computed_where_upright_is_no_rest() -> None:
     push = Formula("push", "k*(1 - cos(theta))", {"k": 2})
     pushed = Pendulum(gamma=0.1, effects=(push(k=0.1),))
     found = pendmap.tongues(pushed, 6.0, 20.0)
@@ -232,7 +232,7 @@ def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> No
 
 
 @pytest.mark.parametrize("name", list(critical_curves.CURVES))
-def test_asymptotic_curves_have_the_order_they_say(name: str) -> None:
+def test_asymptotic_curves_have_their_order(name: str) -> None:
     multiplier, formula = critical_curves.CURVES[name]
     # Towards the tip, with damping in proportion: detuning, p and gamma (or its root) all small.
     errors = []
@@ -267,7 +267,7 @@ def test_added_damping_is_damping_and_effects_count() -> None:
         ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
     ],
 )
-def test_what_has_no_critical_curves_is_refused(given: dict[str, Any], match: str) -> None:
+def test_models_without_critical_curves_are_refused(given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
         pendmap.tongues(Pendulum(**given), 2.0)
 
@@ -287,7 +287,7 @@ def test_bad_values_are_named(given: dict[str, Any], match: str) -> None:
         pendmap.tongues(DAMPED, **given)
 
 
-def test_in_si_the_frequency_is_there_too() -> None:
+def test_results_in_si_have_the_frequency_in_si() -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     si, bare = pendmap.tongues(rig, [1.9, 2.0]), pendmap.tongues(DAMPED, [1.9, 2.0])
     assert np.allclose(si["p"], bare["p"], atol=1e-12)
@@ -299,7 +299,7 @@ def whole() -> xr.Dataset:
     return pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60))
 
 
-def test_threads_do_not_show(whole: xr.Dataset) -> None:
+def test_results_do_not_depend_on_threads(whole: xr.Dataset) -> None:
     again = pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60), threads=1)
     assert again["p"].equals(whole["p"])
 
@@ -328,7 +328,7 @@ def finer() -> xr.Dataset:
     return pendmap.tongues(DAMPED, np.linspace(1.1, 2.1, 11), 3.0, refine=True)
 
 
-def test_frequencies_are_added_until_curves_turn_where_they_do(finer: xr.Dataset) -> None:
+def test_added_frequencies_resolve_the_turns_of_curves(finer: xr.Dataset) -> None:
     omega, asked = finer["omega"].values, finer["asked"].values.astype(bool)
     assert np.array_equal(omega[asked], np.linspace(1.1, 2.1, 11))
     assert (np.diff(omega) > 0).all()
@@ -406,7 +406,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert "lower one first" in refused.stderr
 
 
-def test_a_file_holds_all_of_it(whole: xr.Dataset, tmp_path: Path) -> None:
+def test_files_hold_the_result(whole: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
     assert back.equals(whole)
     assert render.draw(back, tmp_path / "tongues.svg").stat().st_size > 0

@@ -76,7 +76,7 @@ def test_the_exponent_of_tumbling_chaos(truths: dict[str, Any]) -> None:
         assert error < 0.03 * v["lle_per_tau"]
 
 
-def test_an_unpredictable_end_is_called_so() -> None:
+def test_an_unpredictable_end_is_reported() -> None:
     run = pendmap.simulate(pendmap.PRESETS["fig2b"], 1, 0, 2000, samples=8)
     assert run.attrs["end_error"] > 1e-3
     assert "not predictable" in run.attrs["summary"]

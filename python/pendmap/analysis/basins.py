@@ -17,7 +17,7 @@ from pendmap.analysis.draws.basins import fields as drawn_fields
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, variable
+from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, records, variable
 from pendmap.analysis.summary import summarise
 from pendmap.errors import MOST_PERIODS, check_flag, core_errors
 from pendmap.formatting import counted
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_CELLS = 1000
-"""Cells on each side of a map where nothing is given."""
+"""Default number of cells on each side of a map."""
 RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 _LAYERS: Final = {
@@ -44,11 +44,8 @@ _LAYERS: Final = {
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their shares for the JSON object."""
-    return [
-        orbit_table.row(dataset, "attractor", k)
-        | {name: float(dataset[name].values[k]) for name in ("fraction", "stderr")}
-        for k in range(dataset.sizes["attractor"])
-    ]
+    shares = records(dataset, fraction="fraction", stderr="stderr")
+    return [orbit_table.row(dataset, "attractor", k) | own for k, own in enumerate(shares)]
 
 
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
@@ -84,8 +81,8 @@ SCHEMA = Schema(
         "mean entropy of the labels in boxes of 5 x 5 cells",
         "texture.basin_entropy",
     ),
-    Field("boundary_basin_entropy", "nat", "the same, of boxes with more than one label"),
-    Field("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes"),
+    Field("boundary_basin_entropy", "nat", "the same, of boxes with more than one label", None),
+    Field("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes", None),
     Field("unreliable", "1", "share of sampled labels that half the step or mirroring changes"),
     Field("labels_sampled", "1", "labels checked so"),
     Field("unreliable_half_step", "1", "share that half the step changes"),
@@ -105,21 +102,21 @@ SCHEMA = Schema(
     result.BOUND,
     result.TOL,
     *result.RUN[1:],
-    Field("log2_criterion", "", "1 where the log 2 criterion is met: fractal", convert=bool),
+    Field("log2_criterion", "", "1 where the log 2 criterion is met: fractal", None, convert=bool),
     Field("uncertainty_exponent", "1", "exponent of the uncertain share", read=_uncertainty),
     Field("mean_settle", "periods", "mean time of capture; -1: none", convert=none_below_0),
     Field("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
     *result.END,
     drawn_field(drawn_fields),
     result.SECTION,
-    Field("layers", "", "labels or finite_time: which layers tell the plane", json=False),
-    Field("boundary_boxes", "1", "boxes with more than one label", json=False),
+    Field("layers", "", "labels or finite_time: layers that describe the plane", json=False),
+    Field("boundary_boxes", "1", "boxes with more than one label", None, json=False),
     Field("labels_reliable", "", "1 where labels of single cells are reliable", json=False),
-    Field("uncertainty_exponent_stderr", "1", "its standard error", json=False),
-    Field("uncertainty_exponent_low", "1", "lower end of its 95 % interval", json=False),
-    Field("uncertainty_exponent_high", "1", "upper end of its 95 % interval", json=False),
-    Field("uncertainty_eps_low", "1", "least distance, in sides of the window", json=False),
-    Field("uncertainty_eps_high", "1", "greatest distance that was fitted", json=False),
+    Field("uncertainty_exponent_stderr", "1", "its standard error", None, json=False),
+    Field("uncertainty_exponent_low", "1", "lower end of its 95 % interval", None, json=False),
+    Field("uncertainty_exponent_high", "1", "upper end of its 95 % interval", None, json=False),
+    Field("uncertainty_eps_low", "1", "least distance, in sides of the window", None, json=False),
+    Field("uncertainty_eps_high", "1", "greatest distance that was fitted", None, json=False),
 )
 
 
@@ -136,21 +133,20 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Basins of attraction: which attractor each initial condition ends on.
+    """Compute the basins of attraction: the attractor on which each initial condition ends.
 
     Attractors are found from a coarse set of starts, polished by Newton's method to 1e-12 and
     classified by their period ``n`` (in forcing periods) and winding ``w`` (net turns over it).
-    Then every cell runs until an attractor has captured it. Cells that meet none begin new
-    searches. Without damping, or where one chaotic attractor takes everything, there is nothing to
-    tell by labels: net turns and the finite-time exponent after ``layer_periods`` are given
-    instead.
+    Then every cell runs until an attractor has captured it; cells that meet none begin new
+    searches. Without damping, or where one chaotic attractor takes everything, labels have no
+    meaning: net turns and the finite-time exponent after ``layer_periods`` are given instead.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
-        The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; only ``tol``
-        and the errors are of numbers without dimensions. Effects of the group ``reading`` change
-        nothing: a map is of the motion, not of what a sensor shows of it.
+        The model. With a rig velocities are in rad/s, times in s and exponents in 1/s; ``tol`` and
+        the errors are of numbers without dimensions. Effects of the group ``reading`` change
+        nothing: a map shows the motion, not the sensor's reading.
     grid : Grid or int, optional
         The initial conditions at ``tau = 0``, or how many cells each side of the default window
         has: [-pi, pi] x [-3, 3], with a rig [-pi, pi] x [-3 w0, 3 w0]. By default 1000.
@@ -170,8 +166,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     seed : int
         Shifts the samples of starts.
     check : bool
-        Whether to measure what takes further starts: labels of a sample with half the step and
-        mirrored, and the share of starts whose label changes nearby.
+        Whether to check labels of a sample with half the step and mirrored, and to measure the
+        share of starts whose label changes nearby.
     draws : int, optional
         Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
         the probability of each end in each cell, and the doubt that the parameters cause
@@ -189,29 +185,28 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
         the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
         89), ``stderr`` its standard error as if the starts were drawn at random, more than that of
-        a grid. ``basin_entropy``,
-        ``boundary_basin_entropy`` and ``uncertainty_exponent`` say how the basins are interwoven:
-        see :func:`pendmap.basin_entropy` and :func:`pendmap.uncertainty_exponent`; the counts
-        behind the exponent, from 10,000 cells on, are ``uncertain`` of ``uncertainty_tried``
-        starts over ``distance``. With ``draws`` also what
-        :func:`pendmap.analysis.draws.basins.basins_over` adds.
+        a grid. ``basin_entropy``, ``boundary_basin_entropy`` and ``uncertainty_exponent`` measure
+        how the basins are interwoven (:func:`pendmap.basin_entropy`,
+        :func:`pendmap.uncertainty_exponent`); the exponent's counts, from 10,000 cells on, are
+        ``uncertain`` of ``uncertainty_tried`` starts over ``distance``. With ``draws`` also the
+        variables of :func:`pendmap.analysis.draws.basins.basins_over`.
 
     Notes
     -----
     The same request gives the same bits on any number of threads and on all processors that
-    multiply and add with one rounding (AVX2, AVX-512). Processors without that, or ``sse`` and
+    multiply and add with one rounding (AVX2, AVX-512). Other processors, or ``sse`` and
     ``portable`` of the environment variable ``PENDMAP_SIMD``, round otherwise: where basins are
-    smooth no label differs, where they are fractal as many do as rounding decides, 33 % at
-    ``p = 1.7``. ``simd`` of the result says which instruction set it was.
+    smooth no label differs, where they are fractal up to 33 % do (``p = 1.7``). The attribute
+    ``simd`` names the instruction set.
 
     Raises
     ------
     InputError
         If a value is outside its range, or no step reaches ``tol``.
     MemoryError
-        If there is too little memory for the cells.
+        If there is too little memory for the cells; by every analysis.
     KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
+        After Ctrl-C, within a fraction of a second; by every analysis.
 
     See Also
     --------
@@ -234,27 +229,17 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
         own = same(pendulum, check=check, progress=part(progress, 0, len(several) + 1))
         return basins_over(own, several, partial(same, check=False), progress)
-    low, high, count = grid.velocity.as_tuple
-    axes = grid.theta.as_tuple, (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.basins_grid(bare, *axes, choices, progress)
+        raw = _core.basins_grid(bare, *grid.bare(units), choices, progress)
+    angle, speed = grid.theta, grid.velocity
+    shape, unit = (speed.count, angle.count), units.of_velocity
+    said = f"initial velocity {units.derivative}"
     dataset = xr.Dataset(
-        {
-            **_cells(raw, ("velocity", "theta"), (count, grid.theta.count), units),
-            **_uncertain_starts(raw),
+        {**_cells(raw, ("velocity", "theta"), shape, units), **_uncertain_starts(raw)},
+        coords={
+            **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
+            **coordinate("velocity", speed.centres, speed.edges, unit, said),
         },
-        coords=coordinate(
-            "theta",
-            grid.theta.centres,
-            grid.theta.edges,
-            {"units": "rad", "long_name": "initial angle"},
-        )
-        | coordinate(
-            "velocity",
-            grid.velocity.centres,
-            grid.velocity.edges,
-            {"units": units.of_velocity, "long_name": f"initial velocity {units.derivative}"},
-        ),
     )
     return _complete(dataset, raw, pendulum, numerics)
 
@@ -272,7 +257,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     check: bool = True,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Which attractor each start of a list ends on.
+    """Find the attractor on which each start of a list ends.
 
     Parameters
     ----------
@@ -416,8 +401,8 @@ def _complete(
 
 
 def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
-    """Return the measures of a fractal boundary; None or nothing where there is no boundary."""
-    found: dict[str, float | None] = {"boundary_basin_entropy": None, "boundary_boxes": None}
+    """Return the measures of the boundary, none without a boundary."""
+    found: dict[str, float | None] = {}
     if raw.texture.boundary_boxes:
         entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr
         found["boundary_basin_entropy"] = entropy

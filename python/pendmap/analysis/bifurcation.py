@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import find_objects, label
 
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
 from pendmap.analysis.regimes import kind_of
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
 from pendmap.errors import check_number, core_errors
@@ -42,12 +43,9 @@ _LISTED = 12
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
+    keys = {key: f"branch_{key}" for key in ("kind", "w", "first", "last")}
     kinds = dataset["kind"].values
-    names = ("branch_kind", "branch_w", "branch_first", "branch_last")
-    return [
-        {"kind": str(kinds[kind]), "w": int(w), "first": float(first), "last": float(last)}
-        for kind, w, first, last in zip(*(dataset[name].values for name in names), strict=True)
-    ]
+    return [one | {"kind": str(kinds[one["kind"]])} for one in records(dataset, **keys)]
 
 
 SCHEMA = Schema(
@@ -73,15 +71,15 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Stroboscopic points of the attractors against one parameter.
+    """Compute the stroboscopic points of the attractors against one parameter.
 
-    At every value all attractors are searched as by :func:`pendmap.parameter_map`: from several
-    starts, and from what neighbouring values have. Besides, one motion is followed as the parameter
-    slowly grows, and one as it falls: at each value it goes on from where it was, moved by 1e-6,
-    until it has arrived on an attractor. Where the two differ there is hysteresis.
+    At every value all attractors are searched as by :func:`pendmap.parameter_map`, from several
+    starts and from the attractors at neighbouring values. Besides, one motion is followed as the
+    parameter slowly grows, and one as it falls: at each value it goes on from where it was, moved
+    by 1e-6, until it has arrived on an attractor. Where the two differ there is hysteresis.
 
-    Attractors at neighbouring values that are alike (same kind, period and winding, points near one
-    another) make a branch. At a bifurcation one branch ends and others begin.
+    Attractors at neighbouring values with the same kind, period and winding and with points near
+    one another make a branch. At a bifurcation one branch ends and others begin.
 
     Parameters
     ----------
@@ -111,10 +109,6 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a parameter or value is not allowed, the model has an effect that no map can have, or no
         step reaches ``tol``.
-    MemoryError
-        If there is too little memory for the values.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     Examples
     --------
@@ -189,10 +183,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "undecided": (axis.name, raw.undecided),
         "failed": (axis.name, raw.failed),
         "chaos_periods": (axis.name, raw.chaos_periods, {"comment": CHAOS_PERIODS}),
-        "loose_sweep": (
-            "loose",
-            np.repeat([1, -1], [raw.up.value.size, raw.down.value.size]),
-        ),
+        "loose_sweep": ("loose", np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
         "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
@@ -236,7 +227,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
-    """Say where the sweeps are on attractors of two kinds, or on two of one kind."""
+    """Return lines on where the two sweeps are on different attractors."""
     up, down = dataset["up"].values, dataset["down"].values
     kind = np.append(dataset["entry_kind"].values, -1)
     differ = kind[up] != kind[down]
@@ -255,13 +246,13 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
 
 def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
     """Return the widest ranges of values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
-    spans = sorted(zip(edges[::2], edges[1::2] - 1, strict=True), key=lambda s: s[0] - s[1])[:3]
+    every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
+    spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
     said = ", ".join(
         f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
         for i, j in sorted(spans)
     )
-    return said + (" and less" if len(edges) > 2 * len(spans) else "")
+    return said + (" and less" if len(every) > len(spans) else "")
 
 
 def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:

@@ -114,7 +114,7 @@ class _Column:
 
 
 def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
-    """Tell which intervals are to be halved for the curves of one model."""
+    """Return which intervals are to be halved for the curves of one model."""
     widths = np.abs(np.diff(x))
     wanted = np.zeros(widths.size, dtype=bool)
     for k, (a, b) in enumerate(pairwise(columns)):
@@ -133,7 +133,7 @@ def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
 
 
 def _seen_to_end(a: _Column, b: _Column) -> bool:
-    """Whether curves that one of two columns lacks are seen to end: they turn, or leave."""
+    """Return whether curves missing in one of two columns visibly end: they turn or leave."""
     short, long = sorted((a, b), key=lambda one: one.heights.size)
     extra = long.heights.size - short.heights.size
 

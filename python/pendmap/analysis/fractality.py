@@ -114,27 +114,26 @@ class UncertaintyExponent(Readable):
 def uncertainty_exponent(
     labels: npt.ArrayLike | xr.Dataset, *, periodic: tuple[bool, bool] = (False, False)
 ) -> UncertaintyExponent:
-    """Uncertainty exponent of a basin boundary, and with it its dimension.
+    """Estimate the uncertainty exponent of a basin boundary and the boundary's dimension.
 
     A start known to within ``eps`` is uncertain if its label is another at a distance ``eps`` on
     one side or the other. Their share falls as ``f(eps) ~ eps^alpha``, and ``2 - alpha`` is the
-    box-counting dimension of the boundary in the plane: 1 where it is smooth (alpha = 1); where
-    alpha is small, knowing starts much better foretells hardly more ends.
+    box-counting dimension of the boundary in the plane: 1 where it is smooth (alpha = 1). Where
+    alpha is small, much more precise starts hardly improve the prediction of ends.
 
-    Of a dataset of :func:`pendmap.basins` it is what the map found by starts of its own: anew for
-    each distance, in directions drawn at random, down to 1.5e-8 of the window's sides, so that
-    counts are independent. Where the map shows every change of label that a pilot meets, most
-    starts are drawn near those, each with its weight, and the counts are those of as many starts
-    drawn evenly as tell the share as precisely. Of labels on a grid the distances are 1, 2, 3, 4,
-    6, ... cells, along both axes at once, from every cell. Labels on a grid tell
-    nothing below a cell: where filaments are thinner, the exponent is that of what is seen.
+    For a dataset of :func:`pendmap.basins` the counts are those of the map, of independent starts
+    for each distance, in directions drawn at random, down to 1.5e-8 of the window's sides. Where
+    the map shows every change of label that a pilot sample meets, most starts are drawn near those,
+    each with its weight, and the counts are the equivalent numbers of starts drawn evenly. For
+    labels on a grid the distances are 1, 2, 3, 4, 6, ... cells, along both axes at once, from every
+    cell; filaments thinner than a cell are not resolved.
 
-    The law is fitted by its binomial likelihood to the smallest distances, to all of them up to
-    where it breaks (a misfit less likely than 1 %), and the interval is widened by what misfit
-    remains. On a grid neighbouring cells are no independent starts: they count for as many as the
-    spread between strips of the plane allows; beyond an edge that is not periodic lies the plane's
-    mirror image. Starts with an unknown end near by, undecided or failed, are left out. Attractors
-    that are mirror images of one another count as two.
+    The law is fitted by its binomial likelihood to the smallest distances, up to where it breaks (a
+    misfit less likely than 1 %), and the interval is widened by the remaining misfit. On a grid
+    neighbouring cells are no independent starts: their effective number follows from the spread
+    between strips of the plane; beyond an edge that is not periodic lies the plane's mirror image.
+    Starts with an unknown end nearby, undecided or failed, are left out. Attractors that are mirror
+    images of one another count as two.
 
     Parameters
     ----------
@@ -332,16 +331,16 @@ class BasinEntropy:
 
 
 def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
-    """Basin entropy and boundary basin entropy of labels on a grid.
+    """Compute basin entropy and boundary basin entropy of labels on a grid.
 
     In a box of 5 x 5 cells ``S_i = -sum p ln p``, ``p`` the shares of the labels in it. Basin
     entropy is ``S_b = sum S_i / N`` over all N boxes, boundary basin entropy
-    ``S_bb = sum S_i / N_b`` over the N_b boxes with more than one label. ``S_b`` says how
+    ``S_bb = sum S_i / N_b`` over the N_b boxes with more than one label. ``S_b`` measures how
     unpredictable ends are: 0 in one basin, ``ln K`` where K labels are spread at random. On a
-    smooth boundary at most few boxes hold more than two labels, so ``S_bb`` stays below ``ln 2``;
-    above it the boundary is fractal. Below it nothing follows: many fractal boundaries are there,
-    and all of those between two labels alone.
-    Both depend on the size of a cell; compare maps with cells of one size.
+    smooth boundary at most few boxes hold more than two labels, and ``S_bb`` is below ``ln 2``;
+    above it the boundary is fractal. Below it nothing follows: many fractal boundaries have such a
+    value, and all of those between two labels. Both depend on the size of a cell; compare maps with
+    cells of one size.
 
     Parameters
     ----------

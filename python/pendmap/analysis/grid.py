@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import MOST_CELLS, InputError, check_number, check_type, check_whole, short_repr
+from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.units import Units
 
 
 FASTEST: Final = 3.0
@@ -109,6 +110,12 @@ class Grid:
         check_type("grid", given, cls, example)
         return given  # type: ignore[return-value]
 
+    def bare(self, units: Units) -> tuple[tuple[float, float, int], tuple[float, float, int]]:
+        """Return both axes as tuples, velocities without dimensions."""
+        low, high, count = self.velocity.as_tuple
+        speeds = units.bare(low, VELOCITY), units.bare(high, VELOCITY), count
+        return self.theta.as_tuple, speeds
+
     @property
     def attributes(self) -> dict[str, float]:
         """Bounds of the box as attributes of a dataset."""
@@ -129,13 +136,14 @@ def coordinate(
     name: str,
     centres: NDArray[np.float64],
     edges: NDArray[np.float64],
-    attributes: Mapping[str, str],
+    units: str,
+    long_name: str,
 ) -> dict[str, Any]:
     """Return a coordinate of cells and, by the CF conventions, the bounds of each cell."""
     bounds = f"{name}_bounds"
     pairs = np.stack([edges[:-1], edges[1:]], axis=1)
     return {
-        name: (name, centres, {**attributes, "bounds": bounds}),
+        name: (name, centres, {"units": units, "long_name": long_name, "bounds": bounds}),
         bounds: ((name, "bound"), pairs),
     }
 

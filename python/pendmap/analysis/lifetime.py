@@ -17,7 +17,15 @@ from pendmap.analysis.draws.lifetime import lifetime_over
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, summarised
+from pendmap.analysis.result import (
+    Field,
+    Schema,
+    drawn_field,
+    none_below_0,
+    records,
+    summarised,
+    variable,
+)
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
@@ -34,27 +42,19 @@ if TYPE_CHECKING:
 
 
 _STARTS: Final = 40_000
-"""Starts drawn where no number is given."""
+"""Default number of starts."""
 _MOST_STARTS: Final = 10_000_000
-"""Starts that may be drawn."""
+"""Largest number of starts."""
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape for transient chaos."""
 _DRAWN: Final = 4000
-"""Periods of a survival curve that are kept."""
+"""Largest number of periods of a stored survival curve."""
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
-    rows = zip(
-        dataset["attractor"].values,
-        dataset["fraction"].values,
-        dataset["captured"].values[:, -1],
-        strict=True,
-    )
-    return [
-        {"name": str(name), "fraction": float(share), "captured": int(count)}
-        for name, share, count in rows
-    ]
+    last = dataset.isel(elapsed=-1)
+    return records(last, name="attractor", fraction="fraction", captured="captured")
 
 
 SCHEMA = Schema(
@@ -111,19 +111,19 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Mean lifetime of transient chaos: the exponential tail of the times until capture.
+    """Estimate the mean lifetime of transient chaos from the exponential tail of capture times.
 
-    Starts drawn from a window run until an attractor captures them. Chaos that does not last is a
-    chaotic saddle: what is still on it after ``t`` periods decays as ``exp(-t / mean)``. The mean
-    is the maximum of the likelihood, the sum of all times beyond ``from_period``, those cut off at
-    the bound included, over the number of captures; its standard error is ``mean /
+    Starts drawn from a window run until an attractor captures them. Transient chaos is a chaotic
+    saddle: the number of trajectories still on it after ``t`` periods decays as ``exp(-t / mean)``.
+    The mean is the maximum of the likelihood, the sum of all times beyond ``from_period``, those
+    cut off at the bound included, over the number of captures; its standard error is ``mean /
     sqrt(captured)``.
 
     An exponential tail alone is no chaos: starts near the edge of a smooth basin leave the saddle
-    on it at a rate ``kappa`` too. There ``kappa`` is the saddle's own exponent ``lambda``; on a
+    on it at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a
     chaotic saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
-    entropy (Kantz & Grassberger 1985). So growth is measured along trajectories while they live,
-    and where ``lambda`` does not exceed ``kappa`` there is no transient chaos, and no lifetime.
+    entropy (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories
+    before their capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     starts : int
         How many are drawn; 100 to ten million.
     from_period : int, optional
-        Where the tail begins. By default where the data say so: twice the earliest period from
-        which two tests (of a Weibull shape, and of a rate that changes) find it exponential.
+        Beginning of the tail. By default twice the earliest period from which two tests (of a
+        Weibull shape, and of a rate that changes) find it exponential.
     seed : int
         Draws the starts, and the models of ``draws``.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]``, each computed too: the interval
-        of the mean lifetime (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
+        As for :func:`pendmap.basins`; adds the interval of the mean lifetime
+        (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
     max_periods, tol, threads, progress
         As for :func:`pendmap.basins`.
 
@@ -160,10 +160,6 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
-    MemoryError
-        If there is too little memory for the starts.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     References
     ----------
@@ -248,8 +244,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 def _chaotic(found: xr.Dataset) -> float:
     """Return the share of the starts that end on a chaotic attractor."""
-    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
-    return float(found["fraction"].values[chaos].sum())
+    return float(found["fraction"][found["kind"].str.endswith("chaos")].sum())
 
 
 def _curves(
@@ -265,29 +260,17 @@ def _curves(
     ]
     captured = np.array(by, dtype=np.int64).reshape(len(by), elapsed.size)
     tails = survival.residual(times, censored, bound) if times.size else []
+    rows = [(t.begin, t.mean, t.stderr, min(t.weibull, t.steady)) for t in tails]
+    begin, mean, stderr, chance = np.array(rows, dtype=float).reshape(-1, 4).T
+    within = "starts captured within so many periods"
+    unlike = "chance of times as unlike an exponential's, the lesser of two tests"
     return {
-        "captured": (
-            ("attractor", "elapsed"),
-            captured,
-            {"long_name": "starts captured within so many periods"},
-        ),
-        "elapsed": ("elapsed", elapsed, {"long_name": "periods"}),
-        "tail_mean": (
-            "tail_begin",
-            np.array([t.mean for t in tails], dtype=float),
-            {"long_name": "mean time left, periods"},
-        ),
-        "tail_stderr": ("tail_begin", np.array([t.stderr for t in tails], dtype=float)),
-        "tail_exponential": (
-            "tail_begin",
-            np.array([min(t.weibull, t.steady) for t in tails], dtype=float),
-            {"comment": "chance of times as unlike an exponential's, the lesser of two tests"},
-        ),
-        "tail_begin": (
-            "tail_begin",
-            np.array([t.begin for t in tails], dtype=np.int64),
-            {"long_name": "periods"},
-        ),
+        "captured": variable(("attractor", "elapsed"), captured, long_name=within),
+        "elapsed": variable("elapsed", elapsed, long_name="periods"),
+        "tail_mean": variable("tail_begin", mean, long_name="mean time left, periods"),
+        "tail_stderr": ("tail_begin", stderr),
+        "tail_exponential": variable("tail_begin", chance, comment=unlike),
+        "tail_begin": variable("tail_begin", begin.astype(np.int64), long_name="periods"),
     }
 
 
@@ -298,7 +281,7 @@ def _measures(
     pendulum: Pendulum,
     units: Units,
 ) -> dict[str, Any]:
-    """Return what the tail, the saddle or lasting chaos tell, as attributes."""
+    """Return the measures of the tail, the saddle or persistent chaos as attributes."""
     period = pendulum.period
     growth, error, followed = saddle
     persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
@@ -355,11 +338,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     else:
         lines.append(_why_not(dataset, exponent))
     if a["chaotic_share"] and not a["persistent"]:
-        names = [
-            str(name)
-            for name, kind in zip(found["attractor"].values, found["kind"].values, strict=True)
-            if str(kind).endswith("chaos")
-        ]
+        names = found["attractor"].values[found["kind"].str.endswith("chaos").values]
         lines.append(
             f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
             f"left out: nothing captured chaos there within {a['chaos_bound']} periods."

@@ -11,7 +11,7 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, none_below_0, summarised
+from pendmap.analysis.result import Field, Schema, none_below_0, summarised, variable
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.formatting import counted
@@ -90,7 +90,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Largest Lyapunov exponent of the attractor that a start reaches.
+    """Compute the largest Lyapunov exponent of the attractor that a start reaches.
 
     ``lambda = lim ln(|dx(tau)| / |dx(0)|) / tau``, ``dx`` a small deviation. The start is followed
     until an attractor has captured it. Of a closed orbit the exponent is exact, from the
@@ -100,16 +100,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     then captured has the exponent of what captured it: ``transient_periods`` says when.
 
     Friction: a turn multiplies the deviation's velocity by the ratio of the accelerations after and
-    before it; a stick takes its velocity away and leaves its angle. So a motion that sticks keeps a
-    finite largest exponent, and its second one is minus infinity. What is held for ever has none:
-    deviations neither grow nor shrink.
+    before it; a stick sets its velocity to 0 and leaves its angle. A motion that sticks has a
+    finite largest exponent, and its second one is minus infinity. A pendulum that friction holds
+    for ever has none: deviations neither grow nor shrink.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; with a rig velocities are in rad/s and exponents per second.
     theta, velocity : float
-        Where the start is at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
+        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     precision : float
         Standard error over exponent that chaos is averaged for; above 0, up to 0.5.
     max_periods : int, optional
@@ -129,10 +129,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``averaged``, the periods that each trajectory has been averaged for, and
         ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
         as for :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
-        exact, nan for regular motion without damping), ``regular`` (what such
-        motion has over the same time), ``per_period``, ``end``
-        (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),
-        ``transient_periods``, ``second_exponent`` and
+        exact, nan for regular motion without damping), ``regular`` (the exponent of such motion
+        over the same time), ``per_period``, ``end`` (``captured``, ``chaotic``, ``undamped``,
+        ``undecided`` or ``failed``), ``transient_periods``, ``second_exponent`` and
         ``kaplan_yorke_dimension`` (of the stroboscopic map's attractor, ``1 + lambda_1 /
         |lambda_2|``); nan where one has no meaning.
 
@@ -140,8 +139,6 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     References
     ----------
@@ -171,16 +168,12 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start = theta, units.bare(velocity, VELOCITY)
         raw = _core.lyapunov(pendulum, start, choices, progress)
     found, members = raw.attractor, raw.ensemble
-    exponent, stderr = _value(raw)
-    regular = _regular(raw, pendulum.period)
-    if exponent < _CLEAR * regular:
-        stderr = math.nan
+    exponent, stderr, regular = _value(raw, pendulum.period)
     attractors = [] if found is None else [found]
     dataset = xr.Dataset(
         {
             **orbit_table.table(attractors, units, "attractor"),
-            **_course(raw),
-            **_ensemble(raw, pendulum.period, units),
+            **_growth(raw, pendulum.period, units),
         },
         coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
     )
@@ -207,21 +200,20 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _value(raw: _core.Lyapunov) -> tuple[float, float]:
-    """Return the exponent per unit of tau and its standard error; nan where there is none."""
+def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
+    """Return the exponent per unit of tau, its standard error, and that of regular motion.
+
+    The latter is the exponent of undamped motion whose deviations grow as tau. All are nan where
+    there is none.
+    """
     if raw.attractor is not None:
-        return raw.attractor.exponent, raw.attractor.exponent_stderr
-    if raw.ensemble is not None and raw.end == "undamped":
-        return raw.ensemble.exponent
-    return math.nan, math.nan
-
-
-def _regular(raw: _core.Lyapunov, period: float) -> float:
-    """Return the exponent of regular undamped motion, whose deviations grow as tau; else nan."""
+        return raw.attractor.exponent, raw.attractor.exponent_stderr, math.nan
     if raw.ensemble is None or raw.end != "undamped":
-        return math.nan
+        return math.nan, math.nan, math.nan
     averaged = float(raw.ensemble.growth.shape[1] * raw.window)
-    return math.log1p(averaged / raw.ensemble.dropped) / (averaged * period)
+    regular = math.log1p(averaged / raw.ensemble.dropped) / (averaged * period)
+    exponent, stderr = raw.ensemble.exponent
+    return exponent, math.nan if exponent < _CLEAR * regular else stderr, regular
 
 
 def _second(
@@ -250,42 +242,33 @@ def _second(
     }
 
 
-def _course(raw: _core.Lyapunov) -> dict[str, Any]:
-    growth = np.concatenate([[0.0], np.cumsum(raw.course)])
-    text = "logarithm of the growth of a deviation along the start's own trajectory"
-    return {
-        "growth": ("elapsed", growth, {"units": "1", "long_name": text}),
-        "elapsed": (
-            "elapsed",
-            np.arange(growth.size, dtype=np.int32),
-            {"long_name": "periods since the start"},
-        ),
-    }
-
-
-def _ensemble(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
-    """Return the running mean over all trajectories, and the exponents of all windows."""
+def _growth(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
+    """Return the growth along the start's trajectory, running means and exponents of windows."""
+    course = np.concatenate([[0.0], np.cumsum(raw.course)])
     growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     count, windows = growth.shape
     time = raw.window * period
     averaged = np.arange(1, windows + 1)
     means: Floats = np.cumsum(growth, axis=1) / (averaged * time)
     deviation = means.std(axis=0, ddof=1) if count > 1 else np.zeros(windows)
+    stderr = deviation / math.sqrt(max(count, 1))
     mean = means.mean(axis=0) if count else np.zeros(windows)
-    rate = {"units": units.of_rate}
+    elapsed = np.arange(course.size, dtype=np.int32)
+    periods = (averaged * raw.window).astype(np.int32)
+    rate, lasting = units.of_rate, "periods that each trajectory has been averaged for"
+    text = "logarithm of the growth of a deviation along the start's own trajectory"
     return {
-        "finite_time_exponent": (
+        "growth": variable("elapsed", course, "1", text),
+        "elapsed": variable("elapsed", elapsed, long_name="periods since the start"),
+        "finite_time_exponent": variable(
             ("trajectory", "window"),
             units.given(growth / time, RATE),
-            rate | {"long_name": f"finite-time exponent over {raw.window} periods"},
+            rate,
+            f"finite-time exponent over {raw.window} periods",
         ),
-        "running_exponent": ("window", units.given(mean, RATE), rate),
-        "running_stderr": ("window", units.given(deviation / math.sqrt(max(count, 1)), RATE), rate),
-        "averaged": (
-            "window",
-            (averaged * raw.window).astype(np.int32),
-            {"long_name": "periods that each trajectory has been averaged for"},
-        ),
+        "running_exponent": variable("window", units.given(mean, RATE), rate),
+        "running_stderr": variable("window", units.given(stderr, RATE), rate),
+        "averaged": variable("window", periods, long_name=lasting),
     }
 
 

@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
@@ -72,7 +72,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     """Return the amplitude of the drive at which homoclinic tangles begin, to first order.
 
     Along an orbit of the pendulum without losses that leaves upright rest and comes back to it, all
-    that the model has besides does the work
+    other terms of the model do the work
 
     ``M(t0) = W + p D(t0)``,
 
@@ -87,10 +87,10 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
 
     *A torque that keeps up a rotation*, as it gives more in a turn than the losses take, belongs to
     the pendulum without losses: in the tilted potential the orbit is the loop from upright rest
-    ``pi - asin(torque)`` into the well and back (:func:`loop`). The formula
-    above stands beside it: there manifolds of neighbouring upright rests cross (heteroclinic), to
-    first order in the torque too. Under damping the limit of a small torque is that formula. The
-    loop has no limit: its two ways interfere with a phase that grows as ``omega ln(1/torque)``.
+    ``pi - asin(torque)`` into the well and back (:func:`loop`). The formula above is given too: at
+    that amplitude manifolds of neighbouring upright rests cross (heteroclinic), to first order in
+    the torque. With damping it is the limit of a small torque. The loop has no limit: its two ways
+    interfere with a phase that grows as ``omega ln(1/torque)``.
 
     All integrals are computed from the model's own acceleration, so that effects count too. The
     true tangency differs at the second order in damping.
@@ -153,14 +153,12 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     first = at["loop"] if sense else min(known, default=math.nan)
     dataset = xr.Dataset(
         {
-            "p_melnikov": (
-                ("omega", "branch"),
-                np.array(curve),
-                {"units": "1", "long_name": "amplitude of the drive over gravity"},
+            "p_melnikov": variable(
+                ("omega", "branch"), np.array(curve), "1", "amplitude of the drive over gravity"
             )
         },
         coords={
-            "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+            "omega": variable("omega", frequencies, "1", "Omega/w0"),
             "branch": ("branch", np.array(list(orbits))),
         },
     )

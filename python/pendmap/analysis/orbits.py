@@ -16,7 +16,7 @@ from pendmap.analysis.draws.orbits import fields as drawn_fields
 from pendmap.analysis.draws.orbits import orbits_over
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, summarised
+from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
@@ -42,9 +42,8 @@ _LISTED = 12
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
     return [
-        orbit_table.row(dataset, "orbit", k)
-        | {"stable": bool(dataset["stable"][k]), "residual": float(dataset["residual"][k])}
-        for k in range(dataset.sizes["orbit"])
+        orbit_table.row(dataset, "orbit", k) | own | {"stable": bool(own["stable"])}
+        for k, own in enumerate(records(dataset, stable="stable", residual="residual"))
     ]
 
 
@@ -90,7 +89,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """All periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
+    """Find all periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
 
     An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
     displacement is compared with its linear part on every cell of the grid; cells in which it
@@ -99,9 +98,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     the known ones divided out. What closes to 1e-12, or as far as rounding lets it where the
     multipliers are large, is kept, with the Floquet multipliers, the eigenvalues of the derivative
     of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
-    plane lie nearer than a cell may be missed: a finer grid shows.
-
-    States that friction holds for ever are a set, and none of them is listed.
+    plane lie nearer than a cell may be missed; a finer grid finds it. States that friction holds
+    for ever are a set and are not listed.
 
     Parameters
     ----------
@@ -109,16 +107,15 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         The model. With a rig velocities are in rad/s, times in s and exponents in 1/s.
     n : int
         Smallest period, in forcing periods; 1 to 64. Without drive 1: rests (``w = 0``) and the
-        rotation that a torque keeps up (``w = 1`` or ``-1``), closed on the angle section, with a
-        ``period`` of its own and without the trivial multiplier.
+        rotation that a torque keeps up (``w = 1`` or ``-1``), closed on the angle section, with
+        its own ``period`` and without the trivial multiplier.
     w : int
         Net turns over that period, forward positive.
     grid : Grid, optional
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
-        how far orbits move, and in how many draws they exist and are stable
-        (:func:`pendmap.analysis.draws.orbits.orbits_over`).
+        As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
+        and are stable (:func:`pendmap.analysis.draws.orbits.orbits_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -134,10 +131,6 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     ------
     InputError
         If a value is outside its range, or the model has an effect that no map can have.
-    MemoryError
-        If there is too little memory for the grid.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     Examples
     --------
@@ -158,10 +151,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
         own = same(model, progress=part(progress, 0, len(several) + 1))
         return orbits_over(own, several, same, progress)
-    low, high, count = grid.velocity.as_tuple
-    box = (units.bare(low, VELOCITY), units.bare(high, VELOCITY), count)
     with core_errors():
-        raw = _core.orbits(pendulum, (n, w), grid.theta.as_tuple, box, numerics.workers, progress)
+        box = grid.bare(units)
+        raw = _core.orbits(pendulum, (n, w), *box, numerics.workers, progress)
         paths = _paths(pendulum, raw.orbits, units)
     found = raw.orbits
     dataset = xr.Dataset(

@@ -16,7 +16,7 @@ from pendmap.analysis.draws.parameter_map import fields as drawn_fields
 from pendmap.analysis.draws.parameter_map import regimes_over
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.result import Field, Schema, drawn_field, summarised
+from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import (
     SEARCH,
@@ -59,8 +59,8 @@ _STEPS = 10_000
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regimes with their shares of the cells for the JSON object."""
-    rows = zip(dataset["regime_kinds"].values, dataset["regime_share"].values, strict=True)
-    return [{"kinds": json.loads(str(kinds)), "share": float(share)} for kinds, share in rows]
+    found = records(dataset, kinds="regime_kinds", share="regime_share")
+    return [one | {"kinds": json.loads(one["kinds"])} for one in found]
 
 
 SCHEMA = Schema(
@@ -89,21 +89,22 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws: int | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The set of attractors over a plane of two parameters.
+    """Find the set of attractors in every cell of a plane of two parameters.
 
     Every cell is searched from a few initial conditions, other ones than its neighbours', and from
     points of its neighbours' attractors: grids become finer from every eighth cell to all, each
-    cell beginning also from what its neighbours on the coarser grid have; then, in six passes, from
-    what cells at distances from eight to one have and it lacks. So branches that coexist are
-    followed, and nothing depends on the order of the work. Trajectories run until a stable orbit,
-    found by Newton's method, has captured them. Those that nothing captures are watched four times
-    as long again, in four windows. Windows that turn alike in regions that meet form a group; a
-    set of groups that no trajectory leaves, with an exponent that is positive by four standard
-    errors, is chaos of its kind, unless it holds a stable orbit of period 1 to 4 (Newton's method
-    from the least gaps of 64 by 64 starts) that captures it. A run goes on where nothing tells what
-    its last group leads to, and a set of fewer than 16 runs gets 16 more from its own points.
-    Beside another attractor, which could end chaos, none of 16 may end within 5000 periods. What is
-    left is undecided.
+    cell beginning also from the attractors of its neighbours on the coarser grid; then, in six
+    passes, from the attractors that cells at distances from eight to one have and it lacks. In this
+    way branches that coexist are followed, and nothing depends on the order of the work.
+
+    Trajectories run until a stable orbit, found by Newton's method, has captured them. Those that
+    nothing captures are watched four times as long again, in four windows. Windows that turn alike
+    in regions that meet form a group; a set of groups that no trajectory leaves, with an exponent
+    that is positive by four standard errors, is chaos of its kind, unless it holds a stable orbit
+    of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that captures it. A
+    run goes on while its last group leads nowhere known, and a set of fewer than 16 runs gets 16
+    more from its own points. If the cell has another attractor, which could end chaos, none of 16
+    runs may end within 5000 periods. All other starts are undecided.
 
     Parameters
     ----------
@@ -131,8 +132,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]``, each computed too: the
-        probability of each regime in each cell
+        As for :func:`pendmap.basins`; adds the probability of each regime in each cell
         (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
     threads, progress
         As for :func:`pendmap.basins`.
@@ -154,10 +154,6 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a parameter or value is not allowed, the model has an effect that no map can have, or no
         step reaches ``tol``.
-    MemoryError
-        If there is too little memory for the cells.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     References
     ----------
@@ -242,18 +238,10 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
         "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
         "winding": (dims, winding.reshape(shape), {"units": "turns"}),
-        "exponent": (
-            dims,
-            units.given(exponent, RATE).reshape(shape),
-            {"units": units.of_rate},
-        ),
+        "exponent": variable(dims, units.given(exponent, RATE).reshape(shape), units.of_rate),
         "undecided": (dims, raw.undecided.reshape(shape)),
         "failed": (dims, raw.failed.reshape(shape)),
-        "chaos_periods": (
-            dims,
-            raw.chaos_periods.reshape(shape),
-            {"comment": CHAOS_PERIODS},
-        ),
+        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": CHAOS_PERIODS}),
         "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
         **entries(raw, which, units),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.analysis.summary import of_model
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
 OF_TIME: Final = "1/w0 or s"
 """Unit of times: without dimensions or in SI, as the model is."""
 OF_RATE: Final = "1/tau or 1/s"
-"""Unit of exponents, likewise."""
+"""Unit of exponents: without dimensions or in SI."""
 OF_VELOCITY: Final = "1 or rad/s"
-"""Unit of velocities, likewise."""
+"""Unit of velocities: without dimensions or in SI."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,8 +30,9 @@ class Field:
     name: str
     unit: str
     meaning: str
-    core: str = ""
-    """Place of the value in the core's result where it has another name: ``texture.chance``."""
+    core: str | None = ""
+    """Place of the value in the core's result where it has another name: ``texture.chance``; None
+    where the value is never there."""
     json: bool = True
     """Whether the JSON object holds it."""
     convert: Callable[[Any], Any] | None = None
@@ -71,12 +73,9 @@ class Schema:
         values = {"section": model.units.section, **values}
         dataset.attrs = {"kind": self.kind, "title": model.title, **model.attributes}
         for field in self.fields:
-            if field.name in values or field.read is not None:
-                value = values.get(field.name)
-            else:
-                value = raw
-                for part in (field.core or field.name).split("."):
-                    value = getattr(value, part, None)
+            value = values.get(field.name)
+            if not (field.name in values or field.read or field.core is None or raw is None):
+                value = operator.attrgetter(field.core or field.name)(raw)
             if value is not None:
                 dataset.attrs[field.name] = value
 
@@ -106,6 +105,12 @@ def variable(
     return dims, values, {key: text for key, text in attributes.items() if text}
 
 
+def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
+    """Return a JSON object for each place of a dimension, from variables by its keys."""
+    columns = [dataset[name].values.tolist() for name in variables.values()]
+    return [dict(zip(variables, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
 def none_below_0(value: float) -> float | None:
     """Return a number, None where it is -1: an event that never happened."""
     return None if value < 0 else value
@@ -122,10 +127,10 @@ def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
         common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
         return common | own(dataset)
 
-    return Field("draws", "", "models drawn from the covariance and what they say", read=read)
+    return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
 
-UNITS: Final = Field("units", "", "SI or nondimensional")
+UNITS: Final = Field("units", "", "SI or nondimensional", None)
 SECTION: Final = Field("section", "", "where the stroboscopic section lies", json=False)
 TOL: Final = Field("tol", "1", "error after 5 periods that was asked for")
 REACHED: Final = Field("reached_error", "1", "error after 5 periods that was reached")
@@ -152,7 +157,9 @@ RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
 UNSAID: Final = (VERSION.hidden, FORMAT.hidden)
 """Versions as attributes alone."""
 SUMMARY: Final = Field(
-    "summary", "", "findings, a sentence a line", convert=lambda text: text.split("\n")
+    "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")
 )
-MISSES: Final = Field("misses_record", "1", "residual over noise of a model that misses its record")
+MISSES: Final = Field(
+    "misses_record", "1", "residual over noise of a model that misses its record", None
+)
 END: Final = (SUMMARY, MISSES)

@@ -70,8 +70,11 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         lines.insert(0, f"{window}: {counted(a['cells'], 'start')}.")
     if plane != "conservative":
         lines += unlimited
-        if not unlimited and a["undecided"] > 0:
-            lines += _sustained_rotation(pendulum)
+        if not unlimited and a["undecided"] > 0 and _dry(pendulum)[0] > 0 and pendulum.p:
+            lines.append(
+                "With dry friction alone (gamma = 0) phase area shrinks only where the motion "
+                "turns back: a rotation that the drive keeps up settles on nothing."
+            )
     lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
@@ -95,11 +98,8 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
     grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
     """
-    dry = _dry(pendulum)
-    if dry is None:
-        return []
-    friction, torque = dry
-    if torque == 0 or friction == 0 or abs(torque) < friction:
+    friction, torque = _dry(pendulum)
+    if torque == 0 or not 0 < friction <= abs(torque):
         return []
     way = "forward" if torque > 0 else "backward"
     lines = [
@@ -113,19 +113,8 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     return lines
 
 
-def _sustained_rotation(pendulum: Pendulum) -> list[str]:
-    """Return a line where dry friction alone damps: of one sense it keeps phase area."""
-    dry = _dry(pendulum)
-    if dry is None or dry[0] == 0 or pendulum.p == 0:
-        return []
-    line = (
-        "With dry friction alone (gamma = 0) phase area shrinks only where the motion turns back: "
-    )
-    return [line + "a rotation that the drive keeps up settles on nothing."]
-
-
-def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
-    """Return dry friction and torque where nothing grows with the speed; else None."""
+def _dry(pendulum: Pendulum) -> tuple[float, float]:
+    """Return dry friction and torque; nan where other damping acts."""
     kinds = {effect.name for effect in pendulum.effects if effect.brakes}
     own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
     added = dict.fromkeys(own.values(), 0.0)
@@ -137,7 +126,7 @@ def _dry(pendulum: Pendulum) -> tuple[float, float] | None:
     )
     # Stribeck's part of friction is none at speed; all others may brake a rotation.
     if gamma > 0 or kinds - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
-        return None
+        return math.nan, math.nan
     return friction, torque
 
 
@@ -147,7 +136,7 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
-    if chosen and any(str(kind).endswith("chaos") for kind in dataset["kind"].values):
+    if chosen and dataset["kind"].str.endswith("chaos").any():
         text += " (beside chaos ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
 
@@ -183,24 +172,17 @@ def box_said(attrs: Mapping[Any, Any]) -> str:
     return f"in {window_said(theta, velocity, Units.of(attrs))}"
 
 
-def most_missed(starts: int) -> float:
-    """Return the largest share that ``starts`` random starts all miss, at 95 %.
-
-    ``1 - 0.05**(1/starts)``: the upper end of the exact binomial interval for none (Clopper &
-    Pearson 1934, Biometrika 26, 404; one-sided).
-    """
-    return 1 - math.pow(0.05, 1 / starts)
-
-
 def _only_chaos(dataset: xr.Dataset) -> str:
     a = dataset.attrs
     name = str(dataset["attractor"].values[0])
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
+    # Upper end of the one-sided exact interval for no hit (Clopper & Pearson 1934, Biometrika 26).
+    missed = 1 - math.pow(0.05, 1 / a["searched_starts"])
     return (
         f"One chaotic attractor takes everything: {name}, exponent {with_error(exponent, error)} "
         f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
         f"{a['chaos_bound']} periods. All {a['searched_starts']} sampled starts end there: another "
-        f"attractor takes at most {100 * most_missed(a['searched_starts']):.2g} % of them (95 %).\n"
+        f"attractor takes at most {100 * missed:.2g} % of them (95 %).\n"
         "Labels tell nothing here: net turns and the finite-time exponent after "
         f"{counted(a['layer_periods'], 'period')} are shown instead."
     )

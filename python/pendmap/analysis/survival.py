@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Times = npt.NDArray[np.int64]
 
 LEAST: Final = 100
-"""Captures below which no tail is fitted."""
+"""Least number of captures for a tail."""
 
 LEVEL: Final = 0.05
 """Level of the tests of a tail: a lower chance rejects the exponential."""
@@ -39,11 +39,11 @@ _GROWTH: Final = 1.1
 _AGREEING: Final = 3
 """Beginnings in a row that must be exponential."""
 _FOLLOWED: Final = 400
-"""Trajectories whose deviations are followed at most."""
+"""Largest number of trajectories along which deviations are followed."""
 _LONGEST: Final = 400
-"""Periods for which they are followed at most."""
+"""Largest number of periods of these trajectories."""
 _LEAST_FOLLOWED: Final = 20
-"""Trajectories without which no growth is given."""
+"""Least number of trajectories for an estimate of growth."""
 _SETTLING: Final = 4.0
 """Power of e by which a trajectory nears an attractor before it counts as captured."""
 _LEAST_SETTLING, _MOST_SETTLING = 10, 500
@@ -69,7 +69,7 @@ class Tail:
 
     @property
     def is_exponential(self) -> bool:
-        """Whether neither test rejects it."""
+        """Whether neither test rejects the exponential."""
         return min(self.weibull, self.steady) > LEVEL
 
 
@@ -97,10 +97,10 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
 
 
 def begin(times: Times, censored: int, bound: int) -> Tail | None:
-    """Return the tail from where it is exponential, None where it is so nowhere.
+    """Return the exponential tail, None where there is none.
 
     It begins at twice the earliest period from which the tests of three beginnings in a row pass:
-    what is not yet exponential just there hides in the noise, and would bias the mean.
+    just there a remaining transient is hidden by noise and would bias the mean.
     """
     row: list[Tail] = []
     for start in _beginnings(times):
@@ -115,7 +115,7 @@ def begin(times: Times, censored: int, bound: int) -> Tail | None:
 
 
 def residual(times: Times, censored: int, bound: int) -> list[Tail]:
-    """Return tails from all beginnings: their means are level where the tail is exponential."""
+    """Return tails from all beginnings; means are constant where the tail is exponential."""
     tails = (tail(times, censored, bound, start) for start in _beginnings(times))
     return [each for each in tails if each.captured >= LEAST // 4]
 
@@ -165,7 +165,7 @@ def growth_on_saddle(
     pendulum: Pendulum,
     threads: int | None,
 ) -> tuple[float, float, int]:
-    """Return the exponent per period of starts not yet captured, its error, and of how many."""
+    """Return the exponent per period of starts before capture, its error, and their number."""
     none = math.nan, math.nan, 0
     if fitted is None:
         return none
@@ -173,7 +173,7 @@ def growth_on_saddle(
     settle, label = found["settle_periods"].values, found["label"].values
     end = np.where(settle >= 0, settle, found.attrs["max_periods"])
     end = end - _settling(found, pendulum.period)
-    chaos = np.array([str(kind).endswith("chaos") for kind in found["kind"].values], dtype=bool)
+    chaos = found["kind"].str.endswith("chaos").values
     never = (label < 0) | np.concatenate([[False], chaos])[np.maximum(label, 0)]
     # The natural measure of the saddle is where those are that live for long.
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
@@ -202,7 +202,7 @@ def growth_on_saddle(
 
 
 def _settling(found: xr.Dataset, period: float) -> NDArray[np.int64]:
-    """Return the periods that each start needs at its end to come near what captures it."""
+    """Return the periods that each start needs to approach the attractor that captures it."""
     rate = -Units.of(found.attrs).bare(found["exponent"].values, RATE) * period
     rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
     periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)

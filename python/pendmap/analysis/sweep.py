@@ -22,6 +22,7 @@ from pendmap.errors import (
     short_repr,
 )
 from pendmap.model import without_dimensions
+from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
 from pendmap.units import VELOCITY
@@ -37,16 +38,12 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-_UNITS = {"c_over_m": "1/s", "Omega": "rad/s", "Tr": "rad/s2", "phi": "rad", "phase": "rad"}
-_UNITS |= {"stroke_mm": "mm", "frequency_hz": "Hz"}
-
-
 @dataclasses.dataclass(frozen=True)
 class Varied:
     """A parameter and the values that it takes: ascending, evenly spaced."""
 
     name: str
-    """As for :func:`pendmap.parameter_map`."""
+    """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
     values: NDArray[np.float64]
     """In the parameter's own units."""
     parameter: str
@@ -74,18 +71,7 @@ class Varied:
             return {self.name: (self.name, x, self.attributes)}
         half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
         edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
-        return coordinate(self.name, x, edges, self.attributes)
-
-
-_SYMBOLS = {
-    "gamma": ("\N{GREEK SMALL LETTER GAMMA}", "c/m"),
-    "p": ("p",),
-    "omega": ("\N{GREEK SMALL LETTER OMEGA}", "\N{GREEK CAPITAL LETTER OMEGA}"),
-    "phase": ("\N{GREEK SMALL LETTER PHI}",),
-    "torque": ("torque",),
-    "theta_r": ("\N{GREEK SMALL LETTER THETA}r", "Tr"),
-}
-"""Symbols of parameters in titles, without dimensions and in SI."""
+        return coordinate(self.name, x, edges, **self.attributes)
 
 
 def varied(
@@ -120,7 +106,8 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
     """Return the model in one line without some of its parameters, by the core's names."""
     whole = [effect.title(model.units) for effect in model.effects]
     own = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
-    symbols = {symbol for name in names for symbol in _SYMBOLS.get(name, ())}
+    both = [(name, COUNTERPARTS[name][0]) for name in names if name in COUNTERPARTS]
+    symbols = {LABELS[name].symbol for pair in both for name in pair}
     kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
     return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
 
@@ -140,8 +127,12 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
-    laboratory = _laboratory(model) if isinstance(model, Rig) else {}
-    if units.si:
+    # The rig's number that each number of the laboratory changes, and by which factor.
+    laboratory: dict[str, tuple[str, float]] = {}
+    if isinstance(model, Rig):
+        laboratory["frequency_hz"] = ("Omega", math.tau)
+        if model.Omega > 0:  # without a frequency no stroke is an acceleration
+            laboratory["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity)
         own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
         powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
         powers |= {name: own[si] for name, (si, _) in laboratory.items()}
@@ -159,7 +150,9 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         if name in laboratory:
             check(name, values[0])
             factor = laboratory[name][1]
-        plain, unit = units.bare(factor * values, power), _UNITS.get(name, "")
+        plain = units.bare(factor * values, power)
+        # A torque is one without dimensions here, also of a rig.
+        unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
     else:
         bare, unit = name, ""
         which, parameter = name.split(".", 1)
@@ -177,14 +170,6 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     for value in (plain[0], plain[-1]):
         _check(pendulum, bare, float(value), name)
     return Varied(name, values, bare, plain, unit)
-
-
-def _laboratory(rig: Rig) -> dict[str, tuple[str, float]]:
-    """Return the laboratory's numbers: the rig's number that each changes, and by which factor."""
-    known = {"frequency_hz": ("Omega", math.tau)}
-    if rig.Omega > 0:  # without a frequency no stroke is an acceleration
-        known["stroke_mm"] = ("p", 1e-3 * rig.Omega**2 / rig.gravity)
-    return known
 
 
 def _values(name: str, given: object) -> NDArray[np.float64]:
@@ -241,7 +226,7 @@ def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], 
 
 @dataclasses.dataclass(frozen=True)
 class CellSearch:
-    """Where the search for attractors begins in each of many pendulums, checked."""
+    """Starts of the search for attractors in each of many pendulums, checked."""
 
     starts: int
     box: Grid | None

@@ -114,7 +114,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Return the critical curves of rest, exact, with folds and asymptotic curves.
+    """Compute the critical curves of rest, exact, with folds and asymptotic curves.
 
     Hanging rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping);
     inverted rest the same with ``-(1 + p cos(omega tau))``. The derivative of the stroboscopic map
@@ -132,7 +132,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     Without a torque, where hanging rest first loses its stability an oscillation is born, with
     period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its
-    fold: between fold and critical curve it is there beside a rest that is stable.
+    fold: between fold and critical curve it coexists with a stable rest.
 
     Parameters
     ----------
@@ -149,11 +149,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     inverted : bool
         Whether to find where inverted rest is stable too.
     refine : bool
-        Whether to add frequencies where curves begin, end, turn or bend between two of those asked
-        for, so that a figure shows them as they are.
+        Whether to add frequencies where curves begin, end, turn or bend between two given ones, for
+        figures.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]`` with ``seed``, each computed too:
-        the band of each critical amplitude
+        As for :func:`pendmap.basins`; adds the band of each critical amplitude
         (:func:`pendmap.analysis.draws.tongues.tongues_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
@@ -180,8 +179,6 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     InputError
         If a value is outside its range; if the model has friction, which holds rest whatever the
         drive, or a load that is no constant torque, which moves it.
-    KeyboardInterrupt
-        After Ctrl-C, within a fraction of a second.
 
     Examples
     --------
@@ -192,7 +189,12 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     model = pendulum
     pendulum, units = without_dimensions(model)
-    asked = grids.frequencies(_usual(plane) if omega is None else omega)
+    if omega is None:  # evenly spread in the plane
+        low, high, count = OMEGA
+        omega = np.linspace(*OMEGA)
+        if plane != PLANES[0]:
+            omega = 1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count))
+    asked = grids.frequencies(omega)
     p_max = check_number("p_max", p_max)
     numerics = Numerics(threads=threads, seed=seed, progress=progress)
     if plane not in PLANES:
@@ -294,7 +296,7 @@ def _folds_to_their_ends(
     looked: NDArray[np.bool_],
     solve: Callable[[Floats], list[_Row]],
 ) -> NDArray[np.bool_]:
-    """Bisect for the ends of folds among frequencies that were added; tell where was looked."""
+    """Bisect for the ends of folds among added frequencies; return where folds were sought."""
     looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)
@@ -306,14 +308,6 @@ def _folds_to_their_ends(
         for k, row in zip(middles, solve(omega[middles]), strict=True):
             found[k] = row
         looked[middles] = True
-
-
-def _usual(plane: str) -> Floats:
-    """Return frequencies that are evenly spread in the plane."""
-    if plane == PLANES[0]:
-        return np.linspace(*OMEGA)
-    low, high, count = OMEGA
-    return np.asarray(1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count)))
 
 
 def _variables(found: list[_Row], undamped: list[_Row], upright: list[_Row]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.errors import (
     MOST_PERIODS,
     MOST_SAMPLES,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 _SAMPLES = 64
-"""Samples a period where no number is given."""
+"""Default number of samples a period."""
 _APART = 0.1
 """Angle between two samples, rad, that looks smooth in the phase plane."""
 _SMOOTH_SAMPLES = 200_000
@@ -85,7 +85,7 @@ SCHEMA = Schema(
     ),
     Field("energy", "m g l", "energy at the end", read=_last("energy")),
     result.SIMD,
-    Field("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", when="lyapunov"),
+    Field("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", None, when="lyapunov"),
     Field(
         "stderr",
         result.OF_RATE,
@@ -93,13 +93,13 @@ SCHEMA = Schema(
         read=lambda dataset: dataset.attrs.get("exponent_stderr"),
         when="lyapunov",
     ),
-    Field("exponent_from", result.OF_TIME, "when its measurement begins", when="lyapunov"),
-    Field("exponent_to", result.OF_TIME, "when its measurement ends", when="lyapunov"),
+    Field("exponent_from", result.OF_TIME, "when its measurement begins", None, when="lyapunov"),
+    Field("exponent_to", result.OF_TIME, "when its measurement ends", None, when="lyapunov"),
     result.MISSES,
     result.SUMMARY.hidden,
-    Field("exponent_stderr", result.OF_RATE, "standard error of the exponent", json=False),
+    Field("exponent_stderr", result.OF_RATE, "standard error of the exponent", None, json=False),
     Field("until", result.OF_TIME, "last time", json=False),
-    Field("until_asked", result.OF_TIME, "last time that was asked for", json=False),
+    Field("until_asked", result.OF_TIME, "last time that was asked for", None, json=False),
     Field("theta0", "rad", "angle at the start", json=False),
     Field("velocity0", result.OF_VELOCITY, "velocity at the start", json=False),
     result.STEPS.hidden,
@@ -119,15 +119,12 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     lyapunov: bool = False,
     live: Live | None = None,
 ) -> xr.Dataset:
-    """One trajectory: time history, stroboscopic (Poincare) section and energy.
+    """Integrate one trajectory: time history, stroboscopic (Poincare) section and energy.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
-        The model. With a rig everything is in SI: times in s, velocities in rad/s, exponents in
-        1/s; only ``tol`` and the errors are of numbers without dimensions. Effects of the group
-        ``reading`` change nothing here: angle and velocity are those of the motion, not what a
-        sensor shows of it.
+        The model; as for :func:`pendmap.basins`.
     theta, velocity : float
         State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     until : float
@@ -135,18 +132,18 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol : float
         The error of each step is tightened until a 16 times smaller one changes the state after 5
         periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
-        more; then the summary says that it was not reached. 1e-13 to 1e-2. What was reached is in
-        ``reached_error``, the difference at the end in ``end_error``.
+        more, which the summary reports; 1e-13 to 1e-2. The attribute ``reached_error`` is the error
+        reached, ``end_error`` the difference at the end.
     samples : int, optional
         Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
         picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
         million. The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
-        standard error from the spread of 20 batches, the first tenth left out (``exponent_from``
-        and ``exponent_to`` say from which tau to which). It is the exponent of an attractor only if
-        the trajectory was on it all that time: a chaotic transient has a positive one, wherever it
-        ends. :func:`pendmap.basins` gives those of the attractors. Sticking may leave none.
+        standard error from the spread of 20 batches, the first tenth left out (from the time
+        ``exponent_from`` to ``exponent_to``). It is the exponent of an attractor only if the
+        trajectory was on it all that time: a chaotic transient has a positive one, wherever it
+        ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may leave none.
     live : callable, optional
         Called with times, angles and velocities, three arrays of one length in the units of the
         result, of the samples that are new since the last call: about every 50 ms while it
@@ -206,11 +203,15 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
         )
+
+    def shown(times: Floats, angles: Floats, speeds: Floats) -> None:
+        if live is not None:
+            live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
+
     with core_errors():
         start = (theta, units.bare(velocity, VELOCITY))
         end = units.bare(until, TIME)
-        shown = None if live is None else _in_units(live, units)
-        raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, shown)
+        raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, live and shown)
     time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
     event_time = units.given(raw.event_time, TIME)
     once = np.arange(0, time.size, samples)
@@ -220,12 +221,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
     dataset = xr.Dataset(
         {
-            "theta": ("time", raw.theta, {"units": "rad", "long_name": "angle, not wrapped"}),
-            "velocity": (
-                "time",
-                speed,
-                {"units": units.of_velocity, "long_name": units.derivative},
-            ),
+            "theta": variable("time", raw.theta, "rad", "angle, not wrapped"),
+            "velocity": variable("time", speed, units.of_velocity, units.derivative),
             "energy": (
                 "time",
                 energy(raw.theta, speed, model.attributes),
@@ -261,15 +258,6 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _in_units(live: Live, units: Units) -> Live:
-    """Return a function that passes samples on in these units."""
-
-    def shown(times: Floats, theta: Floats, velocity: Floats) -> None:
-        live(units.given(times, TIME), theta, units.given(velocity, VELOCITY))
-
-    return shown
-
-
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
     """Return samples a period that show the motion as a curve, from its guessed greatest speed."""
     periods = max(until / pendulum.period, 1.0)
@@ -281,10 +269,10 @@ def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
     return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
 
 
-def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, float | None]:
+def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, float]:
     """Return the exponent with its standard error, and the times between which it was measured."""
     if raw.exponent is None:
-        return {"exponent": None}
+        return {}
     first = int(_ALIGNMENT * time.size)
     size = max(1, (time.size - first) // _BATCHES)
     last = first + (time.size - first) // size * size - 1
@@ -359,7 +347,7 @@ def advance(  # noqa: PLR0913
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Advance many starts by the same number of periods, and nothing else.
+    """Advance many starts by the same number of periods.
 
     Parameters
     ----------

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-import sys
-from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
     json_option,
-    keep_inputs,
+    option,
     plot_option,
     quiet_option,
     rate_option,
@@ -19,27 +17,20 @@ from pendmap.cli.options import (
     simd_option,
     threads_option,
 )
-from pendmap.cli.show import Written, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import NUMBER, Whole, default_file
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import FILE, NUMBER, Whole
 from pendmap.errors import instruction_set
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command("compare")
-@click.argument("model", type=click.Path(path_type=Path), metavar="MODEL")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.argument("model", type=FILE, metavar="MODEL")
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
 @plot_option
-@click.option(
-    "--members",
-    type=Whole(20, 100_000),
-    default=400,
-    help="Starts of the model beside each forced run.  [default: 400]",
-)
-@click.option(
-    "--spread",
-    type=NUMBER,
-    default=0.01,
-    help="Of these about the measured start, rad, and over w0.  [default: 0.01]",
-)
+@option("--members", Whole(20, 100_000), "Starts of the model beside each forced run.", 400)
+@option("--spread", NUMBER, "Of these about the measured start, rad, and over w0.", 0.01)
 @seed_option("Draws them.")
 @threads_option
 @json_option("; alone, no files")
@@ -50,14 +41,12 @@ def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
     path: Path,
-    plot: Path | None,
     members: int,
     spread: float,
     seed: int,
     threads: int | None,
     rate_hz: float | None,
-    as_json: bool,
-    quiet: bool,
+    **given: Any,  # noqa: ANN401 (outputs)
 ) -> None:
     """Simulate a MODEL beside every run of an EXPERIMENT.
 
@@ -68,30 +57,23 @@ def command(  # noqa: PLR0913 (an option each)
     wells visited, escapes, angle covered, time to settle and greatest velocity, and by the steady
     state that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
-    if plot is None and not as_json:
-        plot = default_file("compare.png")
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.free import as_json as fields
     from pendmap.comparison.free import as_text, tables
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubts_said
 
-    keep_inputs([model, *files_of(path)], {"--plot": [plot]})
+    outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
-    with progress_bar("compare", shown=sys.stderr.isatty() and not quiet) as progress:
+    with progress_bar("compare", shown=outputs.shows_progress) as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = Written()
-    if plot is not None:
-        from pendmap import render
-
-        draw = functools.partial(render.draw_comparison, comparison)
-        written = write_all([(draw, plot)], keep=True)
-    if as_json:
+    written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
+    if outputs.as_json:
         more = {"model": str(model), "simd": instruction_set()}
         write_json(fields(comparison) | more)
-    elif not quiet:
+    elif not outputs.quiet:
         doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
         for line in doubts:
             click.echo(line)

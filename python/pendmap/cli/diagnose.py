@@ -7,16 +7,14 @@ import functools
 import os
 import shlex
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
-    check_view,
     json_option,
-    keep_inputs,
+    option,
     plot_option,
     quiet_option,
     rate_option,
@@ -24,53 +22,40 @@ from pendmap.cli.options import (
     simd_option,
     view_option,
 )
-from pendmap.cli.show import open_recording, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import OutputFile, ReportFile, Whole, default_file
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import FILE, REPORT, OutputFile, Whole
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from pendmap.diagnosis import Discrepancy
-
-
-NAME = "diagnose"
+    from collections.abc import Iterator
+    from pathlib import Path
 
 
 @click.command("diagnose")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
-@click.option(
-    "--model",
-    "model_path",
-    type=click.Path(path_type=Path),
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
+@option(
+    "--model model_path",
+    FILE,
+    "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
     metavar="FILE",
-    help="Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
 )
-@click.option(
-    "--max-effects",
-    type=Whole(0, 6),
-    default=3,
-    help="Effects added at most, 0 to 6.  [default: 3]",
-)
+@option("--max-effects", Whole(0, 6), "Effects added at most, 0 to 6.", 3)
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
-@click.option(
-    "--effects",
-    "effects_path",
-    type=click.Path(path_type=Path),
+@option(
+    "--effects effects_path",
+    FILE,
+    "Candidates of your own beside the library's: [[formula]] of a .toml.",
     metavar="FILE",
-    help="Candidates of your own beside the library's: [[formula]] of a .toml.",
 )
-@click.option(
-    "--out", type=OutputFile([".toml"]), help=f"New model: .toml.  [default: {NAME}.toml]"
-)
+@option("--out", OutputFile([".toml"]), "New model: .toml.  [default: diagnose.toml]")
 @plot_option
-@click.option(
+@option(
     "--report",
-    type=ReportFile(),
+    REPORT,
+    "Report: .html with its figures in it, .md with them beside it, or a folder with both.",
     metavar="FILE|DIR",
-    help="Report: .html with its figures in it, .md with them beside it, or a folder with both.",
 )
 @rerun_option
 @view_option
@@ -85,14 +70,8 @@ def command(  # noqa: PLR0913 (an option each)
     max_effects: int,
     without: tuple[str, ...],
     effects_path: Path | None,
-    out: Path | None,
-    plot: Path | None,
-    report: Path | None,
-    rerun: Path | None,
-    view: bool,
     rate_hz: float | None,
-    as_json: bool,
-    quiet: bool,
+    **given: Any,  # noqa: ANN401 (outputs)
 ) -> None:
     """Find where a model and an experiment disagree, and which effect is missing.
 
@@ -104,9 +83,9 @@ def command(  # noqa: PLR0913 (an option each)
     """
     # The matrices are tall and narrow: threads for them cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from pendmap.diagnosis import diagnose
+    from pendmap.diagnosis import diagnose, diagnosed_model
     from pendmap.diagnosis.candidates import checked_own
-    from pendmap.model import load_formulas
+    from pendmap.model import load_formulas, save_model
     from pendmap.model.effects import definition
     from pendmap.records import files_of, read_experiment
 
@@ -118,23 +97,10 @@ def command(  # noqa: PLR0913 (an option each)
         for name in without:
             if name not in named:
                 definition(name)
-    if not (out or plot or report or rerun or view or as_json):
-        plot, report, rerun = (default_file(f"{NAME}{end}") for end in (".png", ".html", ".rrd"))
-    if view:
-        check_view()
-        rerun = rerun or default_file(f"{NAME}.rrd")
-    outputs = (out or default_file(f"{NAME}.toml"), plot, report, rerun)
-    keep_inputs(
-        [*files_of(path), model_path, effects_path],
-        {
-            "--out": [outputs[0]],
-            "--plot": [plot],
-            "--report": _report_files(report),
-            "--rerun": [rerun],
-        },
-    )
+    reads = [*files_of(path), model_path, effects_path]
+    outputs = Outputs.take(given, "diagnose", ".toml", reads)
     model = None if model_path is None else rig_from(model_path)
-    shown = sys.stderr.isatty() and not quiet
+    shown = outputs.shows_progress
     with progress_bar("read", shown=shown):
         experiment = read_experiment(path, rate_hz=rate_hz)
     with progress_bar("diagnose", shown=shown) as progress:
@@ -148,18 +114,24 @@ def command(  # noqa: PLR0913 (an option each)
         )
     with progress_bar("write", shown=shown):
         line = "pendmap " + shlex.join(sys.argv[1:])
-        written = write_all(_files(found, outputs, line), keep=True)
-    if as_json:
+        save = functools.partial(save_model, diagnosed_model(found, line))
+        files = outputs.files(found, save, "draw_discrepancy", "record_discrepancy")
+        written = write_all(files, keep=True)
+    if outputs.as_json:
         from pendmap.diagnosis.summary import as_json as fields
 
-        more = {"model": written.name(outputs[0]), "simd": instruction_set()}
+        more = {"model": written.name(outputs.out), "simd": instruction_set()}
         write_json(fields(found) | more)
-    elif not quiet:
-        _say(found)
+    elif not outputs.quiet:
+        from pendmap.diagnosis.result import as_text, ranking_table
+
+        for text in as_text(found):
+            click.echo(text)
+        click.echo()
+        write_table(*ranking_table(found))
         written.say()
     written.check()
-    if view and rerun is not None:
-        open_recording(rerun)
+    outputs.open_viewer()
 
 
 @contextlib.contextmanager
@@ -169,42 +141,3 @@ def _named(where: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-
-
-def _report_files(report: Path | None) -> list[Path]:
-    """Return the files of a report without its figures; a folder holds one of either kind."""
-    if report is None:
-        return []
-    in_folder = report.is_dir() or not report.suffix
-    return [report / "report.html", report / "report.md"] if in_folder else [report]
-
-
-def _files(
-    found: Discrepancy, outputs: tuple[Path, Path | None, Path | None, Path | None], line: str
-) -> Iterator[tuple[Callable[[Path], Path], Path]]:
-    from pendmap.diagnosis import diagnosed_model
-    from pendmap.model import save_model
-
-    out, plot, report, rerun = outputs
-    yield lambda path: save_model(diagnosed_model(found, line), path), out
-    if plot is not None:
-        from pendmap import render
-
-        yield functools.partial(render.draw_discrepancy, found), plot
-    if report is not None:
-        from pendmap import render
-
-        yield functools.partial(render.write_report, found), report
-    if rerun is not None:
-        from pendmap import viewer
-
-        yield functools.partial(viewer.record_discrepancy, found), rerun
-
-
-def _say(found: Discrepancy) -> None:
-    from pendmap.diagnosis.result import as_text, ranking_table
-
-    for line in as_text(found):
-        click.echo(line)
-    click.echo()
-    write_table(*ranking_table(found))

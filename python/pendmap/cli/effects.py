@@ -5,26 +5,27 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import json_option
+from pendmap.cli.options import json_option, option
+from pendmap.cli.types import FILE
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pendmap.model.effects import EffectDefinition, EffectParameter
 
 
 @click.command("effects")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option(
-    "--effects",
-    "path",
-    type=click.Path(path_type=Path),
+@option(
+    "--effects path",
+    FILE,
+    "Show those of a file instead, its [[formula]]; they are checked.",
     metavar="FILE",
-    help="Show those of a file instead, its [[formula]]; they are checked.",
 )
 @json_option()
 def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:

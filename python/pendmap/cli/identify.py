@@ -5,27 +5,26 @@ from __future__ import annotations
 import functools
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import Outputs, output_options, quiet_option, rate_option, simd_option
-from pendmap.cli.show import open_viewer, progress_bar, write_all, write_json, write_table
+from pendmap.cli.options import output_options, quiet_option, rate_option, simd_option
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.types import FILE
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from pendmap.identification import IdentificationReport
-    from pendmap.model import Rig
 
 
 SUFFIX = ".toml"
 
 
 @click.command("identify")
-@click.argument("path", type=click.Path(path_type=Path), metavar="EXPERIMENT")
+@click.argument("path", type=FILE, metavar="EXPERIMENT")
 @click.option(
     "--method", "methods", multiple=True, metavar="NAME", help="One of them alone; may be repeated."
 )
@@ -57,6 +56,7 @@ def command(
     """
     from pendmap.errors import InputError
     from pendmap.identification import identified_model, identify_experiment
+    from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
@@ -72,29 +72,14 @@ def command(
         _show(report, outputs)
         raise
     with progress_bar("write", shown=outputs.shows_progress):
-        written = write_all(_files(outputs, report, model), keep=True)
+        save = functools.partial(save_model, model)
+        files = outputs.files(report, save, "draw_identification", "record_identification")
+        written = write_all(files, keep=True)
     _show(report, outputs, written.name(outputs.out))
     if not outputs.as_json and not outputs.quiet:
         written.say()
     written.check()
-    open_viewer(outputs)
-
-
-def _files(
-    outputs: Outputs, report: IdentificationReport, model: Rig
-) -> Iterator[tuple[Callable[[Path], Path], Path]]:
-    if outputs.out is not None:
-        from pendmap.model import save_model
-
-        yield functools.partial(save_model, model), outputs.out
-    if outputs.plot is not None:
-        from pendmap import render
-
-        yield functools.partial(render.draw_identification, report), outputs.plot
-    if outputs.rerun is not None:
-        from pendmap import viewer
-
-        yield functools.partial(viewer.record_identification, report), outputs.rerun
+    outputs.open_viewer()
 
 
 def _show(report: IdentificationReport, outputs: Outputs, model: str | None = None) -> None:
@@ -103,11 +88,9 @@ def _show(report: IdentificationReport, outputs: Outputs, model: str | None = No
 
         fields = as_json(report) | {"model": model, "simd": instruction_set()}
         write_json(fields)
-    elif not outputs.quiet:
-        _say(report)
-
-
-def _say(report: IdentificationReport) -> None:
+        return
+    if outputs.quiet:
+        return
     from pendmap.identification.report import as_text, foremost, methods_table, table1_table
 
     doubts = [f"Warning: {text}" for text in foremost(report)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import json
 import platform
@@ -31,7 +32,10 @@ def command(*, as_json: bool) -> None:
     from pendmap.errors import instruction_set
 
     simd = instruction_set()
-    versions = {name: _version(name) for name in _LEANS_ON}
+    versions: dict[str, str | None] = dict.fromkeys(_LEANS_ON)
+    for name in _LEANS_ON:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[name] = importlib.metadata.version(name)
     facts = {
         "version": _core.__version__,
         "simd": simd,
@@ -50,10 +54,3 @@ def command(*, as_json: bool) -> None:
     click.echo(f"Python           {facts['python']}")
     for name, version in versions.items():
         click.echo(f"{name:<17}{version or 'not installed'}")
-
-
-def _version(name: str) -> str | None:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return None

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import functools
-import sys
-from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import (
-    json_option,
-    keep_inputs,
-    plot_option,
-    quiet_option,
-    rate_option,
-)
-from pendmap.cli.show import Written, progress_bar, write_all, write_json
+from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
+from pendmap.cli.show import Outputs, progress_bar, write_all, write_json
+from pendmap.cli.types import FILE
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command("look")
-@click.argument("path", type=click.Path(path_type=Path), metavar="FILE|FOLDER")
+@click.argument("path", type=FILE, metavar="FILE|FOLDER")
 @plot_option
 @rate_option
 @json_option()
 @quiet_option
-def command(
-    *, path: Path, plot: Path | None, rate_hz: float | None, as_json: bool, quiet: bool
-) -> None:
+def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
     """Say what a record holds and what is odd about it, before anything is fitted.
 
     A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
@@ -38,17 +32,13 @@ def command(
     from pendmap.records.summary import as_json as fields
     from pendmap.records.summary import as_text
 
-    keep_inputs(files_of(path), {"--plot": [plot]})
-    with progress_bar("read", shown=sys.stderr.isatty() and not quiet):
+    outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
+    with progress_bar("read", shown=outputs.shows_progress):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    written = Written()
-    if plot is not None:
-        from pendmap import render
-
-        written = write_all([(functools.partial(render.draw_record, experiment), plot)])
-    if as_json:
+    written = write_all(outputs.files(experiment, None, "draw_record"))
+    if outputs.as_json:
         write_json(fields(experiment))
-    elif not quiet:
+    elif not outputs.quiet:
         click.echo(as_text(experiment))
         written.say()
     written.check()

@@ -5,19 +5,20 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import Outputs
-from pendmap.cli.types import NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
+from pendmap.cli.options import option
+from pendmap.cli.show import Outputs
+from pendmap.cli.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.quantities import check
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     Command = Callable[..., Any]
 
@@ -73,34 +74,22 @@ def varied_model_options(function: Command) -> Command:
         " model in SI also Omega, c_over_m, Tr, phi, frequency_hz (p is kept), stroke_mm (Omega"
         " is).",
     )
-    return _options(vary(with_ranges), NUMBER_OR_RANGE)
+    return model_options(vary(with_ranges), NUMBER_OR_RANGE)
 
 
-def model_options(function: Command) -> Command:
-    """Add the parameters of the pendulum, the presets and the model file."""
-    return _options(function, NUMBER)
-
-
-def model_options_without(*left_out: str) -> Callable[[Command], Command]:
-    """Return what adds the model's options without those that the command takes otherwise."""
-    return functools.partial(_options, kind=NUMBER, left_out=left_out)
-
-
-def _options(
-    function: Command, kind: click.ParamType[Any], left_out: tuple[str, ...] = ()
+def model_options(
+    function: Command, kind: click.ParamType[Any] = NUMBER, left_out: tuple[str, ...] = ()
 ) -> Command:
-    model = click.option(
-        "--model",
-        "model",
-        type=click.Path(path_type=Path),
+    """Add the model's parameters, presets and file, without those that a command takes itself."""
+    model = option(
+        "--model model",
+        FILE,
+        "Model file, without dimensions or in SI; options typed beside it override it. In SI "
+        "times are in s and velocities in rad/s; the options from --gamma to --theta-r have "
+        "no dimensions there either.",
         metavar="FILE.toml",
-        help="Model file, without dimensions or in SI; options typed beside it override it. In SI"
-        " times are in s and velocities in rad/s; the options from --gamma to --theta-r have no"
-        " dimensions there either.",
     )
-    preset = click.option(
-        "--preset", type=click.Choice(sorted(PRESETS)), help="A point of the paper's figure 2."
-    )
+    preset = option("--preset", click.Choice(sorted(PRESETS)), "A point of the paper's figure 2.")
     function = model(preset(function))
     for name, text in reversed((_BARE | _SI).items()):
         if name in left_out:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.options import json_option, seed_option, simd_option
+from pendmap.cli.options import json_option, option, seed_option, simd_option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import PICTURES, OutputFile
+from pendmap.cli.types import PICTURES, OutputFile, default_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -21,17 +21,16 @@ if TYPE_CHECKING:
 
 @click.command("paper")
 @click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
-@click.option(
+@option(
     "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=None,
+    click.Path(path_type=Path, file_okay=False),
+    "Folder for the files, made if it is not there.  [default: the current one]",
     metavar="DIR",
-    help="Folder for the files, made if it is not there.  [default: the current one]",
 )
-@click.option(
+@option(
     "--plot",
-    type=OutputFile(PICTURES),
-    help="File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
+    OutputFile(PICTURES),
+    "File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
 )
 @seed_option("Of the rig's noise.")
 @json_option()
@@ -65,7 +64,7 @@ def command(  # noqa: PLR0913 (an option each)
         out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
     folder = out or Path()
     for key in keys if plot is None else ():  # before anything is computed
-        OutputFile((".png", ".csv")).convert(folder / _name(key), None, None)
+        default_file(folder / _name(key))
     written = write_all(_files(keys, folder, plot, seed))
     if as_json:
         click.echo(json.dumps({"files": written}))

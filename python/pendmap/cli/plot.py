@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import functools
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from pendmap.cli.options import option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import PICTURES, OutputFile, default_file
+from pendmap.cli.types import FILE, PICTURES, OutputFile, default_file
 from pendmap.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command("plot")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--out",
-    "--plot",
-    "out",
-    type=OutputFile(PICTURES),
-    help="Figure to write: .png .svg .pdf.  [default: FILE with .png]",
+@click.argument("file", type=FILE)
+@option(
+    "--out --plot out",
+    OutputFile(PICTURES),
+    "Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
 @click.option(
     "--layer",
@@ -29,7 +31,7 @@ from pendmap.errors import InputError
     " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
 )
 @click.option("--size", help="Width x height in inches, like 8x4.")
-@click.option("--dpi", type=click.IntRange(20, 1200), help="Pixels an inch of a .png.")
+@option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.")
 @click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
 @click.option("--quiet", is_flag=True, help="Do not say what was written.")
 def command(  # noqa: PLR0913 (the options above)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pendmap.model import Pendulum, Rig
 
 _TYPICAL: Final = 20
@@ -22,17 +24,20 @@ _LEAST_SECONDS: Final = 0.05
 """Least time of a measurement of speed, s."""
 
 
-def say(model: Pendulum | Rig, starts: int, *, tol: float, threads: int | None) -> None:
-    """Say periods and time of ``starts`` starts where damping raises the bound."""
+def say(model: Pendulum | Rig, count: int, given: Mapping[str, Any], *, quiet: bool) -> None:
+    """Report periods and time of ``count`` starts where damping raises the bound."""
+    if quiet or given["max_periods"] is not None:
+        return
     from pendmap import _core
     from pendmap.model import without_dimensions
 
+    starts = count * (1 + (given["draws"] or 0))
     pendulum = without_dimensions(model)[0]
     try:
         bound, _, least = _core.bounds(pendulum)
         if bound == least:
             return
-        speed = _speed(pendulum, tol, threads or 0)
+        speed = _speed(pendulum, given["tol"], given["threads"] or 0)
     except ValueError:
         return
     typical = bound // _TYPICAL

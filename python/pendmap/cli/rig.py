@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import functools
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import json_option
+from pendmap.cli.options import json_option, option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import NUMBER, PICTURES, OutputFile
+from pendmap.cli.types import FILE, NUMBER, PICTURES, OutputFile
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from pendmap import virtual_rig
 
 
 @click.command("rig")
 @click.argument("name", required=False, metavar="[free_decay|forced|hidden]")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder to write.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Draws all.  [default: 0]")
+@option("--out", FILE, "Folder to write.", metavar="DIR")
+@option("--seed", click.IntRange(min=0), "Draws all.", 0)
 @click.option(
     "--effect",
     "effects",
@@ -32,40 +32,32 @@ if TYPE_CHECKING:
     help="Effect to hide, more than once for several: a name of --list, also with its parameters"
     " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
 )
-@click.option("--size", type=NUMBER, default=1.0, help="Scales drawn effects.  [default: 1]")
-@click.option("--noise", type=NUMBER, help="Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")
-@click.option("--correlation", type=NUMBER, default=0.0, help="AR(1) of the noise.  [default: 0]")
-@click.option("--counts", type=int, default=4096, help="A turn; 0: no steps.  [default: 4096]")
-@click.option("--rate", type=NUMBER, default=100.0, help="Samples a second, Hz.  [default: 100]")
-@click.option("--jitter", type=NUMBER, default=0.0, help="Of the clock, s rms.  [default: 0]")
-@click.option("--dropouts", type=NUMBER, default=0.0, help="Share of samples lost.  [default: 0]")
-@click.option("--outliers", type=NUMBER, default=0.0, help="Share that is false.  [default: 0]")
-@click.option(
+@option("--size", NUMBER, "Scales drawn effects.", 1.0)
+@option("--noise", NUMBER, "Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")
+@option("--correlation", NUMBER, "AR(1) of the noise.", 0.0)
+@option("--counts", int, "A turn; 0: no steps.", 4096)
+@option("--rate", NUMBER, "Samples a second, Hz.", 100.0)
+@option("--jitter", NUMBER, "Of the clock, s rms.", 0.0)
+@option("--dropouts", NUMBER, "Share of samples lost.", 0.0)
+@option("--outliers", NUMBER, "Share that is false.", 0.0)
+@option(
     "--mess",
-    type=NUMBER,
-    default=0.0,
-    help="Weak disturbances beside the effects (texture of the bearing, drifting zero, slow noise),"
-    " in multiples of the noise.  [default: 0]",
+    NUMBER,
+    "Weak disturbances beside the effects (texture of the bearing, drifting zero, slow "
+    "noise), in multiples of the noise.",
+    0.0,
 )
-@click.option("--free", type=int, help="Free decays.  [default: 1; forced: 0; hidden: 5]")
-@click.option("--forced", type=int, help="Runs under drive.  [default: 0; forced and hidden: 4]")
-@click.option(
+@option("--free", int, "Free decays.  [default: 1; forced: 0; hidden: 5]")
+@option("--forced", int, "Runs under drive.  [default: 0; forced and hidden: 4]")
+@option(
     "--duration",
-    type=NUMBER,
-    help="Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
+    NUMBER,
+    "Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
 )
-@click.option("--w0", type=NUMBER, help="Natural frequency, rad/s.  [default: 6.0 to 6.4]")
-@click.option(
-    "--c-over-m", type=NUMBER, help="Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]"
-)
-@click.option(
-    "--tr", "friction", type=NUMBER, help="Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]"
-)
-@click.option(
-    "--plot",
-    type=OutputFile(PICTURES),
-    help="Figure of the records: .png .svg .pdf.",
-)
+@option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]")
+@option("--c-over-m", NUMBER, "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]")
+@option("--tr friction", NUMBER, "Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]")
+@option("--plot", OutputFile(PICTURES), "Figure of the records: .png .svg .pdf.")
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @json_option()

@@ -1,27 +1,32 @@
-"""Progress on the terminal, results in files."""
+"""Outputs of commands: progress, files, JSON and text."""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import json
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.options import RESULTS
+from pendmap.cli.types import default_file
 from pendmap.errors import InputError, NotWrittenError, one_line
-from pendmap.files import COMPLETE, held_interrupts
+from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import columns
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import xarray as xr
 
     from pendmap.analysis.result import Schema
-    from pendmap.cli.options import Outputs
+
+    Write = Callable[[Path], Path | str]
 
 
 @contextlib.contextmanager
@@ -48,10 +53,142 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
         yield report
 
 
+@dataclasses.dataclass(frozen=True)
+class Outputs:
+    """Outputs that a command writes."""
+
+    out: Path | None = None
+    plot: Path | None = None
+    report: Path | None = None
+    rerun: Path | None = None
+    view: bool = False
+    as_json: bool = False
+    quiet: bool = False
+
+    @classmethod
+    def take(
+        cls,
+        given: dict[str, Any],
+        name: str,
+        suffix: str = RESULTS[0],
+        reads: Iterable[Path | None] = (),
+        *,
+        default: bool = True,
+    ) -> Outputs:
+        """Take the output options out of ``given``; where none is given, by default all files."""
+        fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
+        files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
+        taken = {field: given.pop(field) for field in fields}
+        if default and not any(value for field, value in taken.items() if field != "quiet"):
+            taken |= {field: default_file(name + files[field]) for field in files if field in taken}
+        if taken.get("view") and taken["rerun"] is None:
+            taken["rerun"] = default_file(f"{name}.rrd")
+        if "report" in taken and taken["out"] is None:
+            taken["out"] = default_file(name + suffix)
+        outputs = cls(**taken)
+        places = {"--out": [outputs.out], "--plot": [outputs.plot], "--rerun": [outputs.rerun]}
+        keep_inputs(reads, places | {"--report": _report_files(outputs.report)})
+        if outputs.view:
+            check_view()
+        return outputs
+
+    def check_room(self, cells: int) -> None:
+        """Refuse a map for which the disk has no space: half a byte a cell at least, compressed."""
+        for path in (self.out, self.rerun):
+            if path is not None:
+                check_room(path, cells // 2)
+
+    @property
+    def draws(self) -> bool:
+        """Whether a file, a figure or a recording is written."""
+        return bool(self.out or self.plot or self.rerun or self.view)
+
+    @property
+    def shows_progress(self) -> bool:
+        """Whether stderr is a terminal and --quiet is not given."""
+        return sys.stderr.isatty() and not self.quiet
+
+    def files(
+        self,
+        result: Any,  # noqa: ANN401 (a dataset or a report)
+        save: Write | None,
+        draw: str = "draw",
+        record: str = "record",
+    ) -> Iterator[tuple[Write, Path]]:
+        """Give what writes each file; matplotlib and Rerun are imported when their turn comes."""
+        if self.out is not None and save is not None:
+            yield save, self.out
+        if self.plot is not None:
+            from pendmap import render
+
+            yield functools.partial(getattr(render, draw), result), self.plot
+        if self.report is not None:
+            from pendmap import render
+
+            yield functools.partial(render.write_report, result), self.report
+        if self.rerun is not None:
+            from pendmap import viewer
+
+            yield functools.partial(getattr(viewer, record), result), self.rerun
+
+    def open_viewer(self) -> None:
+        """Open the viewer on the recording where --view asks for it."""
+        if not self.view or self.rerun is None:
+            return
+        from pendmap import viewer
+
+        try:
+            viewer.open_viewer(self.rerun)
+        except viewer.ViewerError as error:
+            raise click.ClickException(str(error)) from error
+
+
+def check_view() -> None:
+    """Refuse --view before anything is computed where no window can open."""
+    from pendmap import viewer
+
+    try:
+        viewer.check_display()
+    except viewer.ViewerError as error:
+        raise click.UsageError(f"--view: {error}") from error
+
+
+def _report_files(report: Path | None) -> list[Path]:
+    """Return the files of a report without its figures; a folder holds one of either kind."""
+    if report is None:
+        return []
+    in_folder = report.is_dir() or not report.suffix
+    return [report / "report.html", report / "report.md"] if in_folder else [report]
+
+
+def keep_inputs(
+    inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
+) -> None:
+    """Refuse outputs, by their option, that are inputs, or folders that hold one."""
+
+    def lost(path: Path, output: Path) -> bool:
+        places = [path, *path.resolve().parents] if output.is_dir() else [path]
+        return any(output.samefile(place) for place in places)
+
+    read = [path for path in inputs if path is not None and path.exists()]
+    for option, paths in outputs.items():
+        for output in paths:
+            if output is not None and output.exists() and any(lost(path, output) for path in read):
+                raise click.UsageError(
+                    f"Invalid value for '{option}': {str(output)!r}: is an input, which would be "
+                    "lost: it must be another file"
+                )
+
+
 def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
     """Write the files asked for, then JSON or the summary to stdout."""
-    files = ((functools.partial(write, dataset), path) for write, path in _files(outputs))
-    written = write_all(files)
+
+    def save(path: Path) -> Path:
+        from pendmap.files import dataset as stored
+
+        return stored.save(dataset, path)
+
+    written = write_all(outputs.files(dataset, save))
     if outputs.as_json:
         write_json(schema.json(dataset))
     elif not outputs.quiet:
@@ -59,7 +196,7 @@ def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
         click.echo(dataset.attrs["summary"])
         written.say()
     written.check()
-    open_viewer(outputs)
+    outputs.open_viewer()
 
 
 def write_json(fields: dict[str, Any]) -> None:
@@ -80,7 +217,7 @@ class Written(list[str]):
         return str(path) if str(path) in self else None
 
     def say(self) -> None:
-        """Say which files are complete, if any are."""
+        """Report the files that are complete, if any are."""
         if self:
             click.echo("Written: " + ", ".join(map(one_line, self)))
 
@@ -93,9 +230,7 @@ class Written(list[str]):
             raise NotWrittenError(f"{'; '.join(self.missed)}; written: {complete}")
 
 
-def write_all(
-    files: Iterable[tuple[Callable[[Path], Path | str], Path]], *, keep: bool = False
-) -> Written:
+def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Written:
     """Write files one after the other, an interrupt between two of them; return their names.
 
     Where the disk does not take one, the others are tried all the same (:meth:`Written.check`).
@@ -117,38 +252,6 @@ def write_all(
             except OSError as error:
                 written.missed.append(f"cannot write {path}: {error.strerror or error}")
     return written
-
-
-def open_viewer(outputs: Outputs) -> None:
-    """Open the viewer on the recording where --view asks for it."""
-    if outputs.view and outputs.rerun is not None:
-        open_recording(outputs.rerun)
-
-
-def open_recording(path: Path) -> None:
-    """Open the viewer on a recording."""
-    from pendmap import viewer
-
-    try:
-        viewer.open_viewer(path)
-    except viewer.ViewerError as error:
-        raise click.ClickException(str(error)) from error
-
-
-def _files(outputs: Outputs) -> Iterator[tuple[Callable[[xr.Dataset, Path], Path], Path]]:
-    # Each is imported when its turn comes: matplotlib and Rerun take a while.
-    if outputs.out is not None:
-        from pendmap.files.dataset import save
-
-        yield save, outputs.out
-    if outputs.plot is not None:
-        from pendmap import render
-
-        yield render.draw, outputs.plot
-    if outputs.rerun is not None:
-        from pendmap import viewer
-
-        yield viewer.record, outputs.rerun
 
 
 def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

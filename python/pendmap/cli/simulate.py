@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import output_options, simd_option, start_options
+from pendmap.cli.options import option, output_options, simd_option, start_options
 from pendmap.cli.show import show
 from pendmap.cli.types import NUMBER, Whole
 from pendmap.errors import MOST_SAMPLES, InputError
@@ -25,13 +25,9 @@ _VIEWER = "127.0.0.1:9876"
 @click.command("simulate")
 @model_options
 @start_options
-@click.option(
-    "--until", type=NUMBER, default=100.0, help="Last time, in 1/w0, in SI s.  [default: 100]"
-)
-@click.option("--tol", type=NUMBER, default=1e-9, help="Error after 5 periods.  [default: 1e-9]")
-@click.option(
-    "--samples", type=Whole(1, MOST_SAMPLES), help="Samples a period.  [default: 64 or more]"
-)
+@option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0)
+@option("--tol", NUMBER, "Error after 5 periods.", 1e-9)
+@option("--samples", Whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option(
     "--live",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import click
 
@@ -14,14 +15,32 @@ from pendmap.errors import MOST_CELLS, InputError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+
+T = TypeVar("T")
 
 PICTURES = (".png", ".svg", ".pdf")
 """Suffixes of figures."""
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 
-def _number(text: str) -> float:
+class OptionType(click.ParamType[T], Generic[T]):
+    """A type of option, by its name and the function that reads a text or raises InputError."""
+
+    def __init__(self, name: str, read: Callable[[str], T]) -> None:
+        self.name, self.read = name, read
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> T:
+        """Return the value of a text; a value that is read already is kept."""
+        if not isinstance(value, str):
+            return value  # type: ignore[return-value]
+        try:
+            return self.read(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
+
+
+def _value(text: str) -> float:
     """Read a number; ``pi``, ``-pi``, ``2pi``, ``2*pi``, ``pi/2`` are numbers too."""
     match = _WITH_PI.fullmatch(text.strip())
     if match:
@@ -31,41 +50,32 @@ def _number(text: str) -> float:
     return float(text)
 
 
-class _Number(click.ParamType[float]):
-    name = "number"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        try:
-            number = _number(str(value))
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{value!r} is not a number (pi is understood)", param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"must be a finite number, got {value!r}", param, ctx)
-        return number
+def _number(text: str) -> float:
+    try:
+        number = _value(text)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"{text!r} is not a number (pi is understood)") from None
+    if not math.isfinite(number):
+        raise InputError(f"must be a finite number, got {text!r}")
+    return number
 
 
-class Whole(click.ParamType[int]):
+class Whole(OptionType[int]):
     """A whole number between two bounds, both included."""
 
-    name = "integer"
-
     def __init__(self, least: int, most: int) -> None:
-        self.least, self.most = least, most
+        super().__init__("integer", functools.partial(_whole, least, most))
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> int:
-        """Refuse anything but a whole number within the bounds."""
-        try:
-            number = int(str(value))
-        except ValueError:
-            number = self.least - 1
-        if not self.least <= number <= self.most:
-            wanted = f"must be a whole number from {self.least} to {self.most}"
-            self.fail(f"{wanted}, got {short_repr(value)}", param, ctx)
-        return number
+
+def _whole(least: int, most: int, text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = least - 1
+    if not least <= number <= most:
+        wanted = f"must be a whole number from {least} to {most}"
+        raise InputError(f"{wanted}, got {short_repr(text)}")
+    return number
 
 
 class AxisText(NamedTuple):
@@ -76,158 +86,107 @@ class AxisText(NamedTuple):
     cells: int
 
 
-class _Axis(click.ParamType[AxisText]):
-    name = "A:B:N"
-    says = "N cells between A and B, like -pi:pi:1000"
-    counts = "cells"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> AxisText:
-        if isinstance(value, AxisText):
-            return value
-        wanted = f"must be A:B:N, {self.says}"
-        parts = str(value).split(":")
-        if len(parts) != 3:  # noqa: PLR2004
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        try:
-            low, high, count = _number(parts[0]), _number(parts[1]), int(parts[2])
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
-        if not 1 <= count <= MOST_CELLS:
-            self.fail(
-                f"must have 1 to {MOST_CELLS} {self.counts}, got {count}: {value!r}", param, ctx
-            )
-        return AxisText(low, high, count)
+def _axis(text: str) -> AxisText:
+    """Read N cells between two bounds."""
+    axis = _bounded(text, "N cells between A and B, like -pi:pi:1000", "cells")
+    if axis.low == axis.high:
+        raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
+    return axis
 
 
-class _Range(_Axis):
-    says = "N values from A to B, both included, like 0.5:2:100"
-    counts = "values"
+def _range(text: str) -> AxisText:
+    """Read N values from one bound to the other, or one value with both bounds."""
+    axis = _bounded(text, "N values from A to B, both included, like 0.5:2:100", "values")
+    if axis.low == axis.high and axis.cells > 1:
+        raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
+    return axis
 
 
-class _NumberOrRange(click.ParamType[float | AxisText]):
-    name = "number|A:B:N"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float | AxisText:
-        if isinstance(value, AxisText) or ":" in str(value):
-            return RANGE.convert(value, param, ctx)
-        return NUMBER.convert(value, param, ctx)
-
-
-class _Values(click.ParamType[list[float]]):
-    name = "A:B:N"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        """Return N values from A to B, both included, or the only one."""
-        if isinstance(value, list):
-            return value
-        wanted = "must be A:B:N, N values from A to B, both included, or a single value"
-        parts = str(value).split(":")
-        try:
-            ends = [_number(part) for part in parts[:2]]
-            count = int(parts[2]) if len(parts) == 3 else 1  # noqa: PLR2004
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if len(parts) not in {1, 3}:
-            self.fail(f"{wanted}, got {value!r}", param, ctx)
-        if not all(math.isfinite(end) for end in ends) or ends[0] > ends[-1]:
-            self.fail(f"{value!r}: the bounds must be finite, the lower one first", param, ctx)
-        if not 1 <= count <= MOST_CELLS:
-            self.fail(f"must have 1 to {MOST_CELLS} values, got {count}: {value!r}", param, ctx)
-        low, high = ends[0], ends[-1]
-        if count == 1 and low != high:
-            self.fail(f"{value!r}: one value has one bound", param, ctx)
-        if count > 1 and low == high:
-            self.fail(f"{value!r}: {count} values need two bounds", param, ctx)
-        return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
+def _bounded(text: str, meaning: str, counts: str) -> AxisText:
+    wanted = f"must be A:B:N, {meaning}, got {text!r}"
+    parts = text.split(":")
+    if len(parts) != 3:  # noqa: PLR2004
+        raise InputError(wanted)
+    try:
+        low, high, count = _value(parts[0]), _value(parts[1]), int(parts[2])
+    except (ValueError, ZeroDivisionError):
+        raise InputError(wanted) from None
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
+    if not 1 <= count <= MOST_CELLS:
+        raise InputError(f"must have 1 to {MOST_CELLS} {counts}, got {count}: {text!r}")
+    return AxisText(low, high, count)
 
 
-class InstructionSet(click.ParamType[str]):
-    """An instruction set of this processor."""
-
-    name = "name"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> str:
-        """Refuse an instruction set that this processor lacks."""
-        from pendmap import _core
-
-        available = _core.simd_available()
-        if value not in available:
-            wanted = f"must be one of {', '.join(available)} on this processor"
-            self.fail(f"{wanted}, got {short_repr(value)}", param, ctx)
-        return str(value)
+def _values(text: str) -> list[float]:
+    """Read N values from one bound to the other, or a single one."""
+    if ":" not in text:
+        return [_number(text)]
+    low, high, count = _range(text)
+    if count == 1 and low < high:
+        raise InputError(f"{text!r}: one value has one bound")
+    return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
 
 
-class OutputFile(click.ParamType[Path]):
+def _instruction_set(text: str) -> str:
+    """Refuse an instruction set that this processor lacks."""
+    from pendmap import _core
+
+    available = _core.simd_available()
+    if text not in available:
+        wanted = f"must be one of {', '.join(available)} on this processor"
+        raise InputError(f"{wanted}, got {short_repr(text)}")
+    return text
+
+
+class OutputFile(OptionType[Path]):
     """A file to write: its suffix and folder are checked before anything is computed."""
 
-    name = "file"
-
     def __init__(self, suffixes: Sequence[str]) -> None:
-        self.suffixes = tuple(suffixes)
+        super().__init__("file", functools.partial(_output, tuple(suffixes)))
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Path:
-        """Refuse a file that cannot be written."""
-        path = Path(str(value))
-        if not path.name:
-            self.fail(f"{str(value)!r}: is a folder, or no file's name", param, ctx)
-        if path.suffix.lower() not in self.suffixes:
-            known = " or ".join(self.suffixes)
-            self.fail(f"{str(path)!r}: suffix must be {known}, got {path.suffix!r}", param, ctx)
-        if not path.parent.is_dir():
-            self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
-        if path.is_dir() and path.suffix.lower() != ".zarr":
-            self.fail(f"{str(path)!r}: is a folder", param, ctx)
-        try:
-            _library(path)
-            check_room(path)
-        except OSError as error:
-            why = error.strerror or error
-            self.fail(f"{str(path)!r}: cannot be written there: {why}", param, ctx)
-        except InputError as error:
-            self.fail(str(error), param, ctx)
-        return path
+
+def _output(suffixes: tuple[str, ...], text: str) -> Path:
+    """Refuse a file that cannot be written."""
+    path = Path(text)
+    if not path.name:
+        raise InputError(f"{text!r}: is a folder, or no file's name")
+    if path.suffix.lower() not in suffixes:
+        known = " or ".join(suffixes)
+        raise InputError(f"{str(path)!r}: suffix must be {known}, got {path.suffix!r}")
+    if not path.parent.is_dir():
+        raise InputError(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist")
+    if path.is_dir() and path.suffix.lower() != ".zarr":
+        raise InputError(f"{str(path)!r}: is a folder")
+    try:
+        _check_library(path)
+        check_room(path)
+    except OSError as error:
+        why = error.strerror or error
+        raise InputError(f"{str(path)!r}: cannot be written there: {why}") from None
+    return path
 
 
 def default_file(name: str | Path) -> Path:
     """Return a file that no option names, where it can be written."""
-    return OutputFile([Path(name).suffix]).convert(name, None, None)
+    return OutputFile([Path(name).suffix]).convert(str(name), None, None)
 
 
-class ReportFile(OutputFile):
-    """A report to write: a file, or a folder that is made where it does not exist."""
-
-    def __init__(self) -> None:
-        super().__init__([".html", ".md"])
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Path:
-        """Refuse a file that cannot be written."""
-        path = Path(str(value))
-        if path.suffix and not path.is_dir():
-            return super().convert(value, param, ctx)
-        if path.exists() and not path.is_dir():
-            self.fail(f"{str(path)!r}: must be a folder, .html or .md, it is a file", param, ctx)
-        if not path.parent.is_dir():
-            self.fail(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist", param, ctx)
-        inside = path / "report.html" if path.is_dir() else path.with_suffix(".html")
-        super().convert(inside, param, ctx)
-        return path
+def _report(text: str) -> Path:
+    """Refuse a report that cannot be written: a file, or a folder that is made where missing."""
+    path, suffixes = Path(text), (".html", ".md")
+    if path.suffix and not path.is_dir():
+        return _output(suffixes, text)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{str(path)!r}: must be a folder, .html or .md, it is a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist")
+    inside = path / "report.html" if path.is_dir() else path.with_suffix(".html")
+    _output(suffixes, str(inside))
+    return path
 
 
-def _library(path: Path) -> None:
+def _check_library(path: Path) -> None:
     """Refuse a file that needs a library that is not installed, or a .zarr of something else."""
     suffix = path.suffix.lower()
     module, extra = _LIBRARIES.get(suffix, ("pendmap.files", ""))
@@ -253,8 +212,13 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
-NUMBER = _Number()
-AXIS = _Axis()
-RANGE = _Range()
-NUMBER_OR_RANGE = _NumberOrRange()
-VALUES = _Values()
+FILE: click.Path = click.Path(path_type=Path)
+NUMBER = OptionType("number", _number)
+AXIS = OptionType("A:B:N", _axis)
+RANGE = OptionType("A:B:N", _range)
+NUMBER_OR_RANGE = OptionType[float | AxisText](
+    "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
+)
+VALUES = OptionType("A:B:N", _values)
+INSTRUCTION_SET = OptionType("name", _instruction_set)
+REPORT = OptionType("file", _report)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from pendmap.cli.types import FILE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
 
 @click.command("view")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=FILE)
 def command(*, file: Path) -> None:
     """Open a recording (.rrd) in the Rerun viewer."""
     if not file.is_file():

@@ -1,13 +1,12 @@
-"""Figures of the paper that are of no dataset: 1, 2, 3, 8 and 9."""
+"""Figure 2 of the paper as a chart; figures 8 and 9 in files."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from pendmap.charts import names, plane, tongues
+from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Line, Panel, Points, holding
-from pendmap.render import drawing
 from pendmap.render.written import written
 from pendmap.units import Units
 
@@ -21,53 +20,6 @@ if TYPE_CHECKING:
     from pendmap.comparison import ForcedComparison
 
 
-def draw_tongues(
-    dataset: xr.Dataset,
-    path: str | os.PathLike[str],
-    *,
-    title: str,
-    marks: Sequence[tuple[float, float, str]] = (),
-) -> Path:
-    """Draw critical curves with points marked, ``(p, omega, name)``, into a file: figure 1."""
-    chart = tongues.chart(dataset, title=title, marks=marks)
-    return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
-
-
-def draw_tumbling(
-    runs: Sequence[xr.Dataset],
-    path: str | os.PathLike[str],
-    *,
-    size: tuple[float, float] | None = None,
-    dpi: float | None = None,
-    title: str | None = None,
-) -> Path:
-    """Draw time history, phase plane and Poincare section of trajectories, a column each: figure 2.
-
-    Trajectories are shown from their first instant.
-    """
-    chart = tumbling_chart(runs, title)
-    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
-
-
-def draw_pendulum(
-    path: str | os.PathLike[str],
-    *,
-    size: tuple[float, float] | None = None,
-    dpi: float | None = None,
-    title: str | None = None,
-) -> Path:
-    """Draw the pendulum with its moving pivot and its equation (eq. 2.1) into a file: figure 3.
-
-    Parameters, result and errors are those of :func:`pendmap.render.draw_record`; ``title`` stands
-    above, by default what is drawn.
-    """
-    from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
-
-    return written(
-        path, lambda dpi: drawings.figure(size=size, dpi=dpi, title=title), size=size, dpi=dpi
-    )
-
-
 def draw_motions(  # noqa: PLR0913 (what, where, and how)
     runs: Sequence[ForcedComparison],
     path: str | os.PathLike[str],
@@ -77,12 +29,8 @@ def draw_motions(  # noqa: PLR0913 (what, where, and how)
     subtitle: str,
     dpi: float | None = None,
 ) -> Path:
-    """Draw forced runs beside a model: the paper's figures 8 (steady states) and 9 (tumbling).
-
-    Steady states have a phase plane each; runs that tumble have a row each: histories and phase
-    planes of the record and of a member of the ensemble, and the statistics.
-    """
-    from pendmap.paper import drawings  # noqa: PLC0415 (likewise)
+    """Draw forced runs with a model of them into a file: steady states, or runs that tumble."""
+    from pendmap.paper import drawings  # noqa: PLC0415 (matplotlib takes a while)
 
     make = drawings.steady_figure if steady else drawings.tumbling_figure
     return written(path, lambda dpi: make(runs, dpi=dpi, title=title, subtitle=subtitle), dpi=dpi)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -29,7 +29,7 @@ TITLE: Final = "The parametric pendulum"
 SIZE: Final = (6.0, 5.6)
 """Inches."""
 THETA: Final = math.radians(38.0)
-"""How far it is drawn out."""
+"""Angle of the rod."""
 LENGTH: Final = 3.0
 BOB: Final = 0.3
 ASIDE: Final = 0.5
@@ -72,83 +72,41 @@ def figure(
 
 
 def _guide(axes: Axes, font: float) -> None:
-    """The slider on its rail, and how it moves."""
+    """Draw the slider on its rail, and its motion."""
     axes.add_patch(Rectangle((-0.42, -0.8), 0.1, 1.6, fc=_RAIL, ec="none", zorder=1))
     for k in range(9):
         y = -0.8 + 0.18 * k
         axes.plot([-0.42, -0.54], [y, y + 0.12], color=_HELP, lw=0.7, zorder=1)
     axes.add_patch(Rectangle((-0.3, -0.24), 0.6, 0.48, fc="white", ec=_DARK, lw=1.4, zorder=2))
-    _arrow(axes, (-0.82, -0.75), (-0.82, 0.75), _MOTION, both=True)
+    _arrow(axes, (-0.82, -0.75), (-0.82, 0.75), _MOTION, arrowstyle="<|-|>")
     axes.plot([-0.94, -0.6], [0, 0], color=_HELP, lw=0.8, ls=(0, (6, 3)))
-    axes.text(
-        -0.98, 0.3, f"\u2212Y {_DRIVE}", ha="right", va="center", color=_MOTION, fontsize=font
-    )
-    axes.text(
-        -0.98,
-        -0.02,
-        "the pivot's place,\nupward",
-        ha="right",
-        va="center",
-        color=_HELP,
-        fontsize=0.78 * font,
-        linespacing=1.3,
-    )
+    _text(axes, (-0.98, 0.3), f"\u2212Y {_DRIVE}", font, ha="right", color=_MOTION)
+    place, small = "the pivot's place,\nupward", 0.78 * font
+    _text(axes, (-0.98, -0.02), place, small, ha="right", color=_HELP, linespacing=1.3)
 
 
 def _rod(axes: Axes, font: float) -> None:
-    """Rod and bob, where they hang at rest, the angle, the length."""
-    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    """Draw rod and bob, their place at rest, the angle, the length."""
+    x, y = _place(LENGTH, THETA)
     down = -LENGTH - 0.3
     axes.plot([0, 0], [-0.3, down], color=_HELP, lw=0.9, ls=(0, (6, 3)), zorder=1)
     axes.add_patch(Circle((0, -LENGTH), BOB, fc="none", ec=_HELP, lw=0.9, ls=(0, (3, 2)), zorder=1))
     across, along = 0.055 * math.cos(THETA), 0.055 * math.sin(THETA)
-    axes.add_patch(
-        Polygon(
-            [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)],
-            fc=_STEEL,
-            ec="none",
-            zorder=3,
-        )
-    )
+    corners = [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)]
+    axes.add_patch(Polygon(corners, fc=_STEEL, ec="none", zorder=3))
     axes.add_patch(Circle((0, 0), 0.13, fc="white", ec=_DARK, lw=1.6, zorder=4))
     axes.add_patch(Circle((0, 0), 0.04, fc=_DARK, ec="none", zorder=5))
     axes.add_patch(Circle((x, y), BOB, fc=_DARK, ec="none", zorder=4))
-    axes.text(
-        x, y, "m", color="white", ha="center", va="center", fontsize=font, style="italic", zorder=5
-    )
+    _text(axes, (x, y), "m", font, color="white", style="italic", zorder=5)
     radius = 1.55
-    axes.add_patch(
-        Arc(
-            (0, 0),
-            2 * radius,
-            2 * radius,
-            theta1=270,
-            theta2=270 + math.degrees(THETA) - 4,
-            color=_DARK,
-            lw=1.3,
-        )
-    )
-    end = THETA - math.radians(0.5)
-    before = THETA - math.radians(6)
-    _arrow(
-        axes,
-        (radius * math.sin(before), -radius * math.cos(before)),
-        (radius * math.sin(end), -radius * math.cos(end)),
-        _DARK,
-    )
-    half = THETA / 2
-    axes.text(
-        (radius + 0.22) * math.sin(half),
-        -(radius + 0.22) * math.cos(half),
-        "\u03b8",
-        ha="center",
-        va="center",
-        fontsize=1.3 * font,
-        color=_DARK,
-    )
-    # The length stands beside the rod, on the other side of the angle, from pivot to bob.
+    _arc(axes, radius, (270, 270 + math.degrees(THETA) - 4), color=_DARK, lw=1.3)
+    before, end = (THETA - math.radians(degrees) for degrees in (6, 0.5))
+    _arrow(axes, _place(radius, before), _place(radius, end), _DARK)
+    _text(axes, _place(radius + 0.22, THETA / 2), "\u03b8", 1.3 * font, color=_DARK)
+    # The length stands on the other side of the rod than the angle, from pivot to bob.
     move = (ASIDE * math.cos(THETA), ASIDE * math.sin(THETA))
-    _arrow(axes, move, (x + move[0], y + move[1]), _HELP, both=True, thin=True)
+    ends = (x + move[0], y + move[1])
+    _arrow(axes, move, ends, _HELP, arrowstyle="<|-|>", mutation_scale=9, lw=0.9)
     for (foot_x, foot_y), bare in (((0.0, 0.0), 0.2), ((x, y), BOB + 0.04)):
         ends = (bare, ASIDE + 0.08)
         axes.plot(
@@ -158,93 +116,63 @@ def _rod(axes: Axes, font: float) -> None:
             lw=0.7,
             zorder=4,
         )
-    axes.text(
-        x / 2 + 1.4 * move[0],
-        y / 2 + 1.4 * move[1],
-        "l",
-        ha="center",
-        va="center",
-        fontsize=1.1 * font,
-        style="italic",
-    )
+    middle = (x / 2 + 1.4 * move[0], y / 2 + 1.4 * move[1])
+    _text(axes, middle, "l", 1.1 * font, style="italic")
 
 
 def _forces(axes: Axes, font: float) -> None:
-    """Gravity, and friction and drag against the motion."""
-    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
+    """Draw gravity, and friction and drag against the motion."""
+    x, y = _place(LENGTH, THETA)
     _arrow(axes, (x, y - BOB), (x, y - BOB - 0.75), _FORCE)
-    axes.text(
-        x + 0.14, y - BOB - 0.5, "m g", color=_FORCE, fontsize=font, va="center", style="italic"
-    )
+    side: dict[str, Any] = {"ha": "left", "color": _FORCE}
+    _text(axes, (x + 0.14, y - BOB - 0.5), "m g", font, style="italic", **side)
     # The velocity is along the arc, upward.
-    side = (math.cos(THETA), math.sin(THETA))
-    start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
-    _arrow(axes, start, (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1]), _MOTION)
-    axes.text(
-        start[0] + 0.78 * side[0],
-        start[1] + 0.78 * side[1] + 0.12,
-        "d\u03b8/dt > 0",
-        color=_MOTION,
-        fontsize=font,
-        ha="center",
-        va="bottom",
+    tangent = (math.cos(THETA), math.sin(THETA))
+    start = (x + (ASIDE + 0.14) * tangent[0], y + (ASIDE + 0.14) * tangent[1])
+    end, label = (
+        (start[0] + far * tangent[0], start[1] + far * tangent[1] + above)
+        for far, above in ((0.7, 0.0), (0.78, 0.12))
     )
+    _arrow(axes, start, end, _MOTION)
+    _text(axes, label, "d\u03b8/dt > 0", font, color=_MOTION, va="bottom")
     # A torque on the axle, against the turning.
     first, last, radius = math.radians(52), math.radians(-14), 0.98
-    axes.add_patch(
-        Arc(
-            (0, 0),
-            2 * radius,
-            2 * radius,
-            theta1=math.degrees(last) + 6,
-            theta2=math.degrees(first),
-            color=_FORCE,
-            lw=1.6,
-        )
+    _arc(axes, radius, (math.degrees(last) + 6, math.degrees(first)), color=_FORCE, lw=1.6)
+    before, tip = (
+        (radius * math.cos(angle), radius * math.sin(angle))
+        for angle in (last + math.radians(9), last)
     )
-    before = last + math.radians(9)
-    _arrow(
-        axes,
-        (radius * math.cos(before), radius * math.sin(before)),
-        (radius * math.cos(last), radius * math.sin(last)),
-        _FORCE,
-    )
-    axes.text(
-        1.14,
-        0.42,
-        "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)",
-        color=_FORCE,
-        fontsize=0.82 * font,
-        va="center",
-        linespacing=1.4,
-    )
+    _arrow(axes, before, tip, _FORCE)
+    said = "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)"
+    _text(axes, (1.14, 0.42), said, 0.82 * font, linespacing=1.4, **side)
 
 
-def _arrow(  # noqa: PLR0913 (from, to, look)
+def _place(radius: float, angle: float) -> tuple[float, float]:
+    """Return the place at a distance from the pivot and an angle from hanging."""
+    return radius * math.sin(angle), -radius * math.cos(angle)
+
+
+def _text(axes: Axes, at: tuple[float, float], text: str, size: float, **look: Any) -> None:  # noqa: ANN401
+    usual = {"ha": "center", "va": "center"}
+    axes.text(*at, text, fontsize=size, **usual | look)
+
+
+def _arc(axes: Axes, radius: float, ends: tuple[float, float], **look: Any) -> None:  # noqa: ANN401
+    """Draw an arc about the pivot between two angles in degrees."""
+    axes.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=ends[0], theta2=ends[1], **look))
+
+
+def _arrow(
     axes: Axes,
     start: tuple[float, float],
     end: tuple[float, float],
     colour: str,
-    *,
-    both: bool = False,
-    thin: bool = False,
+    **look: Any,  # noqa: ANN401
 ) -> None:
+    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 13, "lw": 1.6} | look
     axes.add_patch(
-        FancyArrowPatch(
-            start,
-            end,
-            arrowstyle="<|-|>" if both else "-|>",
-            mutation_scale=9 if thin else 13,
-            color=colour,
-            lw=0.9 if thin else 1.6,
-            shrinkA=0,
-            shrinkB=0,
-            zorder=5,
-        )
+        FancyArrowPatch(start, end, color=colour, shrinkA=0, shrinkB=0, zorder=5, **head)
     )
-
-
-# Forced runs beside a model: steady states, and paths that tumble, a figure each.
 
 
 WIDTH: Final = 11.6

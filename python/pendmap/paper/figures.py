@@ -99,21 +99,26 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
     from pendmap import render  # noqa: PLC0415
+    from pendmap.charts import tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
-    from pendmap.paper import draw, motions  # noqa: PLC0415
+    from pendmap.paper import draw, drawings, motions  # noqa: PLC0415
+    from pendmap.render import drawing  # noqa: PLC0415
+    from pendmap.render.written import written  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
         raise InputError(f"key must be one figure, got {key!r}")
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
-    if key == "1":
+    if key in ("1", "2"):
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
-        return draw.draw_tongues(_critical(), path, title=title, marks=marks)
-    if key == "2":
-        return draw.draw_tumbling(tumbling(), path, title=title)
+        if key == "1":
+            chart = tongues.chart(_critical(), title=title, marks=marks)
+        else:
+            chart = draw.tumbling_chart(tumbling(), title)
+        return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
     if key == "3":
-        return draw.draw_pendulum(path, title=title)
+        return written(path, lambda dpi: drawings.figure(dpi=dpi, title=title))
     if key in ("8", "9"):
         make = motions.steady_states if key == "8" else motions.tumbling
         runs = make(report(seed).methods["combined_repaired"].rig, seed)

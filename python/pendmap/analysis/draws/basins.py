@@ -15,6 +15,7 @@ shares scatter by chance: ``I`` of ``K`` labels drawn at random is about ``(K - 
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -24,6 +25,8 @@ from pendmap.analysis.draws.sample import interval, rows
 from pendmap.analysis.fractality import BOX
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
 SURE: Final = 0.95
 """Probability of an end from which a cell counts as sure."""
 
+_SHARES: Final = ("outcome", "share_mean", "share_low", "share_high", "exists")
+"""Variables over the outcomes."""
 _UNKNOWN: Final = ("undecided", "failed")
 """The ends of labels 0 and -1."""
 
@@ -53,10 +58,9 @@ def basins_over(
     (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty of 95 % or
     more.
     """
-    tally = _Tally(dataset)
-    for one in draws.each(run, progress):
-        tally.add(one)
-    found = dataset.assign(tally.variables()).assign(draws.variables)
+    ends, start, known = _counted(dataset, draws.each(run, progress))
+    variables = _variables(dataset["label"], ends, start, known, len(draws))
+    found = dataset.assign(variables).assign(draws.variables)
     start, by = (found[f"doubt_{name}"].values for name in ("start", "parameters"))
     found.attrs |= {
         "sure_cells": float((found["certainty"].values >= SURE).mean()),
@@ -68,119 +72,108 @@ def basins_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of a basin map says of draws."""
-    names = ("outcome", "share_mean", "share_low", "share_high", "exists")
+    """Return the draws of a basin map for the JSON object."""
     outcomes = [
         {"name": str(name), "fraction": mean, "ci95": [low, high], "exists": exists}
-        for name, mean, low, high, exists in rows(dataset, *names)
+        for name, mean, low, high, exists in rows(dataset, *_SHARES)
     ]
     doubt = ("sure_cells", "doubt_start", "doubt_parameters")
     return {"attractors": outcomes} | {name: dataset.attrs[name] for name in doubt}
 
 
-class _Tally:
-    """Counts of the ends of all cells over draws."""
+@dataclasses.dataclass
+class _End:
+    """An end of starts with its counts over draws."""
 
-    def __init__(self, own: xr.Dataset) -> None:
-        self.cells = own["label"]
-        self.names = names_of(own, "attractor")
-        self.points = points_of(own, "attractor")
-        shape = own["label"].shape
-        self.side = tuple(min(BOX, size) for size in shape)
-        self.boxes = tuple(size // side for size, side in zip(shape, self.side, strict=True))
-        self.counts = [np.zeros(shape, dtype=np.uint16) for _ in self.names]
-        self.mean = [np.zeros(self.boxes) for _ in self.names]
-        self.start, self.known = np.zeros(self.boxes), np.zeros(self.boxes)
-        self.shares: list[dict[int, float]] = []
-        self.exists: list[set[int]] = []
+    points: Floats
+    """Its stroboscopic points, shape (L, 2)."""
+    cells: NDArray[np.uint16]
+    """Number of draws in which each cell ends on it."""
+    boxes: Floats
+    """Sum over the draws of its share of each box."""
+    shares: dict[int, float] = dataclasses.field(default_factory=dict)
+    """Its share of the starts in each draw that has it."""
 
-    def add(self, drawn: xr.Dataset) -> None:
-        """Count the map of one more draw."""
-        label = drawn["label"].values
-        places = self._places(drawn)
-        shares, entropy = {}, np.zeros(self.boxes)
-        which = {k + 1: place for k, place in enumerate(places)}
-        inside = self._boxed(label > 0)
-        self.known += inside > 0
-        for value, place in which.items():
-            mine = label == value
-            self.counts[place] += mine
-            shares[place] = float(mine.mean())
-            part = self._boxed(mine) / np.maximum(inside, 1)
-            self.mean[place] += part
+
+def _counted(
+    dataset: xr.Dataset, drawn: Iterable[xr.Dataset]
+) -> tuple[dict[str, _End], Floats, NDArray[np.int64]]:
+    """Return ends by name, sums of the boxes' entropies, and numbers of draws with known ends."""
+    own = dataset["label"]
+    none = _in_boxes(own, own.values > 0).values * 0.0
+
+    def new(points: Floats) -> _End:
+        return _End(points, np.zeros(own.shape, np.uint16), none.copy())
+
+    names, points = names_of(dataset, "attractor"), points_of(dataset, "attractor")
+    ends = {name: new(mine) for name, mine in zip(names, points, strict=True)}
+    start, known = none.copy(), none.astype(np.int64)
+    for d, one in enumerate(drawn):
+        label = one["label"].values
+        names, points = names_of(one, "attractor"), points_of(one, "attractor")
+        places = matched(list(ends), [end.points for end in ends.values()], names, points)
+        mine = [list(ends)[place] if place >= 0 else "" for place in places]
+        for k, name in enumerate(names):
+            if not mine[k]:
+                alike = sum(plain(other) == plain(name) for other in ends)
+                mine[k] = name if name not in ends else f"{name} ({alike + 1})"
+                ends[mine[k]] = new(points[k])
+        inside = _in_boxes(own, label > 0).values
+        known += inside > 0
+        entropy = none.copy()
+        for value, name in enumerate(mine, 1):
+            here = label == value
+            ends[name].cells += here
+            ends[name].shares[d] = float(here.mean())
+            part = _in_boxes(own, here).values / np.maximum(inside, 1)
+            ends[name].boxes += part
             entropy += _entropy(part)
-        self.start += entropy
+        start += entropy
         for value, name in zip((0, -1), _UNKNOWN, strict=True):
-            if (label == value).any():
-                place = self._place(name, np.empty((0, 2)))
-                self.counts[place] += label == value
-                shares[place] = float((label == value).mean())
-        self.shares.append(shares)
-        self.exists.append(set(places) | set(shares))
+            here = label == value
+            if here.any():
+                end = ends.setdefault(name, new(np.empty((0, 2))))
+                end.cells += here
+                end.shares[d] = float(here.mean())
+    return ends, start, known
 
-    def variables(self) -> dict[str, Any]:
-        """Return the counts as variables of a dataset."""
-        draws, dims = len(self.shares), self.cells.dims
-        kept = [k for k, name in enumerate(self.names) if name not in _UNKNOWN]
-        kept += [k for k, name in enumerate(self.names) if name in _UNKNOWN]
-        names = [self.names[k] for k in kept]
-        probability = np.stack([self.counts[k] for k in kept]).astype(np.float32) / draws
-        share = np.array([[one.get(k, 0.0) for one in self.shares] for k in kept])
-        mean, _, low, high = interval(share)
-        exists = np.array([np.mean([k in one for one in self.exists]) for k in kept])
-        known = np.maximum(self.known, 1)
-        total = sum((_entropy(part / known) for part in self.mean), np.zeros(self.boxes))
-        start = self.start / known
-        over_boxes = tuple(f"box_{name}" for name in dims)
-        one = {"units": "1"}
-        nat = {"units": "nat"}
-        return {
-            "outcome": ("outcome", np.array(names, dtype=str)),
-            "probability": (("outcome", *dims), probability, one),
-            "certainty": (dims, probability.max(axis=0), one),
-            "label_entropy": (dims, _entropy(probability).sum(axis=0, dtype=np.float32), nat),
-            "drawn_share": (("outcome", "draw"), share, one),
-            "exists": ("outcome", exists, {"comment": "share of the draws that have it"}),
-            "share_mean": ("outcome", mean, one),
-            "share_low": ("outcome", low, one),
-            "share_high": ("outcome", high, one),
-            "doubt_start": (over_boxes, start, nat),
-            "doubt_parameters": (over_boxes, np.maximum(total - start, 0.0), nat),
-            **{
-                f"box_{name}": (f"box_{name}", self._centres(str(name), axis))
-                for axis, name in enumerate(dims)
-            },
-        }
 
-    def _places(self, drawn: xr.Dataset) -> list[int]:
-        """Return the outcome of each attractor of a draw; new ones are added."""
-        names, points = names_of(drawn, "attractor"), points_of(drawn, "attractor")
-        found = matched(self.names, self.points, names, points)
-        return [
-            self._place(name, own) if place < 0 else place
-            for name, own, place in zip(names, points, found, strict=True)
-        ]
+def _variables(
+    own: xr.DataArray, ends: dict[str, _End], start: Floats, known: NDArray[np.int64], draws: int
+) -> dict[str, Any]:
+    """Return the counts as variables of a dataset."""
+    dims, names = own.dims, sorted(ends, key=lambda name: name in _UNKNOWN)
+    every = [ends[name] for name in names]
+    probability = np.stack([end.cells for end in every]).astype(np.float32) / draws
+    share = np.array([[end.shares.get(d, 0.0) for d in range(draws)] for end in every])
+    mean, _, low, high = interval(share)
+    exists = np.array([len(end.shares) / draws for end in every])
+    known = np.maximum(known, 1)
+    total = sum((_entropy(end.boxes / known) for end in ends.values()), 0.0 * start)
+    start = start / known
+    boxes = _in_boxes(own, own.values > 0)
+    over_boxes = tuple(f"box_{name}" for name in dims)
+    one, nat = {"units": "1"}, {"units": "nat"}
+    return {
+        "outcome": ("outcome", np.array(names, dtype=str)),
+        "probability": (("outcome", *dims), probability, one),
+        "certainty": (dims, probability.max(axis=0), one),
+        "label_entropy": (dims, _entropy(probability).sum(axis=0, dtype=np.float32), nat),
+        "drawn_share": (("outcome", "draw"), share, one),
+        "exists": ("outcome", exists, {"comment": "share of the draws that have it"}),
+        "share_mean": ("outcome", mean, one),
+        "share_low": ("outcome", low, one),
+        "share_high": ("outcome", high, one),
+        "doubt_start": (over_boxes, start, nat),
+        "doubt_parameters": (over_boxes, np.maximum(total - start, 0.0), nat),
+        **{f"box_{name}": (f"box_{name}", boxes[name].values) for name in dims},
+    }
 
-    def _place(self, name: str, points: Floats) -> int:
-        """Return the place of an outcome by its name, a new one where it is not known."""
-        if name in _UNKNOWN and name in self.names:
-            return self.names.index(name)
-        alike = sum(plain(own) == plain(name) for own in self.names)
-        self.names.append(name if name not in self.names else f"{name} ({alike + 1})")
-        self.points.append(points)
-        self.counts.append(np.zeros(self.cells.shape, dtype=np.uint16))
-        self.mean.append(np.zeros(self.boxes))
-        return len(self.names) - 1
 
-    def _boxed(self, cells: NDArray[np.bool_]) -> Floats:
-        """Return the number of true cells in each whole box."""
-        (rows, columns), (high, wide) = self.boxes, self.side
-        whole = cells[: rows * high, : columns * wide].reshape(rows, high, columns, wide)
-        return np.asarray(whole.sum(axis=(1, 3)), dtype=np.float64)
-
-    def _centres(self, name: str, axis: int) -> Floats:
-        values = self.cells[name].values[: self.boxes[axis] * self.side[axis]]
-        return np.asarray(values.reshape(-1, self.side[axis]).mean(axis=1), dtype=np.float64)
+def _in_boxes(own: xr.DataArray, cells: NDArray[np.bool_]) -> xr.DataArray:
+    """Return the number of true cells in each whole box, at the boxes' centres."""
+    window = {name: min(BOX, size) for name, size in own.sizes.items()}
+    return own.copy(data=cells).coarsen(window, boundary="trim").sum()
 
 
 def _entropy(part: NDArray[Any]) -> NDArray[Any]:
@@ -190,8 +183,7 @@ def _entropy(part: NDArray[Any]) -> NDArray[Any]:
 
 def _summary(found: xr.Dataset) -> list[str]:
     a, lines = found.attrs, []
-    names = ("outcome", "share_mean", "share_low", "share_high", "exists")
-    for name, mean, low, high, exists in rows(found, *names):
+    for name, mean, low, high, exists in rows(found, *_SHARES):
         there = "" if exists == 1 or name in _UNKNOWN else f", in {100 * exists:.3g} % of them"
         lines.append(
             f"{name}: {100 * mean:.2f} % of the starts, 95 % of the draws in "

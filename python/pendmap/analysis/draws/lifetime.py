@@ -50,7 +50,7 @@ def lifetime_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of a lifetime says of draws."""
+    """Return the draws of a lifetime for the JSON object."""
     a = dataset.attrs
     return {
         "mean_periods_ci95": [a["mean_periods_low"], a["mean_periods_high"]],

@@ -40,7 +40,7 @@ def matched(
     others: list[str],
     theirs: list[NDArray[np.float64]],
 ) -> list[int]:
-    """Pair those of one :func:`plain` name by least distance; return places, or -1."""
+    """Pair attractors of equal :func:`plain` names by least distance; return places, else -1."""
     found = [-1] * len(others)
     for name in dict.fromkeys(map(plain, others)):
         mine = [k for k, own in enumerate(names) if plain(own) == name]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.draws.match import matched, names_of, points_of
-from pendmap.analysis.draws.sample import interval, rows
+from pendmap.analysis.draws.sample import interval
+from pendmap.analysis.result import records
 from pendmap.formatting import counted, with_error
 
 if TYPE_CHECKING:
@@ -47,12 +48,14 @@ def orbits_over(
             if k < 0:
                 others += 1
                 continue
-            own = np.array([dataset["theta_point"][k], dataset["velocity_point"][k]])
             there[k, d], stable[k, d] = True, bool(one["stable"][j])
-            state[k, :, d] = _next_to(own, theirs[j])
-            multipliers[k, ..., d] = _paired(
-                dataset["multipliers"].values[k], one["multipliers"].values[j]
-            )
+            point = np.array([dataset["theta_point"][k], dataset["velocity_point"][k]])
+            away = theirs[j] - point
+            away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
+            state[k, :, d] = point + away[np.argmin(np.hypot(*away.T))]
+            own, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
+            swapped = np.abs(pair[::-1] - own).sum() < np.abs(pair - own).sum()
+            multipliers[k, ..., d] = pair[::-1] if swapped else pair
     spread = interval(state)[1]
     dims = dataset["multipliers"].dims
     found = dataset.assign(
@@ -74,31 +77,10 @@ def orbits_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of closed orbits says of draws."""
-    spreads = ("theta_spread", "velocity_spread", "multipliers_spread")
-    orbits = [
-        {"name": str(name), "exists": there, "stable": stable}
-        | dict(zip(spreads, (theta, velocity, spread.tolist()), strict=True))
-        for name, there, stable, theta, velocity, spread in rows(
-            dataset, "orbit", "exists", "stable_share", *spreads
-        )
-    ]
+    """Return the draws of closed orbits for the JSON object."""
+    spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
+    orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
     return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
-
-
-def _next_to(own: Floats, points: Floats) -> Floats:
-    """Return the point nearest to one, its angle within half a turn of it."""
-    away = points - own
-    away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
-    nearest: Floats = own + away[np.argmin(np.hypot(*away.T))]
-    return nearest
-
-
-def _paired(own: Floats, pairs: Floats) -> Floats:
-    """Return multipliers, shape (2, 2), in the order in which they are nearer to the own ones."""
-    swapped = pairs[::-1]
-    nearer = np.abs(swapped - own).sum() < np.abs(pairs - own).sum()
-    return swapped if nearer else pairs
 
 
 def _summary(found: xr.Dataset, others: int) -> list[str]:

@@ -63,7 +63,7 @@ def regimes_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of a map over two parameters says of draws."""
+    """Return the draws of a map over two parameters for the JSON object."""
     regimes = [
         {"kinds": json.loads(str(text)), "share": mean, "ci95": [low, high]}
         for text, mean, low, high in rows(

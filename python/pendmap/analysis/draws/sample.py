@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -114,9 +115,24 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
             "draws: the model must have a [covariance], as the model files of identify and diagnose"
             " have, got none"
         )
-    middle = np.array([_value(model, name) for name in known.names])
+    there = {name: getattr(model, name) for name in model.numbers()}
+    for effect in model.effects:
+        there |= {f"{effect.name}.{name}": x for name, x in effect.parameters.items()}
+    for name in known.names:
+        if name not in there:
+            raise InputError(
+                f"covariance: {short_repr(name)} must be a parameter of the model, got none"
+            )
+    middle = np.array([there[name] for name in known.names], dtype=float)
     root = known.root
-    signs = _signs(model, known.names, middle)
+    sizes = {
+        f"{effect.name}.{entry['name']}"
+        for effect in model.effects
+        if effect.brakes
+        for entry in effect.definition["parameters"]
+        if entry["role"] == "size"
+    }
+    signs = np.where([name in sizes for name in known.names], np.sign(middle), 0.0)
     source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))
     values, models = [], []
     for _ in range(number):
@@ -141,18 +157,14 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
 
 def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """Return mean, standard deviation and ends of the 95 % interval of the finite values."""
-    known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    filled = np.where(known, values, 0.0)
-    mean = np.where(count > 0, filled.sum(axis=-1) / np.maximum(count, 1), np.nan)
-    away = np.where(known, values - mean[..., None], 0.0)
-    spread = np.sqrt((away**2).sum(axis=-1) / np.maximum(count - 1, 1))
-    spread = np.where(count > 1, spread, np.nan)
-    if not values.size:  # which numpy gives no quantiles of
-        return mean, spread, mean, mean
-    safe = np.where((count > 0)[..., None], values, 0.0)
-    low, high = np.nanquantile(safe, _LEVELS, axis=-1)
-    return mean, spread, np.where(count > 0, low, np.nan), np.where(count > 0, high, np.nan)
+    if not values.size:  # numpy has no quantiles of nothing
+        none = np.full(values.shape[:-1], np.nan)
+        return none, none, none, none
+    known = np.where(np.isfinite(values), values, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # no value, or one: nan
+        low, high = np.nanquantile(known, _LEVELS, axis=-1)
+        return np.nanmean(known, axis=-1), np.nanstd(known, axis=-1, ddof=1), low, high
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
@@ -164,30 +176,6 @@ def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
         progress(number * total + done, parts * total)
 
     return report
-
-
-def _value(model: Pendulum | Rig, name: str) -> float:
-    if name in model.numbers():
-        return float(getattr(model, name))
-    which, _, parameter = name.rpartition(".")
-    for effect in model.effects:
-        if effect.name == which and parameter in effect.parameters:
-            return float(effect.parameters[parameter])
-    raise InputError(f"covariance: {short_repr(name)} must be a parameter of the model, got none")
-
-
-def _signs(
-    model: Pendulum | Rig, names: tuple[str, ...], middle: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return 1 or -1 where a parameter keeps its sign (sizes of effects of damping), else 0."""
-    sizes = {
-        f"{effect.name}.{entry['name']}"
-        for effect in model.effects
-        if effect.brakes
-        for entry in effect.definition["parameters"]
-        if entry["role"] == "size"
-    }
-    return np.array([np.sign(x) if n in sizes else 0.0 for n, x in zip(names, middle, strict=True)])
 
 
 def _with(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:

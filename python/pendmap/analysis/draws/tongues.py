@@ -56,7 +56,7 @@ def tongues_over(
 
 
 def fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what the JSON object of critical curves says of draws."""
+    """Return the draws of critical curves for the JSON object."""
     asked = dataset["asked"].values.astype(bool)
     found = {}
     for prefix, key in (("", "curves"), ("inverted_", "inverted")):

@@ -1,0 +1,51 @@
+"""Commands of analyses: options of the model, of the analysis and of the outputs."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap import ANALYSES
+from pendmap.cli.model_options import begin, model_options
+from pendmap.cli.options import added, output_options, progress_options
+from pendmap.cli.show import progress_bar, show
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pendmap.cli.options import Decorator
+
+WRITES = """
+
+Writes {0}.nc, {0}.png and {0}.rrd if no output is named. --json alone writes no file. --view writes
+the recording it opens: {0}.rrd, or what --rerun names."""
+"""End of the help of every command that writes a result."""
+
+
+def analysis_command(
+    name: str, *options: Decorator, model: Decorator = model_options
+) -> Callable[[Callable[..., dict[str, Any]]], click.Command]:
+    """Return what makes a command of :data:`pendmap.ANALYSES`.
+
+    The decorated function takes model, outputs and the values of ``options``, and returns the
+    keyword arguments of the analysis; its docstring is the help.
+    """
+    kind, function = next((k, own[0]) for k, (which, own, _) in ANALYSES.items() if which == name)
+
+    def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
+        def run(**given: Any) -> None:  # noqa: ANN401 (the options)
+            pendulum, outputs = begin(given, name)
+            arguments = prepare(pendulum, outputs, **given)
+            module = importlib.import_module(f"pendmap.analysis.{kind}")
+            with progress_bar(name, shown=outputs.shows_progress) as progress:
+                dataset = getattr(module, function)(pendulum, progress=progress, **arguments)
+            show(dataset, outputs, module.SCHEMA)
+
+        text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
+        decorate = added(model, *options, progress_options, output_options())
+        return click.command(name, help=text)(decorate(run))
+
+    return make
