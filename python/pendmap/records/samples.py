@@ -258,8 +258,8 @@ def keep_readings(work: Work) -> None:
         return
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
-    how = "each reading held" if found.made == "held" else f"{found.made} between readings"
-    text = f"read at {_hertz(rate / found.ratio)} and written at {_hertz(rate)}, {how}"
+    how = "each held" if found.made == "held" else f"{found.made} between"
+    text = f"the record repeats {_hertz(rate / found.ratio)} at {_hertz(rate)}, {how}"
     if work.pivot:
         # The pivot may have been read at every sample.
         work.say("interpolated", f"{text}: errors that count samples are too small")
