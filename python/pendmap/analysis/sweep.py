@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.analysis.numerics import Numerics
-    from pendmap.model import Effect, Pendulum
+    from pendmap.model import Pendulum
     from pendmap.units import Units
 
 
@@ -84,6 +84,13 @@ def varied(
         few = dict(list(example.items())[:count])
         raise InputError(f"what varies must be a mapping like {few}, got {given or 'nothing'}")
     found = tuple(_one(model, name, given) for name, given in ranges.items())
+    pendulum, _ = without_dimensions(model)
+    for axis in found:
+        for value in (float(axis.bare[0]), float(axis.bare[-1])):
+            try:
+                with_values(pendulum, {axis.parameter: value})
+            except InputError as error:
+                raise InputError(f"{axis.name} = {value:g}: {error}") from None
     if len({one.parameter for one in found}) < len(found):
         raise InputError(
             f"{found[0].name} and {found[1].name} must be two parameters, they are one"
@@ -161,14 +168,14 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
             raise InputError(
                 f"{name} changes the units of others: the model must be one without dimensions"
             )
-        bared = [_set(effects[which], parameter, float(x)).bare(units) for x in values]
+        one = dataclasses.replace(effects[which], ci95={})
+        changed = ({**one.parameters, parameter: float(x)} for x in values)
+        bared = [dataclasses.replace(one, parameters=own).bare(units) for own in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
             unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
     if known.count(bare) > 1:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
-    for value in (plain[0], plain[-1]):
-        _check(pendulum, bare, float(value), name)
     return Varied(name, values, bare, plain, unit)
 
 
@@ -185,22 +192,22 @@ def _values(name: str, given: object) -> NDArray[np.float64]:
     return np.linspace(low, high, count)
 
 
-def _check(pendulum: Pendulum, bare: str, value: float, name: str) -> None:
-    """Refuse a value that no pendulum has."""
-    try:
-        if "." not in bare:
-            dataclasses.replace(pendulum, **{bare: value})  # type: ignore[arg-type]
-            return
-        which, parameter = bare.split(".", 1)
-        effects = [_set(e, parameter, value) if e.name == which else e for e in pendulum.effects]
-        dataclasses.replace(pendulum, effects=tuple(effects))
-    except InputError as error:
-        raise InputError(f"{name} = {value:g}: {error}") from None
-
-
-def _set(effect: Effect, parameter: str, value: float) -> Effect:
-    """Return an effect with another value for one of its parameters."""
-    return dataclasses.replace(effect, parameters={**effect.parameters, parameter: value}, ci95={})
+def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
+    """Return the model with these parameters; its effects without their intervals."""
+    own = {name: x for name, x in values.items() if name in model.numbers()}
+    effects = tuple(
+        dataclasses.replace(
+            effect,
+            parameters={
+                name: values.get(f"{effect.name}.{name}", x)
+                for name, x in effect.parameters.items()
+            },
+            ci95={},
+        )
+        for effect in model.effects
+    )
+    changed: dict[str, Any] = {**own, "effects": effects}
+    return dataclasses.replace(model, **changed)
 
 
 STARTS = 9

@@ -17,7 +17,7 @@ from pendmap.analysis.draws import drawn, part
 from pendmap.analysis.draws.tongues import fields as drawn_fields
 from pendmap.analysis.draws.tongues import tongues_over
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, summarised
+from pendmap.analysis.result import Field, Schema, drawn_field, summarised, variable
 from pendmap.analysis.sweep import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.formatting import counted
@@ -219,16 +219,12 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         undamped = [_NO_REST] * len(found)
     of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
-        **_variables(found, undamped, upright),
-        **{
-            f"{table}_omega": (table, np.repeat(frequencies, [len(row.p) for row in rows]))
-            for table, rows in (("critical", found), ("undamped", undamped), ("inverted", upright))
-        },
+        **_variables(frequencies, found, undamped, upright),
         **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
         **_asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max),
     }
     coords: dict[str, Any] = {
-        "omega": ("omega", frequencies, {"units": "1", "long_name": "Omega/w0"}),
+        "omega": variable("omega", frequencies, "1", "Omega/w0"),
         "curve": ("curve", np.array(list(critical_curves.CURVES))),
     }
     if units.si:
@@ -310,34 +306,36 @@ def _folds_to_their_ends(
         looked[middles] = True
 
 
-def _variables(found: list[_Row], undamped: list[_Row], upright: list[_Row]) -> dict[str, Any]:
+def _variables(
+    omega: Floats, found: list[_Row], undamped: list[_Row], upright: list[_Row]
+) -> dict[str, Any]:
+    """Return the tables of critical amplitudes, and the folds, at these frequencies."""
     folds = [row.fold or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
     variables: dict[str, Any] = {
-        **_columns(found, "critical", ""),
-        **_columns(undamped, "undamped", "undamped_"),
-        **_columns(upright, "inverted", "inverted_"),
         "stable_at_first": ("omega", np.array([row.stable[0] for row in found], dtype=np.int8)),
         "fold": ("omega", fold, _OF_P | {"comment": "of the oscillation born at the first loss"}),
-        "fold_theta": ("omega", theta, {"units": "rad"}),
-        "fold_velocity": ("omega", velocity, {"units": "1", "comment": "d theta / d tau"}),
+        "fold_theta": variable("omega", theta, "rad"),
+        "fold_velocity": variable("omega", velocity, "1", comment="d theta / d tau"),
     }
-    for prefix, one, rest in (("", "critical", found), ("inverted_", "inverted", upright)):
-        above = [stable for row in rest for stable in row.stable[1:]]
-        variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
+    for one, prefix, rows in (
+        ("critical", "", found),
+        ("undamped", "undamped_", undamped),
+        ("inverted", "inverted_", upright),
+    ):
+        index = np.repeat(np.arange(omega.size, dtype=np.int32), [len(row.p) for row in rows])
+        p = np.array([p for row in rows for p in row.p], dtype=float)
+        multiplier = np.array([m for row in rows for m in row.multiplier], dtype=np.int8)
+        variables |= {
+            f"{prefix}index": variable(one, index, comment="place of its frequency in omega"),
+            f"{prefix}p": (one, p, _OF_P),
+            f"{prefix}multiplier": (one, multiplier),
+            f"{one}_omega": (one, omega[index]),
+        }
+        if one != "undamped":
+            above = [stable for row in rows for stable in row.stable[1:]]
+            variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
     return variables
-
-
-def _columns(found: list[_Row], one: str, prefix: str) -> dict[str, Any]:
-    count = [len(row.p) for row in found]
-    p = np.array([p for row in found for p in row.p], dtype=float)
-    multiplier = np.array([m for row in found for m in row.multiplier], dtype=np.int8)
-    index = np.repeat(np.arange(len(found), dtype=np.int32), count)
-    return {
-        f"{prefix}index": (one, index, {"comment": "place of its frequency in omega"}),
-        f"{prefix}p": (one, p, _OF_P),
-        f"{prefix}multiplier": (one, multiplier),
-    }
 
 
 def _asymptotic(

@@ -83,7 +83,7 @@ class Outputs:
             taken |= {field: default_file(name + files[field]) for field in files if field in taken}
         if taken.get("view") and taken["rerun"] is None:
             taken["rerun"] = default_file(f"{name}.rrd")
-        if "report" in taken and taken["out"] is None:
+        if "report" in taken and taken["out"] is None:  # a diagnosis always writes its model
             taken["out"] = default_file(name + suffix)
         outputs = cls(**taken)
         places = {"--out": [outputs.out], "--plot": [outputs.plot], "--rerun": [outputs.rerun]}

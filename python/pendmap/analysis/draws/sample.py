@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.sweep import with_values
 from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
 from pendmap.formatting import counted
 from pendmap.model.covariance import covariance_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -141,7 +142,7 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
             if (x * signs < 0).any():
                 continue
             try:
-                one = _with(model, dict(zip(known.names, x.tolist(), strict=True)))
+                one = with_values(model, dict(zip(known.names, x.tolist(), strict=True)))
             except InputError:
                 continue
             break
@@ -176,24 +177,6 @@ def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
         progress(number * total + done, parts * total)
 
     return report
-
-
-def _with(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
-    """Return the model with these values; its effects without their intervals."""
-    own = {name: x for name, x in values.items() if name in model.numbers()}
-    effects = tuple(
-        dataclasses.replace(
-            effect,
-            parameters={
-                name: values.get(f"{effect.name}.{name}", x)
-                for name, x in effect.parameters.items()
-            },
-            ci95={},
-        )
-        for effect in model.effects
-    )
-    changed: dict[str, Any] = {**own, "effects": effects}
-    return dataclasses.replace(model, **changed)
 
 
 def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
