@@ -237,6 +237,8 @@ def test_an_analysis_is_five_files(tmp_path: Path) -> None:
         or not filecmp.cmp(path, old, shallow=False)
     ]
     assert len(changed) + 1 == len(files) == 5
+    core = how_to("Add an analysis").split("With a core in Rust")[1]
+    assert len(files) + len(re.findall(r"`\S+`", core)) == 9
 
     def run(*words: str) -> str:
         environment = os.environ | {"PYTHONPATH": str(copy.parent)}

@@ -11,13 +11,13 @@ from pendmap.errors import InputError, check_number, check_type, core_errors, sh
 from pendmap.model.covariance import said_of
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
-from pendmap.model.labels import LABELS
+from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.tables import read_model
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,16 +140,9 @@ class Pendulum:
     @property
     def title(self) -> str:
         """The parameters in one line, without zeros unless effects depend on them."""
-        shown = {"gamma", "p"} | {name for name in self.numbers() if getattr(self, name) != 0}
-        if not is_driven(self.p, self.effects):
-            shown.discard("omega")
-        if any(effect.drifts for effect in self.effects):
-            shown.add("lab_time")
-        named = [
-            (LABELS[name].symbol, getattr(self, name)) for name in self.numbers() if name in shown
-        ]
-        parts = [f"{symbol} = {value:g}" for symbol, value in named]
-        return ", ".join([*parts, *(effect.title(self.units) for effect in self.effects)])
+        driven = is_driven(self.p, self.effects)
+        names = [name for name in self.numbers() if driven or name != "omega"]
+        return title_of(self, names, {"gamma", "p"})
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
@@ -178,6 +171,22 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
                     f"one of them must be left out (or {called} = 0)"
                 )
     return tuple(effects)
+
+
+def title_of(
+    model: Any,  # noqa: ANN401 (a Pendulum or a Rig)
+    names: Sequence[str],
+    always: set[str],
+) -> str:
+    """Return those parameters that are not 0 or shown ``always``, the last if effects drift."""
+    shown = always | ({names[-1]} if any(effect.drifts for effect in model.effects) else set())
+    parts = []
+    for name in names:
+        value = getattr(model, name)
+        if value != 0 or name in shown:
+            unit = unit_of(name) if model.units.si and name != "phi" else ""
+            parts.append(f"{LABELS[name].symbol} = {value:g} {unit}".rstrip())
+    return ", ".join([*parts, *(effect.title(model.units) for effect in model.effects)])
 
 
 def attributes_of(

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.errors import InputError, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.effects import definition, library
-from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects
+from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.model.tables import SI_KEYS, read_model
 from pendmap.units import Units
@@ -222,15 +221,8 @@ class Rig:
     @property
     def title(self) -> str:
         """The parameters in one line, without zeros unless effects depend on them."""
-        always = {"w0", "c_over_m", "p"}
-        if any(effect.drifts for effect in self.effects):
-            always.add("lab_time_s")
-        shown = []
-        for name in ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s"):
-            if getattr(self, name) != 0 or name in always:
-                unit = "" if name == "phi" else unit_of(name)
-                shown.append(f"{LABELS[name].symbol} = {getattr(self, name):g} {unit}".rstrip())
-        return ", ".join([*shown, *(effect.title(self.units) for effect in self.effects)])
+        names = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
+        return title_of(self, names, {"w0", "c_over_m", "p"})
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
