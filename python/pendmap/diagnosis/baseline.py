@@ -13,9 +13,11 @@ from pendmap.diagnosis.fitted_model import (
     GENTLE,
     FittedModel,
     converge,
+    fit_again,
     fit_model,
     fit_with_candidates,
     impose_physics,
+    none_if_diverged,
 )
 from pendmap.diagnosis.refit import best_of, drop_effect
 from pendmap.errors import FitDiverged, InputError
@@ -64,13 +66,18 @@ def fit_baseline(
     added = [c for c in map(Candidate, CORE) if c.name not in {*base.taken, *without}]
     if not added:
         return base, None
-    core = best_of(*(_core(data, base, added, short=short) for short in (False, True)))
+    start = {candidate.free[0]: 0.0 for candidate in added}
+
+    def fit_core(*, short: bool = False) -> FittedModel | None:
+        return fit_with_candidates(data, base, added, start, level=base.level, short=short)
+
+    core = best_of(fit_core(), fit_core(short=True))
     if model is None and (core is None or not follows(data, core)):
         base = _rescued(data, first, base)
-        core = best_of(core, _core(data, base, added, short=False))
+        core = best_of(core, fit_core())
     if core is None:
         return base, None
-    core = converge(data, core, core.level)
+    core = converge(data, core, core.level) or core
     reduced: FittedModel | None = core
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
@@ -81,16 +88,6 @@ def follows(data: DataSplit, fitted: FittedModel) -> bool:
     """Whether a model follows the motion, whatever its residuals lack."""
     scatter = np.mean([float(np.std(run.theta)) for run in data.fitted])
     return fitted.fit.rms <= POOR * float(scatter)
-
-
-def _core(
-    data: DataSplit, base: FittedModel, added: Sequence[Candidate], *, short: bool
-) -> FittedModel | None:
-    start = {candidate.free[0]: 0.0 for candidate in added}
-    try:
-        return fit_with_candidates(data, base, added, start, level=base.level, short=short)
-    except FitDiverged:
-        return None
 
 
 def _rescued(data: DataSplit, first: Rig, found: FittedModel) -> FittedModel:
@@ -109,6 +106,7 @@ def _rescued(data: DataSplit, first: Rig, found: FittedModel) -> FittedModel:
     return found
 
 
+@none_if_diverged
 def _in_parts(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
     """Return the fit with those runs divided that a model does not follow as a whole.
 
@@ -118,10 +116,7 @@ def _in_parts(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | Non
     runs = [run if run.forced else _divide(run, start, free) for run in data.fitted]
     if all(new is old for new, old in zip(runs, data.fitted, strict=True)):
         return None
-    try:
-        return fit_model(dataclasses.replace(data, fitted=tuple(runs)), start, free)
-    except FitDiverged:
-        return None
+    return fit_model(dataclasses.replace(data, fitted=tuple(runs)), start, free)
 
 
 def _divide(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
@@ -138,6 +133,7 @@ def _divide(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
     return run
 
 
+@none_if_diverged
 def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
     """Return the fit started from a fit to all samples, where stretches are held back, else None.
 
@@ -151,11 +147,7 @@ def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | 
         own = whole[place]
         if own.trusted is not None and run.trusted is not None:
             whole[place] = dataclasses.replace(own, trusted=own.trusted | run.trusted)
-    try:
-        begin = fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free)
-        return fit_model(data, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
-    except FitDiverged:
-        return None
+    return fit_again(data, fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free))
 
 
 def _unfolded(model: Rig) -> Rig:
