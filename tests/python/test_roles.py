@@ -1,4 +1,4 @@
-"""What a parameter of an effect does is said by its definition, never guessed from its name."""
+"""The definition of an effect gives the role of each parameter; its name does not matter."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def predict_limits(name: str) -> list[Any]:
-    """What a search makes of an effect, its parameters by their places."""
+    """Return the candidates of an effect, their parameters by place."""
     names = [p["name"] for p in effects.definition(name)["parameters"]]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
 
