@@ -36,9 +36,6 @@ MOST_STEPS: Final = 40
 QUICK: Final = 4.0
 """Growth of windows from stage to stage of a fit."""
 
-GENTLE: Final = 1.5
-"""Growth of windows in fits that decide, or that diverged with the quick growth."""
-
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one reading's, below which a fit ends."""
 
@@ -156,7 +153,6 @@ def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
     windows: Windows | None = None,
     steps: int = MOST_STEPS,
     least_gain: float = 1e-3,
-    growth: float = QUICK,
     zeroed: Sequence[str] = (),
     target: float = math.inf,
 ) -> FittedModel:
@@ -170,7 +166,7 @@ def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
         profiled=(),
         steps=steps,
         least_gain=least_gain,
-        growth=growth,
+        growth=QUICK,
         target=target,
     )
     return FittedModel(fit, tuple(free), tuple(chosen), data.fitted, data.floors, tuple(zeroed))
