@@ -49,7 +49,7 @@ def written(words: list[str]) -> str | None:
     """The name, without its ending, that the files of a command have."""
     if "--out" in words:
         return Path(words[words.index("--out") + 1]).stem
-    return None if "--json" in words else words[1]
+    return None if {"--json", "--plot", "--rerun", "--view"} & set(words) else words[1]
 
 
 def needed(place: int, lines: list[list[str]]) -> list[int]:
