@@ -130,5 +130,7 @@ def answer(found: Discrepancy) -> dict[str, Any]:
             }
             for s in assessment.identified
         ],
-        "attempts": [[a.names, a.score, a.gain, a.held_gain, a.accepted] for a in found.attempts],
+        "attempts": [
+            [a.effects, a.score, a.bic_gain, a.held_out_gain, a.accepted] for a in found.attempts
+        ],
     }

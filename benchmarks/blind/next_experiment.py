@@ -72,13 +72,12 @@ def add_effects(
     """Return old records with those of a proposal, made by the same rig; no new one is held out."""
     begun = [run.plan for run in virtual_rig.make(request).runs]
     plans, late = [], 0.0
-    for planned in proposal.runs:
-        start = planned.start
+    for start in proposal.runs:
         lab = start.lab_time_s + late
         plans.append(
-            RunPlan("free", start.theta, start.velocity, planned.seconds, lab_time=round(lab, 1))
+            RunPlan("free", start.theta, start.velocity, proposal.length_s, lab_time=round(lab, 1))
         )
-        late += planned.seconds + pause
+        late += proposal.length_s + pause
     asked = {"free": None, "forced": None, "duration": None, "plans": (*begun, *plans)}
     every = record(dataclasses.replace(request, **asked))
     new = tuple(dataclasses.replace(run, hold_out=False) for run in every.runs[len(begun) :])

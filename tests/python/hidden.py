@@ -1,12 +1,10 @@
-"""Experiments with something hidden, diagnosed; the truth stands in a file that nothing here opens
-before the diagnosis is there.
-"""  # noqa: D205 (one sentence)
+"""Diagnoses of experiments with hidden effects; the truth is read after the diagnosis."""
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import hashlib
-import os
 import pickle
 import tempfile
 import tomllib
@@ -35,22 +33,24 @@ def diagnosed(
 ) -> tuple[Discrepancy, dict[str, dict[str, float]]]:
     """Hide effects, diagnose the experiment, then read the truth: parameters by effect.
 
-    The same is diagnosed once in a run of the tests, whichever process asks for it.
+    Each experiment is diagnosed once in a run of the tests, over all processes.
     """
     request = virtual_rig.Request("hidden", seed=seed, effects=effects or ("none",), **given)
     asked = repr((request, tuple(without), max_effects)).encode()
     known = KNOWN[0] / f"{hashlib.sha256(asked).hexdigest()}.pickle"
-    if known.exists():
-        return pickle.loads(known.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 (our own)
-    where = virtual_rig.places(folder / "hidden", replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    found = diagnose(read_experiment(where.experiment), max_effects=max_effects, without=without)
-    content = tomllib.loads(where.truth.read_text(encoding="utf-8"))
-    truth = {e["name"]: e["parameters"] for e in content.get("effect", [])}
-    # Complete or absent: others may look while it is written.
-    partial = known.with_suffix(f".{os.getpid()}")
-    partial.write_bytes(pickle.dumps((found, truth)))
-    partial.replace(known)
+    with known.with_suffix(".lock").open("w") as lock:
+        # Other processes wait here until the first has diagnosed.
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if known.exists():
+            return pickle.loads(known.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 (our own)
+        where = virtual_rig.places(folder / "hidden", replace=True)
+        virtual_rig.write(virtual_rig.make(request), where)
+        found = diagnose(
+            read_experiment(where.experiment), max_effects=max_effects, without=without
+        )
+        content = tomllib.loads(where.truth.read_text(encoding="utf-8"))
+        truth = {e["name"]: e["parameters"] for e in content.get("effect", [])}
+        known.write_bytes(pickle.dumps((found, truth)))
     return found, truth
 
 

@@ -1,4 +1,4 @@
-"""A verdict is said whole, whatever cannot be computed beside it."""
+"""A diagnosis is complete where a part beside its verdict cannot be computed."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 ENTRIES = ("fit_runs", "fit_equations", "fit_rows", "simulate")
-"""Where the core follows a motion of a model."""
+"""Functions of the core that integrate a model."""
 LOST = "the motion leaves the range of numbers: it begins too fast"
 
 
 def anew() -> Discrepancy:
-    """Return a diagnosis of which nothing beside the verdict is computed yet."""
+    """Return a diagnosis without the parts that are computed on demand."""
     return dataclasses.replace(once("quadratic_drag"), reasons={})
 
 
 def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
-    """Let each call into the core lose the motion with this chance."""
+    """Make each call into the core diverge with a probability."""
     draw = np.random.default_rng(seed)
     for name in ENTRIES:
         true = getattr(_core, name)
@@ -43,7 +43,7 @@ def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
 
 
 @pytest.mark.parametrize(("share", "seed"), [(1.0, 0), (0.3, 2)])
-def test_what_cannot_be_computed_is_null_with_its_reason(
+def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
     share: float, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = plain(summary.as_json(once("quadratic_drag")))
@@ -54,7 +54,7 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
     assert told.keys() == whole.keys()
     for name in ("verdict", "effects", "gap", "where", "ranking", "left"):
         assert told[name] == whole[name], name
-    # Each part is there, or its reason is.
+    # Each part has a value or a reason.
     unknown = told["not_computed"]
     for part in {name.partition(".")[0] for name in unknown}:
         assert told[part] is None or told[part] != whole[part], part
@@ -78,8 +78,8 @@ def test_what_cannot_be_computed_is_null_with_its_reason(
 
 
 @pytest.mark.thorough
-def test_the_torque_of_a_spring_is_called_elastic_with_reserve(tmp_path: Path) -> None:
-    # Its period does not grow with the swing: no pendulum, but one with a spring as strong.
+def test_the_torque_of_a_spring_is_named_elastic_with_reserve(tmp_path: Path) -> None:
+    # An oscillator whose period does not grow with the amplitude equals a pendulum with a spring.
     t = np.arange(0, 30, 0.02)
     record = tmp_path / "spring.csv"
     rows = np.c_[t, 3.1 * np.exp(-0.5 * t) * np.cos(6 * t)]
@@ -102,7 +102,9 @@ def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Pat
 
 
 @pytest.mark.thorough
-def test_what_differs_from_run_to_run_is_said_and_widens_intervals(tmp_path: Path) -> None:
+def test_a_parameter_that_differs_between_runs_is_reported_and_has_a_wider_interval(
+    tmp_path: Path,
+) -> None:
     time, noise = np.arange(0, 40, 0.04), np.random.default_rng(1)
     w0 = np.array([6.200, 6.209, 6.201, 6.207])
     for k, own in enumerate(w0):

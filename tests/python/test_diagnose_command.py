@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 import tomllib
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+import pendmap.diagnosis
 from bumpy import FILE
-from pendmap import Rig
+from hidden import once
+from pendmap import Rig, cli
 from recorded import clean
 from recorded import text as csv
 
@@ -58,7 +61,7 @@ def test_json_and_a_model_that_every_command_takes(
     low, high = effect["ci95"]["q"]
     assert low < effect["parameters"]["q"] < high
     assert found["detection_limits"]["bearing_harmonic"] > 0
-    # The model that it names is there; alone --json writes nothing else.
+    # The model file that it names exists; --json alone writes no other file.
     made = {path.name for path in tmp_path.iterdir()} - {"hidden", "hidden.truth.toml"}
     assert made == {found["model"]} == {"diagnose.toml"}
     path = tmp_path / found["model"]
@@ -76,7 +79,7 @@ def test_json_and_a_model_that_every_command_takes(
     assert Rig.from_toml(path).effects[0].name == "quadratic_drag"
     again = pendmap_command("simulate", "--model", found["model"], "--until", "5", "--json")
     assert again.returncode == 0, again.stderr
-    # With what was found in the model there is nothing left to find.
+    # A diagnosis of the same records with the model found finds nothing.
     more = pendmap_command(
         "diagnose", hidden, "--model", found["model"], "--json", "--out", "b.toml"
     )
@@ -98,22 +101,31 @@ def test_a_viscous_model_lacks_coulomb_friction(tmp_path: Path, pendmap_command:
     assert model.effects[0].parameters["theta_r"] == found["effects"][0]["parameters"]["theta_r"]
 
 
-def test_the_verdict_comes_first(hidden: str, pendmap_command: Run) -> None:
-    run = pendmap_command("diagnose", hidden, "--out", "found.toml", "--max-effects", "1")
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.startswith("Verdict: named")
-    assert "Written: found.toml" in run.stdout
+def test_the_verdict_comes_first(
+    tmp_path: Path, hidden: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The diagnosis of these records, which other tests need too.
+    found = once("quadratic_drag", seed=3)
+    monkeypatch.setattr(pendmap.diagnosis, "diagnose", lambda *_given, **_named: found)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["pendmap", "diagnose", hidden, "--out", "found.toml"])
+    with pytest.raises(SystemExit) as end:
+        cli.run()
+    said = capsys.readouterr().out
+    assert not end.value.code
+    assert said.startswith("Verdict: named")
+    assert "Written: found.toml" in said
     # Numbers have the units that the report gives them.
     assert re.search(
         r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; closes \d+ % of .*; probability 0\.\d+",
-        run.stdout,
+        said,
         re.MULTILINE,
     )
-    ranked = run.stdout.partition("candidate")[2].splitlines()
+    ranked = said.partition("candidate")[2].splitlines()
     shapes = [line for line in ranked if " w = " in line]
     assert shapes
     assert all(re.search(r"th0 = \S+ rad, w = \S+ rad\b", line) for line in shapes)
-    assert re.search(r"^Share of the squared gap closed: \d+ %$", run.stdout, re.MULTILINE)
+    assert re.search(r"^Share of the squared gap closed: \d+ %$", said, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +148,7 @@ def test_bad_input_is_refused_on_one_line(
     assert not list(tmp_path.glob("*.toml"))
 
 
-def test_help_says_what_json_alone_writes(pendmap_command: Run) -> None:
+def test_help_says_which_files_json_alone_writes(pendmap_command: Run) -> None:
     said = " ".join(pendmap_command("diagnose", "--help").stdout.split())
     assert "One JSON object on stdout; alone, no file but the model." in said
 
@@ -157,7 +169,7 @@ def test_help_says_what_json_alone_writes(pendmap_command: Run) -> None:
         (("record.rrd", "--rerun", "record.rrd"), "--rerun"),
     ],
 )
-def test_what_is_read_is_not_replaced(
+def test_an_input_is_not_replaced(
     words: tuple[str, ...], option: str, tmp_path: Path, pendmap_command: Run
 ) -> None:
     for name in ("lab", "folder"):
@@ -184,7 +196,7 @@ def test_what_is_read_is_not_replaced(
     assert content() == before
 
 
-def test_a_model_without_dimensions_is_refused_with_what_makes_it_one_in_si(
+def test_a_model_without_dimensions_is_refused_with_the_remedy(
     tmp_path: Path, pendmap_command: Run
 ) -> None:
     (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
@@ -196,7 +208,7 @@ def test_a_model_without_dimensions_is_refused_with_what_makes_it_one_in_si(
     assert run.stderr.count("\n") == 1
 
 
-def test_a_wrong_unit_is_said_before_the_verdict(tmp_path: Path, pendmap_command: Run) -> None:
+def test_a_wrong_unit_is_reported_before_the_verdict(tmp_path: Path, pendmap_command: Run) -> None:
     lab = tmp_path / "lab"
     lab.mkdir()
     time, theta = clean(duration=10.0)
@@ -222,16 +234,16 @@ def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: R
     run = pendmap_command("diagnose", "small.csv", "--json")
     assert run.returncode == 0, run.stderr
     found = json.loads(run.stdout)
-    # To the pendulum of 2.9 rad that it is taken for gravity is nothing, and a spring all.
+    # At the amplitude of 2.9 rad that the record is read as, a spring replaces gravity.
     assert found["effects"]
     assert all(effect["approximate"] for effect in found["effects"])
-    # Such a spring feeds the motion of every run that could be proposed.
+    # With this spring the motion of every proposed run diverges.
     assert found["proposals"] is None
     assert "range of numbers" in found["not_computed"]["proposals"]
 
 
 @pytest.mark.thorough
-def test_what_was_no_candidate_is_said(hidden: str, pendmap_command: Run) -> None:
+def test_effects_left_out_are_reported(hidden: str, pendmap_command: Run) -> None:
     none = pendmap_command("diagnose", hidden, "--max-effects", "0", "--out", "a.toml")
     assert "at most 0 effects were allowed" in none.stdout
     drags = ("quadratic_drag", "power_law_drag")
@@ -250,6 +262,6 @@ def test_a_driven_record_taken_for_a_free_one_gets_no_name(
     found = json.loads(run.stdout)
     assert found["verdict"] == "unknown"
     assert found["effects"] == []
-    # Ten times the noise is missed, and the record's releases are said.
+    # The residual is ten times the noise, and the releases in the record are reported.
     assert found["gap"]["after"] > 10 * found["gap"]["noise_floor"]
     assert any("releases" in text for text in found["findings"])

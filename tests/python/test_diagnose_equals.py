@@ -55,12 +55,14 @@ def test_equals_are_alike(one: str, other: str | Candidate, forced: int, tmp_pat
         ("asymmetric_coulomb", "asymmetric_viscous"),
     ],
 )
-def test_what_differs_under_a_drive_is_told_apart(one: str, other: str, tmp_path: Path) -> None:
+def test_effects_that_differ_under_a_drive_are_told_apart(
+    one: str, other: str, tmp_path: Path
+) -> None:
     assert scored(tmp_path, [one, other], forced=2).likeness(0, 1) < 0.99
 
 
 @pytest.mark.parametrize("name", ["added_mass", "sensor_lag"])
-def test_what_leaves_no_trace_in_a_free_decay_gains_nothing(name: str, tmp_path: Path) -> None:
+def test_an_effect_that_a_free_decay_does_not_show_gains_nothing(name: str, tmp_path: Path) -> None:
     score = scored(tmp_path, [name, "encoder_offset"], forced=0).scores[0]
     assert score.gain == 0
     assert score.information == 0

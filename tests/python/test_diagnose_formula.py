@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: Run) -> None:
+def test_a_formula_that_alone_explains_the_records_is_named(
+    tmp_path: Path, pendmap_command: Run
+) -> None:
     records = experiment(tmp_path / "records")
     own = tmp_path / "own.toml"
     own.write_text(FILE, encoding="utf-8")
@@ -41,7 +43,7 @@ def test_what_only_a_formula_explains_is_named(tmp_path: Path, pendmap_command: 
         low, high = bump["ci95"][name]
         assert low - (high - low) < true < high + (high - low), name
     assert found["gap"]["held_out_after"] < 1.1 * found["gap"]["noise_floor"]
-    # The new model is whole: it needs no other file.
+    # The new model needs no other file.
     model = load_model(out)
     assert isinstance(model, Rig)
     assert model.effects[-1].formula is not None
@@ -61,10 +63,10 @@ def _slope(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # n
 
 
 @pytest.mark.thorough
-def test_functions_are_scored_beside(tmp_path: Path) -> None:
+def test_functions_are_scored_beside_effects(tmp_path: Path) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
     functions = [TorqueFunction("table", _table), TorqueFunction("slope", _slope, {"size": 0.1})]
-    # No formula: nothing that the library has is named for the bump.
+    # Without a formula no effect of the library is named for the bump.
     found = diagnose(records, effects=functions)
     assert found.verdict not in {"none", "named"}
     shares = [line for line in as_text(found) if line.startswith("Share")]
@@ -78,7 +80,7 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
     best = max(score.gain for score in found.scores.scores) / level
     assert table.gain > best
     assert table.gain > 2 * slope.gain
-    # Beside a formula that is right nothing is left for them.
+    # Beside the true formula the functions gain nothing.
     (tmp_path / "own.toml").write_text(FILE, encoding="utf-8")
     found = diagnose(records, effects=[*load_formulas(tmp_path / "own.toml"), *functions])
     assert [effect.name for effect in found.effects] == ["bump"]
@@ -96,11 +98,11 @@ def test_functions_are_scored_beside(tmp_path: Path) -> None:
         (lambda th, *_: 1.0 if th > 0 else 0.0, "fails with ValueError"),
     ],
 )
-def test_a_function_s_faults_are_said_on_one_line(
+def test_an_error_of_a_function_is_reported_on_one_line(
     function: Callable[..., Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
-    # Before anything is fitted, which takes a while.
+    # Functions are called before any fit.
     module = importlib.import_module("pendmap.diagnosis.diagnose")
     monkeypatch.setattr(module, "fit_baseline", pytest.fail)
     with (
@@ -111,14 +113,14 @@ def test_a_function_s_faults_are_said_on_one_line(
     assert str(caught.value).count("\n") == 0
 
 
-def test_what_a_function_has_no_value_for_between_readings_is_no_fault(tmp_path: Path) -> None:
+def test_a_function_may_be_undefined_at_readings_of_0(tmp_path: Path) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
-    # Readings in counts stay: exactly 0 is no velocity, and no angle, of a motion.
+    # Readings in counts repeat, so that angles and velocities of exactly 0 occur.
     function = TorqueFunction("mine", lambda th, v, *_: v / np.abs(v) + np.sin(th) / th)
     check_functions(records.runs, [function])
 
 
-def test_what_cannot_be_a_candidate_is_refused(tmp_path: Path) -> None:
+def test_an_invalid_candidate_is_refused(tmp_path: Path) -> None:
     records = read_experiment(experiment(tmp_path / "records"))
     lopsided = Formula("two", "-k*v - c*v^3", {"k": 1, "c": -1})
     with pytest.raises(InputError, match="is not proportional to its first parameter k"):

@@ -1,4 +1,4 @@
-"""How well the shape of an effect is known: intervals along a bent ridge, the side of a place."""
+"""Intervals of shape parameters, and places on either side of the rest position."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> FittedModel:
-    """The model fitted again from another value of a parameter, held there or not."""
+    """Return the model fitted from another value of a parameter, held fixed or not."""
     fitted = found.best.fitted
     effect, parameter = key.split(".")
     model = fitted.fit.model
@@ -41,7 +41,7 @@ def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> FittedMo
 
 
 def _risen(found: Discrepancy, key: str, value: float) -> float:
-    """By how much the least sum of squares rises with a parameter held, over that of noise."""
+    """Return the rise of the least sum of squares with a parameter held, over that of noise."""
     fitted = found.best.fitted
     return (_from(found, key, value, held=True).chi2 - fitted.chi2) / fitted.widening
 
@@ -82,12 +82,12 @@ def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> No
 
 
 @pytest.mark.thorough
-def test_a_place_that_is_known_is_given_once(tmp_path: Path) -> None:
+def test_a_place_on_a_known_side_is_given_once(tmp_path: Path) -> None:
     found, truth = diagnosed(tmp_path, "rough_spot", size=1.0)
     (named,) = found.effects
     assert named.elsewhere == {}
     assert named.parameters["th0"] * truth["rough_spot"]["th0"] > 0
-    # A fit that began on the other side stays there, until it is asked to change over.
+    # A fit that starts on the other side stays there unless mirrored places are tried.
     key, best = "rough_spot.th0", found.best.fitted
     astray = _from(found, key, -named.parameters["th0"], held=False)
     assert astray.chi2 > best.chi2 + 20

@@ -1,4 +1,4 @@
-"""A diagnosis gives out what a pendulum can be: no coefficient of it drives the motion."""
+"""Models of a diagnosis are physical: no coefficient drives the motion."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ def decay(c_over_m: float = 0.0, drag: float = Q, seed: int = 1) -> Experiment:
 
 
 def with_effect(data: DataSplit, effect: str, steps: int = 40, **parameters: float) -> FittedModel:
-    """Fit an effect, or only see how well its parameters are known where they are put."""
+    """Fit an effect, or only estimate the errors of given parameters."""
     shape = dict(list(parameters.items())[1:])
     model = Rig(W0, c_over_m=0.05, Tr=TR, effects=(Effect(effect, parameters),))
     free = [*BASE, *(f"{effect}.{name}" for name in parameters)]
     return fit_model(data, model, free, [Candidate(effect, shape)], steps=steps)
 
 
-def test_damping_that_the_fit_makes_negative_is_held_at_0_and_the_rest_fitted_again() -> None:
-    # The damping is 0 in truth; this noise takes its fit below.
+def test_negative_damping_is_fixed_at_0_and_the_others_fitted_again() -> None:
+    # The true damping is 0; with this noise its estimate is negative.
     data = split_records(decay(seed=4))
     free = with_effect(data, "quadratic_drag", q=0.01)
     assert free.fit["c_over_m"] < -1e-4
@@ -54,7 +54,7 @@ def test_damping_that_the_fit_makes_negative_is_held_at_0_and_the_rest_fitted_ag
     assert held.zeroed == ("c_over_m",)
     assert held.fit.model.c_over_m == 0
     assert "c_over_m" not in held.fit.estimates
-    # The coefficient alone at 0, the others as they were, fits worse than those found again.
+    # With the coefficient at 0 and the others unchanged the model fits worse.
     start = {n: v for n, v in free.start.items() if n != "c_over_m"}
     kept = fit_model(data, held.fit.model, held.free, held.chosen, start=start, steps=0)
     assert free.chi2 < held.chi2 < kept.chi2
@@ -63,14 +63,14 @@ def test_damping_that_the_fit_makes_negative_is_held_at_0_and_the_rest_fitted_ag
         assert abs(estimate.value - true) < 4 * estimate.stderr
 
 
-def test_what_is_physical_stays_as_it_is() -> None:
+def test_a_physical_model_is_unchanged() -> None:
     data = split_records(decay(c_over_m=0.05))
     fitted = with_effect(data, "quadratic_drag", q=0.01)
     assert impose_physics(data, fitted) is fitted
 
 
-def test_a_drag_that_drives_is_no_effect() -> None:
-    # Damping less a part that grows with the velocity: drag of the wrong sign fits it best.
+def test_a_drag_that_drives_is_refused() -> None:
+    # Damping that falls with the velocity: drag of the wrong sign fits best.
     data = split_records(decay(c_over_m=0.15, drag=-0.01))
     fitted = with_effect(data, "quadratic_drag", q=0.01)
     assert fitted.fit["quadratic_drag.q"] == pytest.approx(-0.01, rel=0.1)
@@ -81,7 +81,7 @@ def test_a_drag_that_drives_is_no_effect() -> None:
     ("tau", "possible"),
     [(0.5 * SWING, False), (2 * SWING, True), (0.5 * TIME[-1], True), (2 * TIME[-1], False)],
 )
-def test_a_time_constant_is_a_swing_at_least_and_the_record_at_most(
+def test_a_time_constant_is_between_a_swing_and_the_length_of_the_record(
     tau: float, *, possible: bool
 ) -> None:
     data = split_records(decay(c_over_m=0.05))
@@ -90,7 +90,7 @@ def test_a_time_constant_is_a_swing_at_least_and_the_record_at_most(
 
 
 def test_the_model_that_is_printed_is_the_one_that_is_written(tmp_path: Path) -> None:
-    # A damping with the cube of the velocity, and nothing may be added: friction below 0 fits best.
+    # Cubic damping, and no effect may be added: negative friction fits best.
     found, _ = diagnosed(
         tmp_path, "cubic_damping", seed=5, size=3.0, free=3, forced=0, max_effects=0
     )
@@ -133,7 +133,7 @@ def test_a_forced_run_without_its_drive_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("part", "possible"), [(2.0, False), (0.5, True)])
 def test_a_drift_takes_no_friction_below_0(part: float, *, possible: bool) -> None:
-    # What the record says, by scipy: friction that has fallen by a part of itself when it ends.
+    # A record by scipy whose friction falls by a part of itself.
     def rhs(t: float, state: list[float]) -> list[float]:
         friction = TR * (1 - part * t / TIME[-1]) * np.tanh(state[1] / 1e-3)
         return [state[1], -0.05 * state[1] - W0**2 * np.sin(state[0]) - friction]

@@ -1,4 +1,4 @@
-"""With how much reserve a name is given."""
+"""Probabilities of names, and names that are given with reserve."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 import pendmap
 from driven_decays import motion
-from hidden import diagnosed
+from hidden import diagnosed, once
 from pendmap.comparison.data import split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
 
-def test_probability_falls_with_what_is_left_and_with_how_many_effects_it_took() -> None:
+def test_probability_falls_with_the_misfit_and_with_the_number_of_effects() -> None:
     by_chance = [probabilities(chance, [300.0])[0] for chance in (1.0, 0.1, 1e-2, 1e-3)]
     assert by_chance == sorted(by_chance, reverse=True)
     assert by_chance[0] > SURE > by_chance[-1]
     by_count = [min(probabilities(0.5, [500.0] * count)) for count in (1, 2, 3)]
     assert by_count == sorted(by_count, reverse=True)
-    # One that mops up what a stronger one of the wrong form leaves.
+    # A weak effect beside a strong one is less sure.
     strong, weak = probabilities(0.5, [2000.0, 20.0])
     assert strong > weak
     assert probabilities(0.5, [2000.0, 1500.0])[1] > weak
@@ -43,14 +43,14 @@ def test_probability_falls_with_what_is_left_and_with_how_many_effects_it_took()
     assert probabilities(0.5, []) == ()
 
 
-def test_nothing_left_is_chance(tmp_path: Path) -> None:
-    found, _ = diagnosed(tmp_path, free=3, forced=0)
+def test_residuals_without_a_hidden_effect_are_explained_by_noise() -> None:
+    found = once("none", seed=5, free=1, forced=0)
     assert found.verdict == "none"
     assert found.assessment.form.chance > CHANCE
     assert all(0 <= chance <= 1 for chance in found.assessment.form.chances.values())
 
 
-def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> None:
+def test_a_form_that_the_library_lacks_shows_in_the_residuals(tmp_path: Path) -> None:
     found, _ = diagnosed(
         tmp_path, "encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",)
     )
@@ -60,8 +60,8 @@ def test_a_form_that_the_library_lacks_shows_in_what_is_left(tmp_path: Path) -> 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [3, 5])
-def test_what_two_others_do_together_is_given_with_reserve(seed: int, tmp_path: Path) -> None:
-    # With its whole family taken out, two frictions do what a drag does, to within the noise.
+def test_two_effects_in_the_place_of_one_are_named_with_reserve(seed: int, tmp_path: Path) -> None:
+    # Without the family of the drag two frictions fit its records to within the noise.
     own = [effect.name for effect in pendmap.effects() if effect.family == "damping"]
     found, _ = diagnosed(
         tmp_path, "quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own
@@ -96,11 +96,11 @@ def runs_of(state: State, fitted: FittedModel) -> RunByRun:
     [
         ({}, "partial"),
         ({"closes": 1.1}, "unknown"),
-        # Nothing counts as left: then the drag's rivals, which the wave hides, decide.
+        # No residual counts: the alternatives of the drag, which the wave hides, decide.
         ({"rest": 0.0}, "ambiguous"),
     ],
 )
-def test_what_is_partial(
+def test_thresholds_decide_between_partial_unknown_and_ambiguous(
     change: dict[str, float], verdict: str, waving: tuple[State, ScoredModel]
 ) -> None:
     state, best = waving
@@ -125,7 +125,7 @@ def test_the_effect_that_closes_most_comes_first(waving: tuple[State, ScoredMode
         assert judged.identified[0].gain > judged.identified[1].gain
 
 
-def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
+def test_an_effect_that_contains_the_name_takes_no_share() -> None:
     named = {c.name: c for c, *_ in list_candidates((), driven=False)}
 
     def alternative(
@@ -147,7 +147,7 @@ def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
         return Identifiability(named["quadratic_drag"], 500.0, 1.0, alternatives)
 
     assert each().share == 1.0
-    # What has the name as a special case takes nothing from it.
+    # An effect with the name as a special case takes no share.
     power = each(alternative("power_law_drag", 0.0, contains=True))
     assert power.share == 1.0
     assert power.equivalent == ["quadratic_drag"]
@@ -159,7 +159,7 @@ def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
     # exp(-6 / 2) to 1.
     behind = each(alternative("cubic_damping", 6.0, contains=False))
     assert behind.share == pytest.approx(1 / (1 + math.exp(-3)))
-    # One run alone may say all against it, and it is a name all the same.
+    # An alternative that one run alone excludes is equivalent.
     one = each(alternative("cubic_damping", 30.0, contains=False, alike=True))
     assert one.equivalent == ["quadratic_drag", "cubic_damping"]
     assert each(alternative("cubic_damping", 30.0, contains=False)).equivalent == ["quadratic_drag"]
@@ -167,9 +167,7 @@ def test_what_has_the_name_as_a_special_case_takes_no_share() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [34, 43])
-def test_without_noise_nothing_is_made_of_what_the_arithmetic_leaves(
-    seed: int, tmp_path: Path
-) -> None:
+def test_without_noise_rounding_errors_give_no_effect(seed: int, tmp_path: Path) -> None:
     clean = {"seed": seed, "noise": 0.0, "counts": 0}
     nothing, _ = diagnosed(tmp_path, **clean)
     assert nothing.verdict == "none"

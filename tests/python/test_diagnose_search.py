@@ -1,4 +1,4 @@
-"""What a search fits, forgets and accepts."""
+"""The search: its fits, their reuse, and the acceptance of effects."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_core_is_fitted_beside_the_given_model(
     assert none is None
 
 
-def test_a_search_ends_with_what_is_there_and_drops_the_rest_of_the_core(
+def test_a_search_keeps_the_true_effect_and_drops_the_others_of_the_core(
     dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, core = dragged
@@ -81,7 +81,7 @@ def test_a_search_ends_with_what_is_there_and_drops_the_rest_of_the_core(
     assert state.chance(state.base, best) < state.thresholds.chance
     assert core is not None
     assert state.chance(best, core) > state.thresholds.chance
-    # From the core the pruning alone leads there.
+    # Pruning of the core gives the same effects.
     assert prune_effects(state, core).names == ("quadratic_drag",)
 
 
@@ -116,7 +116,7 @@ def test_the_same_model_is_fitted_once(
     assert state.scores(state.base) is scores
 
 
-def test_a_fit_that_is_lost_is_no_candidate(
+def test_a_fit_that_diverges_is_no_candidate(
     dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state, _ = dragged
@@ -124,13 +124,13 @@ def test_a_fit_that_is_lost_is_no_candidate(
     def lost(*_given: object, **_named: object) -> FittedModel:
         raise FitDiverged("lost")
 
-    monkeypatch.setattr("pendmap.diagnosis.refit.fit_with_candidates", lost)
+    monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_model", lost)
     other = State(state.records, state.base, state.thresholds, 3, ())
     assert other.refit(state.base, [0]) is None
     assert search(other, None, lambda _: None).chosen == ()
 
 
-def test_no_fault_of_a_fit_is_taken_for_a_lost_motion(
+def test_an_error_of_a_fit_is_not_taken_for_divergence(
     dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state, _ = dragged
@@ -143,18 +143,18 @@ def test_no_fault_of_a_fit_is_taken_for_a_lost_motion(
         State(state.records, state.base, state.thresholds, 3, ()).refit(state.base, [0])
 
 
-def test_no_effect_is_accepted_that_noise_alone_may_be() -> None:
+def test_no_effect_is_accepted_that_noise_explains() -> None:
     data = decay(drag=0.0)
     base, core = fit_baseline(data)
     state = State(data, base, Thresholds(), 3, ())
     assert search(state, core, lambda _: None).chosen == ()
-    # With a chance of anything the best candidate is as good as any.
+    # Thresholds that accept everything accept the best candidate.
     lax = Thresholds(chance=2.0, alike=0.0, closes=0.0, loss=math.inf)
     state = State(data, base, lax, 1, CORE)
     assert search(state, None, lambda _: None).chosen != ()
 
 
-def test_a_model_that_loses_on_what_was_held_back_does_not_hold(
+def test_a_model_that_loses_on_held_out_records_is_refused(
     dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, _ = dragged
@@ -166,7 +166,7 @@ def test_a_model_that_loses_on_what_was_held_back_does_not_hold(
     assert len(hold_out_losses(state.data, best, held, state.level)) == 3
 
 
-def test_without_the_effect_its_rivals_are_behind_by_what_they_miss(
+def test_alternatives_are_behind_by_the_gain_that_they_miss(
     dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, _ = dragged
@@ -190,14 +190,14 @@ def test_a_model_without_an_effect_is_never_worse_than_one_with_fewer(
     gain = Candidate("encoder_gain")
     both = fit_with_candidates(known.data, best, [gain], {gain.free[0]: 0.0}, level=known.level)
     right = known.leave_out(both, gain)
-    # The fit without the gain is lost; the drag is fitted to the given model again.
+    # The fit without the gain diverges; the drag is added to the given model instead.
     monkeypatch.setattr("pendmap.diagnosis.state.drop_effect", lambda *_: None)
     state = State(known.records, known.base, known.thresholds, 3, ())
     state.data = known.data
     rest = state.leave_out(both, gain)
     assert rest.names == ("quadratic_drag",)
     assert rest.chi2 == pytest.approx(right.chi2, rel=1e-3)
-    # Where that is lost too, the given model is the best one without the gain.
+    # Where that fit diverges too, the given model is the best one without the gain.
     monkeypatch.setattr("pendmap.diagnosis.state.add_effects", lambda *_: None)
     state = State(known.records, known.base, known.thresholds, 3, ())
     assert state.leave_out(both, gain) is known.base
@@ -232,9 +232,9 @@ def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path
     assert fit(1.01 * base.chi2) == whole
 
 
-def test_a_pendulum_that_rests_holds_up_no_fit(tmp_path: Path) -> None:
-    # A forced run comes to rest where warming just holds it: in its last windows the sum of
-    # squares is least at a kink, and no fit was ever at its end.
+def test_a_fit_converges_where_the_pendulum_comes_to_rest(tmp_path: Path) -> None:
+    # A forced run comes to rest at the limit of friction: in its last windows the sum of squares
+    # has its minimum at a kink.
     data = recorded(
         tmp_path, "quadratic_drag", seed=4, free=5, forced=4, noise=0.1, counts=4096, rate=124.0
     )

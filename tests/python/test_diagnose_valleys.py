@@ -1,6 +1,6 @@
-"""Experiments on whose records fits lose their way: another side, a lost window, a bent valley.
+"""Experiments with local minima: a mirrored place, a lost window, a curved valley.
 
-Each was called something else, or was many standard errors off, before fits found back.
+Earlier versions named another effect, or were many standard errors off.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
 @pytest.mark.parametrize(
     ("effects", "given"),
     [
-        # On one side of the rest a friction that depends on the load made up for the wrong side.
+        # Load-dependent friction compensated for the wrong side.
         (
             ["rough_spot"],
             MIXED | {"seed": 1970971373, "size": 0.971, "noise": 0.208, "counts": 4096},
         ),
-        # A power of 3.004 in the place of the cube.
+        # A power of 3.004 replaced the cube.
         (
             ["cubic_damping"],
             MIXED
@@ -42,7 +42,7 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
                 "rate": 500.0,
             },
         ),
-        # Beside it a drift of nothing give or take nothing, without which the fit was lost.
+        # A drift of size 0 was kept, as the fit without it diverged.
         (
             ["viscous_warm_up"],
             FREE
@@ -54,7 +54,7 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
                 "rate": 500.0,
             },
         ),
-        # Seventeen standard errors off along the valley of size and width.
+        # The estimate was 17 standard errors off along the valley of size and width.
         (
             ["stribeck_friction"],
             MIXED
@@ -68,7 +68,7 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
     ],
     ids=["side", "power", "idle", "width"],
 )
-def test_what_is_hidden_is_named_alone_with_its_parameters(
+def test_a_hidden_effect_is_named_alone_with_its_parameters(
     effects: list[str], given: dict[str, Any], tmp_path: Path
 ) -> None:
     found, truth = diagnosed(tmp_path, *effects, **given)
@@ -84,7 +84,7 @@ def test_what_is_hidden_is_named_alone_with_its_parameters(
 
 @pytest.mark.thorough
 def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
-    # The steady drift was a warming of 180 years: its own fit had lost the end of a run.
+    # The drift was named a warm-up of 180 years: its fit had lost the end of a run.
     found, _ = diagnosed(
         tmp_path,
         "viscous_drift",
@@ -99,8 +99,8 @@ def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path) -> None:
-    # Phases of the drive, adapted to the runs held out, take up what its frequency did there.
+def test_held_out_runs_with_little_information_refuse_no_effect(tmp_path: Path) -> None:
+    # The phases fitted to the held-out runs absorb the error of the frequency there.
     found, _ = diagnosed(
         tmp_path,
         "drive_frequency",
@@ -116,10 +116,10 @@ def test_held_out_runs_that_say_little_do_not_take_an_effect_away(tmp_path: Path
 
 
 @pytest.mark.thorough
-def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
+def test_a_name_that_does_not_predict_the_held_out_run_is_given_with_reserve(
     tmp_path: Path,
 ) -> None:
-    # What was fitted is explained by one drift of friction; the run held out has chi^2/N 1.9.
+    # One drift explains the fitted runs; the held-out run has chi^2/N = 1.9.
     found, _ = diagnosed(
         tmp_path,
         "viscous_drift",
@@ -141,9 +141,9 @@ def test_a_name_that_does_not_foretell_the_run_held_out_is_given_with_reserve(
 
 
 @pytest.mark.thorough
-def test_an_effect_of_nothing_does_not_stay_since_its_rest_was_lost(tmp_path: Path) -> None:
-    # The drag alone had been found first, with a window that had slipped; a bearing harmonic of
-    # nothing, give or take nothing, led out of there and was named for it.
+def test_an_effect_of_size_0_is_dropped_although_the_fit_without_it_slipped(tmp_path: Path) -> None:
+    # The drag was found first with a slipped window; a bearing harmonic of size 0 led out of that
+    # minimum and was named.
     found, truth = diagnosed(
         tmp_path, "quadratic_drag", seed=4, noise=0.1, counts=4096, rate=124.0, **MIXED
     )

@@ -1,4 +1,4 @@
-"""What a reading counts for: the error of the model beside the noise, independent readings."""
+"""Weights of readings: errors of the model beside the noise, numbers of independent readings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SIGNS = np.where(np.arange(N) % 2, 1.0, -1.0)
 
 
 def data(*runs: FitRun, doubt: float = 0.0) -> DataSplit:
-    """Return runs, each of them a record of its own; the first is held back too."""
+    """Return runs from separate records; the first is held back too."""
     time = np.arange(N) * 0.01
     angle = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.03)
     good = np.ones(N, bool)
@@ -57,15 +57,15 @@ def leaving(*residuals: Floats) -> FittedModel:
     return SimpleNamespace(fit=SimpleNamespace(residuals=residuals))  # type: ignore[return-value]
 
 
-def test_the_error_of_a_model_is_the_root_mean_square_of_what_it_leaves() -> None:
+def test_the_error_of_a_model_is_the_root_mean_square_of_its_residuals() -> None:
     # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: the mean square is 6.5.
     left = SIGNS * np.where(SIGMA == 1, math.sqrt(5), math.sqrt(8))
-    # White noise as strong as it is said to be leaves no error.
+    # Residuals of the stated noise give no error.
     errors = model_errors(data(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
     assert errors == pytest.approx((math.sqrt(6.5), 0.0), abs=1e-9)
 
 
-def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
+def test_untrusted_readings_and_rounding_are_no_error() -> None:
     trusted = np.arange(N) != 7
     # Rounding of a count of sqrt(12) has the variance 1: 2 is noise, 6 is more.
     counted = run(1.0, count=math.sqrt(12), trusted=trusted)
@@ -77,14 +77,14 @@ def test_what_is_not_trusted_and_what_counts_hide_are_no_error() -> None:
 
 
 @pytest.mark.parametrize(("doubt", "error"), [(0.0, math.sqrt(1.5)), (0.1, 0.0)])
-def test_noise_that_is_hardly_known_may_leave_more(doubt: float, error: float) -> None:
+def test_uncertain_noise_allows_larger_residuals(doubt: float, error: float) -> None:
     # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; 1.5 is left.
     left = SIGNS * math.sqrt(1.5)
     found = model_errors(data(run(1.0), doubt=doubt), leaving(left))
     assert found == pytest.approx((error,), abs=1e-9)
 
 
-def test_readings_of_a_run_that_a_model_misses_count_alike() -> None:
+def test_readings_of_a_run_that_a_model_misses_have_equal_weights() -> None:
     records = data(run(SIGMA), run(3.0, count=math.sqrt(12)), run(1.0))
     found = weight_records(records, (2.0, 4.0, 0.0))
     one, two, three = found.fitted

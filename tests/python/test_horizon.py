@@ -38,7 +38,7 @@ def test_the_new_model_forecasts_farther(found: Discrepancy) -> None:
         assert np.all(np.diff(forecast.horizon) > 0)
         far = forecast.horizon > 0.5 * forecast.horizon[-1]
         before, after = np.mean(forecast.before[far]), np.mean(forecast.after[far])
-        # What the new model lacks is the state alone, which one swing of readings gives.
+        # The new model lacks only the state at the start, which one swing of readings gives.
         assert forecast.noise_floor * 0.9 < after < 1.4 * forecast.noise_floor
         assert before > 1.2 * after
 

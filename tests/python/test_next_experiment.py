@@ -1,4 +1,4 @@
-"""What is recommended to be recorded next decides as much as is predicted, once it is recorded."""
+"""Recommended records decide as much as is predicted, once they are recorded."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def done(request: Request, proposal: Proposal) -> tuple[Run, ...]:
     plans = [
         RunPlan(
             "free",
-            run.start.theta,
-            run.start.velocity,
-            run.seconds,
-            lab_time=round(run.start.lab_time_s, 1),
+            start.theta,
+            start.velocity,
+            proposal.length_s,
+            lab_time=round(start.lab_time_s, 1),
         )
-        for run in proposal.runs
+        for start in proposal.runs
     ]
     asked: dict[str, Any] = {"free": None, "forced": None, "plans": (*begun, *plans)}
     every = recorded(dataclasses.replace(request, **asked)).runs[len(begun) :]
@@ -65,7 +65,7 @@ def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment,
 
 
 @pytest.mark.thorough
-def test_what_is_recommended_leaves_one_name() -> None:
+def test_the_recommended_record_leaves_one_name() -> None:
     """Drifts that are alike within minutes: the rig does what was recommended."""
     request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
     assert before.verdict == "ambiguous"
@@ -111,15 +111,15 @@ def test_an_interval_becomes_as_narrow_as_predicted() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("what", ["from 0.5 rad", "from 2.8 rad", "flung through 0"])
-def test_a_proposal_says_what_its_record_says(what: str) -> None:
-    """The information predicted, from thinned samples, is that of the record once it is there."""
+def test_the_information_of_a_proposal_is_that_of_its_record(what: str) -> None:
+    """The prediction from thinned samples agrees with the recorded run."""
     request, _, found = hidden(8, free=2, noise=0.2, counts=8192)
     known = {"max_velocity": 8 * found.base.fitted.fit.model.w0}
     experiment = dataclasses.replace(found.data.experiment, known=known)
     data = dataclasses.replace(found.data, experiment=experiment)
     menu = list_proposals(data, found.base.fitted.fit.model.w0)
     proposal = next(p for p in menu if len(p.runs) == 1 and what in p.what)
-    ahead = Prospects(data, found.base, [proposal], [], {})
+    ahead = Prospects(data, found.base, [], {}, [proposal])
     predicted = ahead.after(proposal).matrix - ahead.old.matrix
     (run,) = done(request, proposal)
     reading = reading_of(run.time, run.theta, trusted=run.trusted, count=run.count_rad)
@@ -130,12 +130,12 @@ def test_a_proposal_says_what_its_record_says(what: str) -> None:
     fit = fit_model(alone, fitted.fit.model, fitted.free, start=fitted.start).fit
     recorded_ = Columns.of(fit, alone.fitted, []).information(0, len(run.time), hold=True)
     errors = [np.sqrt(np.diag(np.linalg.inv(m))) for m in (predicted, recorded_.matrix)]
-    # What no angle that large tells of the last swings is another matter.
+    # Within the approximation of the thinned samples.
     assert errors[0] == pytest.approx(errors[1], rel=0.3)
 
 
-def test_exact_equals_are_told_apart_by_nothing() -> None:
-    _, _, found = hidden(6, "bias_torque", size=0.3, free=2)
+def test_exact_equals_are_told_apart_by_no_proposal() -> None:
+    found = once("bias_torque", seed=6, size=0.3, free=2, forced=0)
     outlook = found.advice.outlook
     assert outlook is not None
     assert {frozenset(pair) for pair in outlook.equals} == {
@@ -146,7 +146,7 @@ def test_exact_equals_are_told_apart_by_nothing() -> None:
 
 
 def test_every_verdict_has_a_table_and_json_without_gaps() -> None:
-    _, _, found = hidden(5, free=1)
+    found = once("none", seed=5, free=1, forced=0)
     assert found.verdict == "none"
     fields = as_json(found)
     table = fields["proposals"]
@@ -161,8 +161,8 @@ def test_every_verdict_has_a_table_and_json_without_gaps() -> None:
     assert all(run["drive"] is None for row in table["experiments"] for run in row["runs"])
 
 
-def test_what_a_free_decay_does_not_show_has_no_limit() -> None:
-    _, _, found = hidden(5, free=1)
+def test_an_effect_that_a_free_decay_does_not_show_has_no_limit() -> None:
+    found = once("none", seed=5, free=1, forced=0)
     limits = found.advice.limits
     assert limits["added_mass"].size == math.inf
     # One period a turn is gravity itself.
@@ -182,7 +182,7 @@ def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
 
 @pytest.mark.thorough
 def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
-    """The limit of clean records; the same rig then hides it, with other noise."""
+    """The limit is that of records without an effect; the same rig then hides it."""
     _, _, clean = hidden(11, free=2, noise=0.2)
     limit = clean.advice.limits["encoder_gain"].size
     found = 0
@@ -194,7 +194,7 @@ def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
     assert faint.verdict == "none"
 
 
-def test_what_columns_others_follow_is_the_schur_complement() -> None:
+def test_information_beside_other_columns_is_the_schur_complement() -> None:
     """Against least squares on the columns themselves."""
     rng = np.random.default_rng(2)
     x = rng.standard_normal((300, 5)) * [1, 1e3, 1e-4, 7, 1]
@@ -215,7 +215,7 @@ def test_chances_of_names() -> None:
 
 
 def test_the_rig_does_runs_that_are_planned() -> None:
-    """The first runs are the same whatever follows; what contradicts itself is refused."""
+    """Planned runs do not change those before them; contradictory requests are refused."""
     request = Request("hidden", seed=4, effects=("none",), free=1, forced=0)
     first = virtual_rig.make(request).runs[0]
     plan = RunPlan("free", 0.3, 1.0, 5.0, lab_time=900.0)
@@ -230,8 +230,8 @@ def test_the_rig_does_runs_that_are_planned() -> None:
         Request("hidden", plans=(dataclasses.replace(plan, duration=0.0),))
 
 
-def test_what_is_not_enough_is_said_to_be_so() -> None:
-    """Of two drags whose gain is small, no run of the menu makes sure: so many more would."""
+def test_an_insufficient_proposal_says_how_many_runs_are_needed() -> None:
+    """The gain of the drag is small: no single proposal reaches the wanted separation."""
     found = once("quadratic_drag", size=0.1)
     outlook, best = found.advice.outlook, found.advice.best
     assert outlook is not None

@@ -77,7 +77,7 @@ def test_every_power_leads_to_the_same_fit(run: FitRun, n: float) -> None:
         assert abs(estimate.value - truth) < 3 * estimate.stderr
         assert estimate.ci95[0] < truth < estimate.ci95[1]
     assert fit.model.effects[0].parameters == {"q": fit[Q], "n": fit[N]}
-    # What is known is the drag at the velocities that there were: more of the one is less of both.
+    # The records determine the drag at their velocities: size and power are correlated.
     places = [fit.names.index(Q), fit.names.index(N)]
     (a, ab), (_, b) = fit.covariance[np.ix_(places, places)]
     assert ab / math.sqrt(a * b) < -0.8
@@ -138,7 +138,7 @@ def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]
 
 
 @pytest.mark.thorough
-def test_standard_errors_of_a_power_match_the_scatter(tmp_path: Path) -> None:
+def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
     scaled = []
     for seed in range(1, 17):
         truth, trials = hidden(tmp_path, seed)
@@ -159,7 +159,7 @@ def test_standard_errors_of_a_power_match_the_scatter(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_diagnosis_gives_the_interval_of_the_power(tmp_path: Path) -> None:
+def test_a_diagnosis_gives_an_interval_of_the_power(tmp_path: Path) -> None:
     found, truth = diagnosed(
         tmp_path, "power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0
     )

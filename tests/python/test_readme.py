@@ -1,4 +1,4 @@
-"""Commands and examples of README.md and of the pages in docs run."""
+"""Commands and snippets of README.md and of the pages in docs are run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PATIENCE = 120.0
-"""Processor time that a command may take, s."""
+"""Most processor time of a command, s."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -49,7 +49,7 @@ def written(words: list[str]) -> str | None:
     """The name, without its ending, that the files of a command have."""
     if "--out" in words:
         return Path(words[words.index("--out") + 1]).stem
-    return None if "--json" in words else words[1]
+    return None if {"--json", "--plot", "--rerun", "--view"} & set(words) else words[1]
 
 
 def needed(place: int, lines: list[list[str]]) -> list[int]:
@@ -65,35 +65,32 @@ def children_seconds() -> float:
     return spent.children_user + spent.children_system
 
 
-@pytest.fixture(scope="module")
-def ran(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, tuple[Path, set[int]]]:
-    """The folder of each page in this process, and the places of the commands that ran in it."""
-    return {page: (tmp_path_factory.mktemp(page.stem), set()) for page in PAGES}
+def together(lines: list[list[str]]) -> list[list[int]]:
+    """Places of the commands that need one another, in order: each command once."""
+    groups: list[set[int]] = []
+    for place in range(len(lines)):
+        own = {place, *needed(place, lines)}
+        groups = [
+            *(group for group in groups if not group & own),
+            own.union(*(group for group in groups if group & own)),
+        ]
+    return sorted(sorted(group) for group in groups)
 
 
 @pytest.mark.parametrize(
-    ("page", "place"),
+    ("page", "places"),
     [
-        pytest.param(page, k, id=f"{page.name} {k} {line[1]}")
+        pytest.param(page, places, id=f"{page.name} {places[-1]} {lines[places[-1]][1]}")
         for page, lines in PROMISED.items()
-        for k, line in enumerate(lines)
+        for places in together(lines)
     ],
 )
-def test_every_command_runs(page: Path, place: int, ran: dict[Path, tuple[Path, set[int]]]) -> None:
-    folder, done = ran[page]
-    lines = PROMISED[page]
-
-    def run(place: int) -> None:
-        for before in needed(place, lines):
-            if before not in done:
-                run(before)
+def test_every_command_runs(page: Path, places: list[int], tmp_path: Path) -> None:
+    for words in (PROMISED[page][place] for place in places):
         began = children_seconds()
-        finished = run_command(folder, *lines[place][1:])
-        assert finished.returncode == 0, f"{lines[place]}: {finished.stderr}"
+        finished = run_command(tmp_path, *words[1:])
+        assert finished.returncode == 0, f"{words}: {finished.stderr}"
         assert children_seconds() - began < PATIENCE
-        done.add(place)
-
-    run(place)
 
 
 def test_there_are_commands() -> None:

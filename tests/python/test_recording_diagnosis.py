@@ -1,4 +1,4 @@
-"""Recordings of diagnoses, read back: the record beside both models, what is left, the report."""
+"""Recordings of diagnoses, read back: record, both models, residuals, report."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_the_report_lies_beside(found: Discrepancy, back: ReadBack) -> None:
     assert back.one("/__properties/pendmap", "verdict") == "named"
 
 
-def test_where_nothing_is_found_there_is_a_recording_too(tmp_path: Path) -> None:
+def test_a_diagnosis_without_effects_has_a_recording(tmp_path: Path) -> None:
     back = ReadBack(viewer.record_discrepancy(once("none"), tmp_path / "a.rrd"))
     before, after = (scalars(back, f"/run_1/residual/{name}") for name in ("before", "after"))
     np.testing.assert_array_equal(before, after)

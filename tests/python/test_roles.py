@@ -1,4 +1,4 @@
-"""Roles of the parameters of effects: definitions state them, searches use them."""
+"""The definition of an effect gives the role of each parameter; its name does not matter."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def predict_limits(name: str) -> list[Any]:
-    """A search's candidates for an effect, its parameters by their places."""
+    """Return the candidates of an effect, their parameters by place."""
     names = [p["name"] for p in effects.definition(name)["parameters"]]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
 

@@ -1,4 +1,4 @@
-"""What SINDy is offered in the benchmark, against formulas and motions written here.
+"""Features of SINDy in the benchmark, against formulas and motions written here.
 
 A peer that is given wrong features loses for the wrong reason.
 """

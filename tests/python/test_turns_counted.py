@@ -36,7 +36,7 @@ def wells(k: float) -> list[float]:
 
 
 def ends(model: pendmap.Pendulum, theta: float, velocity: float, periods: int) -> float:
-    """The angle after so many periods, by scipy."""
+    """Return the angle after a number of periods, by scipy."""
     k = model.effects[0].parameters["k"]
 
     def slope(tau: float, state: np.ndarray) -> list[float]:
@@ -116,6 +116,6 @@ def test_a_figure_marks_each_attractor_where_it_is_alone(tmp_path: Path) -> None
     assert len(set(colours)) == len(colours)
 
 
-def test_what_needs_a_turn_that_repeats_is_refused() -> None:
+def test_an_analysis_that_needs_a_periodic_angle_is_refused() -> None:
     with pytest.raises(InputError, match="counts turns"):
         pendmap.melnikov(pendmap.Pendulum(effects=(spring(0.05),)))

@@ -9,32 +9,24 @@ import numpy as np
 
 from pendmap.diagnosis.candidates import CORE, Candidate
 from pendmap.diagnosis.fitted_model import (
-    GENTLE,
     FittedModel,
     converge,
+    fit_again,
     fit_model,
     fit_with_candidates,
     impose_physics,
+    none_if_diverged,
 )
 from pendmap.diagnosis.refit import best_of, drop_effect
-from pendmap.errors import FitDiverged, InputError
-from pendmap.identification.fit import fit_runs
-from pendmap.identification.methods.start import starting_values
+from pendmap.errors import InputError
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.identification.runs import FitRun
-
-SOUND: Final = 1.5
-"""Sum of squares per degree of freedom up to which a model follows a run."""
-
-PARTS: Final = (1, 3, 10)
-"""Numbers of windows into which a run is divided, in turn, until a model follows it."""
 
 POOR: Final = 0.1
 """Residual, over the standard deviation of the angle, above which a fit went astray."""
@@ -63,13 +55,16 @@ def fit_baseline(
     added = [c for c in map(Candidate, CORE) if c.name not in {*base.taken, *without}]
     if not added:
         return base, None
-    core = best_of(*(_core(data, base, added, short=short) for short in (False, True)))
-    if model is None and (core is None or not follows(data, core)):
-        base = _rescued(data, first, base)
-        core = best_of(core, _core(data, base, added, short=False))
+    start = {candidate.free[0]: 0.0 for candidate in added}
+    core = best_of(
+        *(
+            fit_with_candidates(data, base, added, start, level=base.level, short=short)
+            for short in (False, True)
+        )
+    )
     if core is None:
         return base, None
-    core = converge(data, core, core.level)
+    core = converge(data, core, core.level) or core
     reduced: FittedModel | None = core
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
@@ -82,61 +77,7 @@ def follows(data: DataSplit, fitted: FittedModel) -> bool:
     return fitted.fit.rms <= POOR * float(scatter)
 
 
-def _core(
-    data: DataSplit, base: FittedModel, added: Sequence[Candidate], *, short: bool
-) -> FittedModel | None:
-    start = {candidate.free[0]: 0.0 for candidate in added}
-    try:
-        return fit_with_candidates(data, base, added, start, level=base.level, short=short)
-    except FitDiverged:
-        return None
-
-
-def _rescued(data: DataSplit, first: Rig, found: FittedModel) -> FittedModel:
-    """Return the given model fitted with slowly growing windows, in parts, or from other starts."""
-    free = list(found.free)
-    if not found.fit.converged:
-        gently = fit_model(data, first, free, growth=GENTLE)
-        divided = None if gently.fit.converged else _in_parts(data, first, free)
-        found = best_of(found, gently, divided) or found
-    if found.fit.converged and follows(data, found):
-        return found
-    for begin in _other_starts(data):
-        found = best_of(found, fit_model(data, begin, free)) or found
-        if follows(data, found):
-            break
-    return found
-
-
-def _in_parts(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
-    """Return the fit with those runs divided that a model does not follow as a whole.
-
-    A run released near the top easily diverges, and takes the fit of the other runs with it. None
-    where there is no such run.
-    """
-    runs = [run if run.forced else _divide(run, start, free) for run in data.fitted]
-    if all(new is old for new, old in zip(runs, data.fitted, strict=True)):
-        return None
-    try:
-        return fit_model(dataclasses.replace(data, fitted=tuple(runs)), start, free)
-    except FitDiverged:
-        return None
-
-
-def _divide(run: FitRun, start: Rig, free: Sequence[str]) -> FitRun:
-    """Return a run with windows as long as its own model can follow it."""
-    for part in PARTS:
-        longest = float(np.ptp(run.time)) / part
-        divided = run if part == 1 else dataclasses.replace(run, longest_s=longest)
-        try:
-            fit = fit_runs([divided], start, free, profiled=())
-        except FitDiverged:
-            continue  # its motion is lost
-        if fit.converged and fit.chi2 < SOUND * max(fit.degrees, 1):
-            return divided
-    return run
-
-
+@none_if_diverged
 def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
     """Return the fit started from a fit to all samples, where stretches are held back, else None.
 
@@ -150,11 +91,7 @@ def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | 
         own = whole[place]
         if own.trusted is not None and run.trusted is not None:
             whole[place] = dataclasses.replace(own, trusted=own.trusted | run.trusted)
-    try:
-        begin = fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free)
-        return fit_model(data, begin.fit.model, free, start=begin.start, windows=begin.fit.windows)
-    except FitDiverged:
-        return None
+    return fit_again(data, fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free))
 
 
 def _unfolded(model: Rig) -> Rig:
@@ -190,19 +127,3 @@ def _start(data: DataSplit) -> Rig:
             "half swings or more, or w0 must be given under [rig]; none shows it"
         )
     return Rig(w0=known, c_over_m=0.01 * known, gravity=data.experiment.gravity)
-
-
-def _other_starts(data: DataSplit) -> list[Rig]:
-    """Return further starts, one from each free run that swings."""
-    found = []
-    for run, k in zip(data.fitted, data.fitted_of, strict=True):
-        if run.forced:
-            continue
-        good = run.counted
-        try:
-            begin = starting_values(run.time[good], run.theta[good], sigma=data.readings[k].sigma)
-        except InputError:
-            continue
-        gravity = data.experiment.gravity
-        found.append(Rig(w0=begin.w0, c_over_m=begin.c_over_m, Tr=begin.Tr, gravity=gravity))
-    return found

@@ -64,20 +64,18 @@ class Candidate:
         """Entry of the library, or of the formula."""
         return definition(self.name) if self.formula is None else self.formula.entry
 
-    @property
-    def _entries(self) -> list[dict[str, Any]]:
-        entries: list[dict[str, Any]] = self.definition["parameters"]
-        return entries
+    def _of_role(self, *roles: str) -> list[dict[str, Any]]:
+        return [entry for entry in self.definition["parameters"] if entry["role"] in roles]
 
     @property
     def size(self) -> str:
         """Name of the parameter that is the size."""
-        return next(str(e["name"]) for e in self._entries if e["role"] == "size")
+        return str(self._of_role("size")[0]["name"])
 
     @property
     def phase(self) -> str | None:
         """Name of the parameter that is a phase, if any."""
-        return next((e["name"] for e in self._entries if e["role"] == "phase"), None)
+        return next((entry["name"] for entry in self._of_role("phase")), None)
 
     @property
     def free(self) -> list[str]:
@@ -89,29 +87,25 @@ class Candidate:
     @property
     def adapted(self) -> list[str]:
         """Names in a fit of the shape parameters that are fitted with its size: not integers."""
-        entries = [e for e in self._entries if e["role"] != "order"]
-        return [f"{self.name}.{e['name']}" for e in entries if e["name"] in self.shape]
+        orders = [entry["name"] for entry in self._of_role("order")]
+        return [f"{self.name}.{name}" for name in self.shape if name not in orders]
 
     @property
     def exponents(self) -> dict[str, str]:
         """Exponents of its shape by the sizes whose units depend on them."""
-        return {
-            f"{self.name}.{entry['name']}": f"{self.name}.{entry['power_of_w0_less']}"
-            for entry in self._entries
-            if f"{self.name}.{entry['power_of_w0_less']}" in self.adapted
-        }
+        less = {e["name"]: e["power_of_w0_less"] for e in self.definition["parameters"]}
+        pairs = {f"{self.name}.{size}": f"{self.name}.{power}" for size, power in less.items()}
+        return {size: power for size, power in pairs.items() if power in self.adapted}
 
     @property
     def places(self) -> list[str]:
         """Shape parameters that are places, on either side of the rest position."""
-        return [
-            e["name"] for e in self._entries if e["name"] in self.shape and e["role"] == "place"
-        ]
+        return [entry["name"] for entry in self._of_role("place")]
 
     @property
     def sought(self) -> dict[str, Any] | None:
         """Entry of the frequency or instant, which residuals show before any fit."""
-        return next((e for e in self._entries if e["role"] in {"frequency", "instant"}), None)
+        return next(iter(self._of_role("frequency", "instant")), None)
 
     @property
     def choices(self) -> int:
@@ -133,15 +127,12 @@ class Candidate:
         """Number of parameters that are fitted or scanned."""
         return len(self.free) + len(self.shape)
 
-    def effect(self, units: Units, size: float = 0.0, phase: float = 0.0) -> Effect:
-        """Return the effect with a size (SI) and a phase; a phase keeps the size above 0."""
-        bare = dict(self.shape) | {self.size: 0.0}
+    def effect(self, units: Units, size: float = 0.0) -> Effect:
+        """Return the effect with a size, nondimensional; a phase keeps the size above 0."""
+        bare = dict(self.shape) | {self.size: size}
         if self.phase is not None:
-            bare |= {self.size: FAINT, self.phase: phase}
-        effect = Effect(self.name, bare, formula=self.formula).given(units)
-        if size == 0.0:
-            return effect
-        return dataclasses.replace(effect, parameters={**effect.parameters, self.size: size})
+            bare |= {self.size: size or FAINT, self.phase: 0.0}
+        return Effect(self.name, bare, formula=self.formula).given(units)
 
     @property
     def title(self) -> str:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
 
     from pendmap.diagnosis.functions import TorqueFunction
-    from pendmap.model import Effect, Formula, Rig
+    from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
 
 
@@ -185,17 +185,22 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     model = fit.model
     covariance = found.best.fitted.widening * fit.covariance
     named = {effect.name: effect.effect for effect in found.effects}
-    own = {own_name(name) for name in named} - {None}
+    # An effect that is a parameter of the rig is an effect in the file.
+    own = {
+        rig: f"{name}.{next(iter(effect.parameters))}"
+        for name, effect in named.items()
+        if (rig := own_name(name)) is not None
+    }
     kept = tuple(e for e in model.effects if e.name not in named)
     runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
     sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
     notes: dict[str, Any] = {
         "covariance": {
-            "names": [_called(name, named) for name in fit.names],
+            "names": [own.get(name, name) for name in fit.names],
             "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
             "between_runs": {
-                _called(name, named): between
+                own.get(name, name): between
                 for name in fit.names
                 if "[" not in name and (between := found.runs.between(name)) > 0
             },
@@ -211,18 +216,10 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
         notes["provenance"]["set_to_zero"] = list(found.best.fitted.zeroed)
     return dataclasses.replace(
         model,
-        **{name: 0.0 for name in own if name is not None},
+        **dict.fromkeys(own, 0.0),
         effects=(*kept, *named.values()),
         Omega=0.0
         if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
         else (model.Omega or 1.0),
         notes=notes,
     )
-
-
-def _called(name: str, named: dict[str, Effect]) -> str:
-    """Return the name of a fitted parameter in the model file."""
-    for effect in named.values():
-        if own_name(effect.name) == name:
-            return f"{effect.name}.{next(iter(effect.parameters))}"
-    return name

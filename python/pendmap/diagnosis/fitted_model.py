@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from pendmap.model.effects import opposes
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
+
 MOST_STEPS: Final = 40
 """Most steps of a fit."""
 
 QUICK: Final = 4.0
 """Growth of windows from stage to stage of a fit."""
-
-GENTLE: Final = 1.5
-"""Growth of windows in fits that decide, or that diverged with the quick growth."""
 
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one reading's, below which a fit ends."""
@@ -63,9 +63,9 @@ STRETCH: Final = 2.0
 """Factor by which a width may leave its typical range."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A model fitted to records."""
+    """A model fitted to records; equal to itself alone."""
 
     fit: TrajectoryFit  # To the records that are not held back
     free: tuple[str, ...]  # Fitted parameters, as in fit_runs
@@ -152,7 +152,6 @@ def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
     windows: Windows | None = None,
     steps: int = MOST_STEPS,
     least_gain: float = 1e-3,
-    growth: float = QUICK,
     zeroed: Sequence[str] = (),
     target: float = math.inf,
 ) -> FittedModel:
@@ -166,28 +165,62 @@ def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
         profiled=(),
         steps=steps,
         least_gain=least_gain,
-        growth=growth,
+        growth=QUICK,
         target=target,
     )
     return FittedModel(fit, tuple(free), tuple(chosen), data.fitted, data.floors, tuple(zeroed))
 
 
-def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel:
-    """Return a fit continued until it has converged."""
-    if fitted.fit.converged:
-        return fitted
+def none_if_diverged(fit: Callable[Given, Found]) -> Callable[Given, Found | None]:
+    """Return a function that returns None where a fit diverges."""
+
+    @functools.wraps(fit)
+    def attempt(*given: Given.args, **named: Given.kwargs) -> Found | None:
+        try:
+            return fit(*given, **named)
+        except FitDiverged:
+            return None
+
+    return attempt
+
+
+@none_if_diverged
+def fit_again(  # noqa: PLR0913 (what changes, and when the fit ends)
+    data: DataSplit,
+    fitted: FittedModel,
+    *,
+    model: Rig | None = None,
+    free: Sequence[str] | None = None,
+    chosen: Sequence[Candidate] | None = None,
+    start: Mapping[str, float] | None = None,
+    zeroed: Sequence[str] = (),
+    steps: int = MOST_STEPS,
+    least_gain: float = 1e-3,
+    target: float = math.inf,
+) -> FittedModel:
+    """Fit a model, with what is given changed, from its parameters and windows."""
     return fit_model(
         data,
-        fitted.fit.model,
-        fitted.free,
-        fitted.chosen,
-        start=fitted.start,
+        fitted.fit.model if model is None else model,
+        fitted.free if free is None else free,
+        fitted.chosen if chosen is None else chosen,
+        start=fitted.start if start is None else start,
         windows=fitted.fit.windows,
-        least_gain=EXACT * level,
-        zeroed=fitted.zeroed,
+        steps=steps,
+        least_gain=least_gain,
+        zeroed=zeroed,
+        target=target,
     )
 
 
+def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel | None:
+    """Return a fit continued until it has converged."""
+    if fitted.fit.converged:
+        return fitted
+    return fit_again(data, fitted, zeroed=fitted.zeroed, least_gain=EXACT * level)
+
+
+@none_if_diverged
 def fit_with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     data: DataSplit,
     fitted: FittedModel,
@@ -264,20 +297,19 @@ def impose_physics(
     """
     while negative := [n for n in OPPOSING if n in fitted.fit.estimates and fitted.fit[n] < 0]:
         zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
-        try:
-            fitted = fit_model(
-                data,
-                dataclasses.replace(fitted.fit.model, **zeros),
-                [name for name in fitted.free if name not in negative],
-                fitted.chosen,
-                start=fitted.start_without(negative),
-                windows=fitted.fit.windows,
-                zeroed=(*fitted.zeroed, *negative),
-                least_gain=LITTLE * fitted.level,
-                target=target,
-            )
-        except FitDiverged:
+        again = fit_again(
+            data,
+            fitted,
+            model=dataclasses.replace(fitted.fit.model, **zeros),
+            free=[name for name in fitted.free if name not in negative],
+            start=fitted.start_without(negative),
+            zeroed=(*fitted.zeroed, *negative),
+            least_gain=LITTLE * fitted.level,
+            target=target,
+        )
+        if again is None:
             return None
+        fitted = again
     return fitted if all(_possible(data, fitted, c) for c in fitted.chosen) else None
 
 

@@ -91,31 +91,29 @@ def hold_out_losses(
         for run, of in zip(data.fitted, data.fitted_of, strict=True)
     )
     whole = _chi2(runs, fitted, windows, level)
-    folds = [tuple(_less_a_fold(run, k) for run in runs) for k in range(FOLDS)]
-    thirds = [tuple(_less_a_third(run, first=first) for run in runs) for first in (True, False)]
-    lost = [whole - _chi2(part, fitted, windows, level) for part in (*folds, *thirds)]
+    lost = [
+        whole - _chi2([_without(run, k) for run in runs], fitted, windows, level)
+        for k in range(FOLDS + 2)
+    ]
     return (sum(lost[:FOLDS]), *lost[FOLDS:])
 
 
-def _less_a_fold(run: FitRun, fold: int) -> FitRun:
-    """Return a free run without two of ten stretches of its readings, half the run apart."""
+def _without(run: FitRun, number: int) -> FitRun:
+    """Return a free run without a part of its readings.
+
+    A fold is two of ten stretches, half the run apart; two further parts are the first and the last
+    third.
+    """
     if run.forced:
         return run
     kept = run.counted.copy()
     samples = np.flatnonzero(kept)
-    stretch = np.arange(samples.size) * 2 * FOLDS // max(samples.size, 1)
-    kept[samples[stretch % FOLDS == fold]] = False
-    return dataclasses.replace(run, trusted=kept)
-
-
-def _less_a_third(run: FitRun, *, first: bool) -> FitRun:
-    """Return a free run without the first or the last third of its readings."""
-    if run.forced:
-        return run
-    kept = run.counted.copy()
-    samples = np.flatnonzero(kept)
-    cut = int(samples[samples.size // 3 if first else -(samples.size // 3) - 1])
-    kept[slice(0, cut) if first else slice(cut, None)] = False
+    n, k = samples.size, np.arange(samples.size)
+    if number < FOLDS:
+        part = 2 * FOLDS * k // max(n, 1) % FOLDS == number
+    else:
+        part = k < n // 3 if number == FOLDS else k >= n - n // 3 - 1
+    kept[samples[part]] = False
     return dataclasses.replace(run, trusted=kept)
 
 

@@ -15,8 +15,6 @@ from pendmap.records.summary import doubted
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.fitted_model import FittedModel
-    from pendmap.diagnosis.scores import Score
     from pendmap.diagnosis.state import ScoredModel, State
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
@@ -59,7 +57,17 @@ def name_effects(
     profiled = compute_part(
         reasons, "effects.ci95", lambda: profile_intervals(data, best.fitted), none
     )
-    others = find_equivalents(data, best.fitted, _sought(state, best.fitted))
+    # The frequencies or instants that residuals show without the effect.
+    sought = {
+        c.name: [
+            score
+            for score in state.scores(state.leave_out(best.fitted, c)).scores
+            if score.candidate.name == c.name
+        ]
+        for c in best.fitted.chosen
+        if c.sought
+    }
+    others = find_equivalents(data, best.fitted, sought)
     named = []
     for each, sure in zip(assessment.identified, assessment.probabilities, strict=True):
         candidate = each.candidate
@@ -87,16 +95,6 @@ def name_effects(
             )
         )
     return tuple(named)
-
-
-def _sought(state: State, best: FittedModel) -> dict[str, list[Score]]:
-    """Return, by effect, the frequencies or instants that residuals show without it."""
-    found = {}
-    for candidate in best.chosen:
-        if candidate.sought:
-            scores = state.scores(state.leave_out(best, candidate)).scores
-            found[candidate.name] = [s for s in scores if s.candidate.name == candidate.name]
-    return found
 
 
 def effect_values(

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.diagnosis.fitted_model import (
     LITTLE,
     FittedModel,
-    fit_model,
+    fit_again,
     fit_with_candidates,
     impose_physics,
 )
-from pendmap.errors import FitDiverged
 from pendmap.identification.fit import fit_runs
 
 if TYPE_CHECKING:
@@ -79,10 +78,7 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
         short: bool = False,
     ) -> FittedModel | None:
         start = {name: KICK * v if kick and name in sizes else v for name, v in step.items()}
-        try:
-            return fit_with_candidates(data, fitted, added, start, level=level, short=short)
-        except FitDiverged:
-            return None
+        return fit_with_candidates(data, fitted, added, start, level=level, short=short)
 
     found = fit(added, step, kick=True)
     for k in _other_shapes(scores, places, thresholds):
@@ -136,20 +132,19 @@ def drop_effect(
     faint = _is_faint(fitted, dropped)
     start = fitted.start_without([dropped.free[0]]) if faint else fitted.start
     start = dict.fromkeys(fitted.zeroed, 0.0) | start
-    try:
-        reduced = fit_model(
-            data,
-            dataclasses.replace(model, effects=effects, **own),
-            [name for name in (*fitted.free, *fitted.zeroed) if name not in gone],
-            tuple(c for c in fitted.chosen if c.name != dropped.name),
-            start={name: value for name, value in start.items() if name not in gone},
-            windows=fitted.fit.windows,
-            least_gain=LITTLE * level,
-            target=target,
-        )
-    except FitDiverged:
+    reduced = fit_again(
+        data,
+        fitted,
+        model=dataclasses.replace(model, effects=effects, **own),
+        free=[name for name in (*fitted.free, *fitted.zeroed) if name not in gone],
+        chosen=tuple(c for c in fitted.chosen if c.name != dropped.name),
+        start={name: value for name, value in start.items() if name not in gone},
+        least_gain=LITTLE * level,
+        target=target,
+    )
+    if reduced is None or reduced.fit.given_up:
         return None
-    return None if reduced.fit.given_up else impose_physics(data, reduced, target)
+    return impose_physics(data, reduced, target)
 
 
 def _is_faint(fitted: FittedModel, dropped: Candidate) -> bool:
@@ -174,11 +169,8 @@ def add_effects(
     added = [c for c in chosen if c.name not in reduced.names]
     known = {name: full.start.get(name, 0.0) for c in added for name in c.free}
     start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
-    try:
-        found = fit_with_candidates(data, reduced, added, start, level=level)
-    except FitDiverged:
-        return None
-    return impose_physics(data, found)
+    found = fit_with_candidates(data, reduced, added, start, level=level)
+    return None if found is None else impose_physics(data, found)
 
 
 def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
@@ -247,18 +239,8 @@ def _fit_from(
         else e
         for e in fitted.fit.model.effects
     )
-    try:
-        return fit_model(
-            data,
-            dataclasses.replace(fitted.fit.model, effects=effects),
-            fitted.free,
-            fitted.chosen,
-            start=fitted.start | dict(start),
-            windows=fitted.fit.windows,
-            steps=steps,
-        )
-    except FitDiverged:
-        return None
+    model = dataclasses.replace(fitted.fit.model, effects=effects)
+    return fit_again(data, fitted, model=model, start=fitted.start | dict(start), steps=steps)
 
 
 def profile_intervals(

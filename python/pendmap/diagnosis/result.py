@@ -116,6 +116,14 @@ class Discrepancy(Readable):
         return [names for names in classes if len(names) > 1]
 
     @property
+    def clearest(self) -> list[dict[str, Any]]:
+        """The most significant bin of each quantity; its neighbours are similar."""
+        rows: dict[str, dict[str, Any]] = {}
+        for row in self.where:
+            rows.setdefault(row["over"], row)
+        return list(rows.values())
+
+    @property
     def adds(self) -> bool:
         """Whether the best model is not the baseline."""
         return self.best is not self.base
@@ -153,7 +161,7 @@ class Discrepancy(Readable):
 
 def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the table of candidates at the baseline."""
-    refitted = {a.names[0]: a for a in reversed(found.attempts) if a.stage == 0}
+    refitted = {a.effects[0]: a for a in reversed(found.attempts) if a.stage == 0}
     rows = []
     for row in ranking(found)[:RANKED]:
         tried = refitted.get(row["name"])
@@ -166,8 +174,10 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
                 row["name"],
                 shape,
                 f"{row['score']:.1f}",
-                "" if tried is None else f"{tried.gain:.1f}",
-                "" if tried is None or tried.held_gain is None else f"{tried.held_gain:.1f}",
+                "" if tried is None else f"{tried.bic_gain:.1f}",
+                ""
+                if tried is None or tried.held_out_gain is None
+                else f"{tried.held_out_gain:.1f}",
             ]
         )
     return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
@@ -219,9 +229,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     yield from zeroed(found)
     yield from _between(found)
     yield from confined(found)
-    # The most significant bin of each quantity; its neighbours are similar.
-    clearest = {row["over"]: row for row in reversed(found.where)}
-    for row in sorted(clearest.values(), key=lambda row: -abs(row["z"]))[:WHERE]:
+    for row in found.clearest[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (
             f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "

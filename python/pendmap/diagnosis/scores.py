@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
     Floats = NDArray[np.float64]
@@ -117,11 +119,6 @@ class Scores:
         alike = len(self.columns[one]) == len(self.columns[other])
         return not shaped and alike and self.likeness(one, other) > 1 - SAME
 
-    def best_pairs(self, places: Sequence[int], count: int) -> list[list[int]]:
-        """Return the pairs of candidates with the greatest joint gains."""
-        pairs = sorted(itertools.combinations(places, 2), key=self.together, reverse=True)
-        return [list(pair) for pair in pairs[:count]]
-
 
 def score_candidates(
     data: DataSplit, fitted: FittedModel, pool: Sequence[Sequence[Candidate]]
@@ -129,36 +126,15 @@ def score_candidates(
     """Return the scores of candidates at a fit; ``pool`` has the shapes of each effect."""
     room = max(PASS - len({name.partition("[")[0] for name in fitted.fit.names}) - STATE, 1)
     sought = [shapes for shapes in pool if shapes[0].sought]
-    queue = _passes([shapes for shapes in pool if not shapes[0].sought], room)
-    queue = queue or [[]]
-    every: list[Candidate] = []
-    names: list[str] = []
-    passes: list[list[WindowSlopes]] = []
-    for present in queue:
-        free = [name for candidate in present for name in candidate.free]
-        found, slopes = window_slopes(
-            fitted.fit, data.fitted, free, add_candidates(fitted.fit.model, present)
-        )
-        wanted = [found.index(name) for name in free]
-        if not passes:
-            names = [name for name in found if name in fitted.fit.estimates]
-            wanted = [found.index(name) for name in names] + wanted
-            # Frequencies and instants come from the residuals.
-            queue += _passes(_located(data, sought, slopes, fitted.fit.model), room)
-        bare = passes[0] if passes else slopes
-        passes.append(
-            [
-                dataclasses.replace(w, columns=w.columns_as_in(one)[:, wanted])
-                for w, one in zip(slopes, bare, strict=True)
-            ]
-        )
-        every += present
+    passes = _passes([shapes for shapes in pool if not shapes[0].sought], room) or [[]]
+    names, windows = candidate_slopes(fitted.fit, data.fitted, passes)
+    # Frequencies and instants come from the residuals.
+    later = _passes(_located(data, sought, windows, fitted.fit.model), room)
+    if later:
+        _, windows = candidate_slopes(fitted.fit, data.fitted, later, windows)
+    every = [candidate for present in (*passes, *later) for candidate in present]
     if not every:
         return Scores.of_none()
-    windows = [
-        dataclasses.replace(each[0], columns=np.hstack([w.columns for w in each]))
-        for each in zip(*passes, strict=True)
-    ]
     together = freed_together((), windows)
     base, residual = _orthonormal(together.columns[:, : len(names)]), together.residual
     columns = together.columns[:, len(names) :]
@@ -181,6 +157,36 @@ def score_candidates(
         faint = candidate.effect(fitted.fit.model.units).parameters.get(candidate.size, 0.0)
         scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
     return Scores(tuple(scores), tuple(where), gram, pull)
+
+
+def candidate_slopes(
+    fit: TrajectoryFit,
+    runs: Sequence[FitRun],
+    passes: Sequence[Sequence[Candidate]],
+    known: Sequence[WindowSlopes] = (),
+) -> tuple[list[str], list[WindowSlopes]]:
+    """Return a fit's parameters, and the derivatives by them and then by candidates.
+
+    Each pass has one shape of an effect at most. Where windows are ``known`` the candidates'
+    columns follow theirs, without the parameters.
+    """
+    names: list[str] = []
+    windows = list(known)
+    columns = [[window.columns] for window in known]
+    for present in passes:
+        free = [name for candidate in present for name in candidate.free]
+        found, slopes = window_slopes(fit, runs, free, add_candidates(fit.model, present))
+        wanted = [found.index(name) for name in free]
+        if not windows:
+            names = [name for name in found if name not in free]
+            wanted = [*map(found.index, names), *wanted]
+            windows, columns = slopes, [[] for _ in slopes]
+        for own, window, one in zip(columns, slopes, windows, strict=True):
+            own.append(window.columns_as_in(one)[:, wanted])
+    return names, [
+        dataclasses.replace(window, columns=np.hstack(own))
+        for window, own in zip(windows, columns, strict=True)
+    ]
 
 
 def _located(

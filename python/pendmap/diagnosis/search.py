@@ -1,23 +1,19 @@
 """The search for the effects that a model lacks: forward selection, elimination and swaps.
 
-1. The given model is fitted, and the physical core: viscous damping, Coulomb friction, quadratic
-   drag and the sensor's zero. The core keeps the effects that it needs.
-2. The error of the best model so far is added to the readings' noise. Sums of squares count in
-   independent readings of that model's residuals.
-3. All effects of the library, in all their shapes, are scored at the best model (Rao), alone and in
-   pairs; at first also at the models without one of the core's effects.
-4. The best few are fitted with all other parameters, within physics.
-5. The model of least cost, its sum of squares with Schwarz's penalty, is fitted until it converges.
-   It is accepted if noise hardly gains as much, if it closes its share of the gap (with a frequency
-   or an instant the whole gap), and if it loses on no held-out set.
-6. Accepted effects are dropped if they gain too little beside the others, and replaced by better
-   ones under the conditions of step 5. Of models that the records do not tell apart the simplest
-   and commonest is kept. A model never fits worse than one with fewer effects.
-7. Steps 2 to 6 are repeated until nothing is accepted.
+1. The baseline and the physical core are fitted; the core keeps the effects that it needs.
+2. The error of the best model is added to the noise; sums of squares count in independent readings.
+3. All candidates are scored at the best model (Rao), alone and in pairs; at first also at the
+   models without one of the core's effects. The best few are fitted with all other parameters.
+4. The model of least cost (Schwarz) is accepted if noise hardly gains as much, if it closes its
+   share of the gap (with a frequency or an instant all of it), and if no held-out set loses.
+5. Accepted effects are dropped if they gain too little beside the others, and replaced by better
+   ones. Of models that the records do not tell apart the simplest and commonest is kept.
+6. Steps 2 to 5 are repeated until nothing is accepted.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -38,7 +34,7 @@ def search(state: State, core: FittedModel | None, progress: Callable[[int], Non
     """Return the best model."""
     best = state.reweight(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
-    best = prune_effects(state, initial_models(state, core)[0])
+    best = prune_effects(state, cheapest_start(state, core))
     if core.chosen and state.most > 0:
         state.attempts.append(
             Attempt(
@@ -70,16 +66,15 @@ def search(state: State, core: FittedModel | None, progress: Callable[[int], Non
     return state.reweight(best)
 
 
-def initial_models(state: State, core: FittedModel) -> list[FittedModel]:
-    """Return the given model, the core and the core without each effect, the cheapest first."""
+def cheapest_start(state: State, core: FittedModel) -> FittedModel:
+    """Return the cheapest of the given model, the core and the core without one of its effects."""
     starts = [state.base]
     if core.chosen and state.most > 0:
         starts.append(core)
         state.accept(core)
-        for candidate in core.chosen:
-            reduced = state.leave_out(core, candidate)
-            starts += [reduced] if reduced.chosen else []
-    return sorted(starts, key=state.cost)
+        reduced = [state.leave_out(core, candidate) for candidate in core.chosen]
+        starts += [model for model in reduced if model.chosen]
+    return min(starts, key=state.cost)
 
 
 def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> FittedModel | None:
@@ -127,12 +122,13 @@ def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list
     if state.remaining(fitted) < 2 or len(ranked) < 2:  # noqa: PLR2004 (a pair)
         return chosen[: 2 * limits.singles], []
     alone = scores.scores[ranked[0]].gain
-    pairs = [
-        pair
-        for pair in scores.best_pairs(ranked, limits.pairs)
+    pairs = sorted(itertools.combinations(ranked, 2), key=scores.together, reverse=True)
+    joint = [
+        list(pair)
+        for pair in pairs[: limits.pairs]
         if scores.together(pair) - alone > limits.alike * state.level
     ]
-    return chosen[: 2 * limits.singles], pairs
+    return chosen[: 2 * limits.singles], joint
 
 
 def _attempt(  # noqa: PLR0913 (two models and their comparison)

@@ -12,7 +12,7 @@ from pendmap.comparison.replay import Fits
 from pendmap.diagnosis.candidates import ZERO, commonness, count_choices, list_candidates
 from pendmap.diagnosis.fitted_model import (
     converge,
-    fit_model,
+    fit_again,
     impose_physics,
     model_errors,
     weight_records,
@@ -53,11 +53,14 @@ class ScoredModel:
 class Attempt:
     """Candidates that were fitted, and whether they were accepted."""
 
-    names: tuple[str, ...]  # The effects
+    effects: tuple[str, ...]
     shape: dict[str, float]  # Of the first, nondimensional
     score: float  # Gain promised by the score, in independent readings
-    gain: float  # Fall of the cost: sum of squares in independent readings with Schwarz's penalty
-    held_gain: float | None  # Least fall on a held-out set, in independent readings; None if unused
+    # Fall of the cost: sum of squares in independent readings with Schwarz's penalty.
+    bic_gain: float
+    held_out_gain: (
+        float | None
+    )  # Least fall on a held-out set, in independent readings; None if unused
     accepted: bool  # Whether the search went on with them
     stage: int  # Number of effects of the model without them
 
@@ -87,10 +90,9 @@ class State:
         self.base = self._best = base
         self._fits: dict[Key, FittedModel] = {key_of(()): base}
         self._reduced: set[tuple[Key, str]] = set()
-        # Keyed by the identity of the fit that they begin at, which is kept alive with them.
-        self._refits: dict[tuple[int, Key], tuple[FittedModel, FittedModel | None]] = {}
-        self._scores: dict[int, tuple[FittedModel, Scores]] = {}
-        self._held: dict[int, tuple[FittedModel, HoldOut | None, tuple[float, ...]]] = {}
+        self._refits: dict[tuple[FittedModel, Key], FittedModel | None] = {}
+        self._scores: dict[FittedModel, Scores] = {}
+        self._held: dict[FittedModel, tuple[HoldOut | None, tuple[float, ...]]] = {}
 
     def reweight(self, best: FittedModel) -> FittedModel:
         """Add a model's error to the weights of readings, and return the model fitted with them.
@@ -104,26 +106,22 @@ class State:
             return best
         before = self.errors, self.data
         self.errors, self.data = errors, weight_records(self.records, errors)
-        try:
-            base = self._fit_again(self.base)
-            again = self._fit_again(best) if best.chosen else base
-        except FitDiverged:
+        base = self._fit_again(self.base)
+        again = self._fit_again(best) if best.chosen else base
+        if base is None or again is None:
             self.errors, self.data = before
             return best
         self._begin(base)
         return self.remember(again) or best
 
-    def _fit_again(self, fitted: FittedModel) -> FittedModel:
+    def _fit_again(self, fitted: FittedModel) -> FittedModel | None:
         """Return a model fitted with the present weights of readings."""
-        found = fit_model(
-            self.data,
-            fitted.fit.model,
-            [*fitted.free, *fitted.zeroed],
-            fitted.chosen,
-            start=dict.fromkeys(fitted.zeroed, 0.0) | fitted.start,
-            windows=fitted.fit.windows,
-        )
-        return found if not fitted.chosen else impose_physics(self.data, found) or found
+        free = [*fitted.free, *fitted.zeroed]
+        start = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start
+        found = fit_again(self.data, fitted, free=free, start=start)
+        if found is None or not fitted.chosen:
+            return found
+        return impose_physics(self.data, found) or found
 
     @property
     def level(self) -> float:
@@ -147,20 +145,16 @@ class State:
 
     def converge(self, fitted: FittedModel) -> FittedModel:
         """Return a converged fit, within physics."""
-        if fitted.fit.converged:
+        full = converge(self.data, fitted, self.level)
+        if full is None or full is fitted:
             return fitted
-        try:
-            full = impose_physics(self.data, converge(self.data, fitted, self.level))
-        except FitDiverged:
-            return fitted
-        return self.remember(full if full is not None else fitted) or fitted
+        return self.remember(impose_physics(self.data, full) or fitted) or fitted
 
     def scores(self, fitted: FittedModel) -> Scores:
         """Return the scores of all candidates at a fit."""
-        if id(fitted) not in self._scores:
-            found = score_candidates(self.data, fitted, self._candidates(fitted))
-            self._scores[id(fitted)] = fitted, found
-        return self._scores[id(fitted)][1]
+        if fitted not in self._scores:
+            self._scores[fitted] = score_candidates(self.data, fitted, self._candidates(fitted))
+        return self._scores[fitted]
 
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
         """Return the candidates that a model does not have, each in all its shapes."""
@@ -171,11 +165,11 @@ class State:
     def refit(self, fitted: FittedModel, places: Sequence[int]) -> FittedModel | None:
         """Return a model with the candidates at some places of its scores; None if it diverges."""
         scores = self.scores(fitted)
-        key = id(fitted), key_of([scores.scores[k].candidate for k in places])
+        key = fitted, key_of([scores.scores[k].candidate for k in places])
         if key not in self._refits:
             found = refit_with(self.data, self.thresholds, fitted, scores, places, self.level)
-            self._refits[key] = fitted, self.remember(found)
-        return self._refits[key][1]
+            self._refits[key] = self.remember(found)
+        return self._refits[key]
 
     def leave_out(self, fitted: FittedModel, dropped: Candidate) -> FittedModel:
         """Return the best reduced model with at most a model's other effects."""
@@ -203,6 +197,7 @@ class State:
         That is the given model where none is as good as the best accepted one.
         """
         reach = max(self._best.chi2 + self.thresholds.alike * self.level, best.chi2)
+        most = self.thresholds.alike * max(best.level, self.level)
 
         def order(fitted: FittedModel) -> tuple[float, ...]:
             common = sum(commonness(name) for name in fitted.names)
@@ -210,35 +205,31 @@ class State:
 
         alike = [t for t in self._fits.values() if t.chi2 <= reach and self.remaining(t) >= 0]
         for fitted in sorted((best, *alike), key=order):
-            if fitted is best or self.predicts_equally(best, fitted):
+            # Held-out sets must not tell it from the best one either.
+            if fitted is best or self._loses_at_most(most, best, fitted):
                 return fitted
         return best
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None where it diverges."""
-        return self._evaluated(fitted)[1]
+        return self._evaluated(fitted)[0]
 
     def hold_out_losses(self, fitted: FittedModel) -> tuple[float, ...]:
         """Return the increase of a model's sum of squares by each held-out set."""
-        return self._evaluated(fitted)[2]
+        return self._evaluated(fitted)[1]
 
-    def _evaluated(
-        self, fitted: FittedModel
-    ) -> tuple[FittedModel, HoldOut | None, tuple[float, ...]]:
-        if id(fitted) not in self._held:
+    def _evaluated(self, fitted: FittedModel) -> tuple[HoldOut | None, tuple[float, ...]]:
+        if fitted not in self._held:
             try:
                 held = evaluate_hold_out(self.data, fitted)
-                losses = hold_out_losses(self.data, fitted, held, self.level)
+                self._held[fitted] = held, hold_out_losses(self.data, fitted, held, self.level)
             except FitDiverged:
-                held, losses = None, (math.inf,)
-            self._held[id(fitted)] = fitted, held, losses
-        return self._held[id(fitted)]
+                self._held[fitted] = None, (math.inf,)
+        return self._held[fitted]
 
     def scored(self, fitted: FittedModel) -> ScoredModel:
         """Return a model with its hold-out evaluation; FitDiverged where that diverges."""
-        held = self.hold_out(fitted)
-        held = held if held is not None else evaluate_hold_out(self.data, fitted)
-        return ScoredModel(fitted, held)
+        return ScoredModel(fitted, self.hold_out(fitted) or evaluate_hold_out(self.data, fitted))
 
     def remaining(self, fitted: FittedModel) -> int:
         """Return how many effects may be added to a model; the sensor's zero does not count."""
@@ -315,11 +306,6 @@ class State:
         if not self.data.inside and after.chi2 > most:
             return False
         return self._loses_at_most(self.thresholds.loss * full.level, reduced, full)
-
-    def predicts_equally(self, best: FittedModel, other: FittedModel) -> bool:
-        """Whether held-out sets do not tell a model from the best one."""
-        most = self.thresholds.alike * max(best.level, self.level)
-        return self._loses_at_most(most, best, other)
 
     def _loses_at_most(self, most: float, one: FittedModel, other: FittedModel) -> bool:
         pairs = zip(self.hold_out_losses(one), self.hold_out_losses(other), strict=False)

@@ -108,18 +108,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         if "functions" in unknown
         else [dataclasses.asdict(score) for score in found.functions],
         "not_computed": unknown,
-        "attempts": [
-            {
-                "effects": list(a.names),
-                "shape": a.shape,
-                "score": a.score,
-                "bic_gain": a.gain,
-                "held_out_gain": a.held_gain,
-                "accepted": a.accepted,
-                "stage": a.stage,
-            }
-            for a in found.attempts
-        ],
+        "attempts": [dataclasses.asdict(attempt) for attempt in found.attempts],
         "findings": [
             finding.text
             for finding in (
@@ -152,14 +141,14 @@ def _proposals(found: Discrepancy) -> dict[str, Any] | None:
                 "recommended": prospect is outlook.best,
                 "runs": [
                     {
-                        "kind": "free" if run.start.drive is None else "forced",
-                        "theta_rad": run.start.theta,
-                        "velocity_rad_s": run.start.velocity,
-                        "seconds": run.seconds,
-                        "lab_time_s": run.start.lab_time_s,
-                        "drive": None if run.start.drive is None else dict(run.start.drive),
+                        "kind": "free" if start.drive is None else "forced",
+                        "theta_rad": start.theta,
+                        "velocity_rad_s": start.velocity,
+                        "seconds": prospect.proposal.length_s,
+                        "lab_time_s": start.lab_time_s,
+                        "drive": None if start.drive is None else dict(start.drive),
                     }
-                    for run in prospect.proposal.runs
+                    for start in prospect.proposal.runs
                 ],
             }
             for prospect in outlook.by_start

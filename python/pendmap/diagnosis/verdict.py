@@ -203,6 +203,8 @@ class Assessment:
 
 def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: float) -> Assessment:
     """Return the verdict on a search."""
+    from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
+
     limits, fitted, held = state.thresholds, best.fitted, best.hold_out
     noise, degrees = fitted.noise, max(fitted.fit.degrees, 1)
     allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.data.doubt**2)
@@ -211,7 +213,10 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
     left = max(noise.z, max(noise.by_run) - SEVERAL)
     held_out = 1.0
     if fitted.chosen:
-        held_out = _hold_out_chance(best, limits.forecast * max(ratio, allowed))
+        # Probability that noise of the greatest accepted ratio leaves the held-out residuals.
+        most = limits.forecast * max(ratio, allowed)
+        readings = max(held.degrees / fitted.level, 1.0)
+        held_out = float(chdtrc(readings, held.chi2 / most / fitted.level))
     others = {
         "torque": chance,
         "slow": noise.chance,
@@ -251,14 +256,6 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         sure,
         verdict == "partial" or min(sure, default=1.0) < limits.sure,
     )
-
-
-def _hold_out_chance(best: ScoredModel, ratio: float) -> float:
-    """Return the probability that noise, ``ratio`` per reading, leaves the held-out residuals."""
-    from scipy.special import chdtrc  # noqa: PLC0415 (where it is needed)
-
-    level, held = best.fitted.level, best.hold_out
-    return float(chdtrc(max(held.degrees / level, 1.0), held.chi2 / ratio / level))
 
 
 def _closed(state: State, best: ScoredModel) -> float:

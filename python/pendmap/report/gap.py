@@ -8,8 +8,16 @@ import numpy as np
 
 from pendmap.diagnosis.result import PLACES
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.report.document import Name, Picture, Section, Strong, Table
-from pendmap.report.wording import chance, compared, joined, mrad, number, stated, values
+from pendmap.report.document import Picture, bullets, code
+from pendmap.report.wording import (
+    before_and_after,
+    chance,
+    joined,
+    mrad,
+    number,
+    stated,
+    values,
+)
 from pendmap.residuals.torque import STANDS_OUT
 
 if TYPE_CHECKING:
@@ -17,7 +25,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-    from pendmap.report.document import Block, Text
 
 SAID: Final = {
     "none": "the model describes the records to within their noise.",
@@ -47,44 +54,49 @@ QUIET: Final = 20
 """Percentage of the readings, those with the least noise, for which residuals are compared."""
 
 
-def verdict(found: Discrepancy) -> Section:
-    """Return the verdict with its probabilities and the statistics it is based on."""
-    blocks: list[Block] = [(Strong(found.verdict.capitalize()), ": ", SAID[found.verdict])]
-    effects: list[Text] = [
-        (*values(effect), f"; probability {chance(effect.probability)}") for effect in found.effects
-    ]
-    shared = " Names that are not told apart share it." if found.verdict == "ambiguous" else ""
-    blocks += [effects, PROBABILITY + shared] if effects else []
-    blocks += [("Not told apart here: ", *joined(names), ".") for names in found.equivalent]
-    blocks += ["It rests on this:", list(_statistics(found))]
-    return Section("Verdict", tuple(blocks))
+def verdict(found: Discrepancy) -> Iterator[str]:
+    """Yield the verdict with its probabilities and the statistics it is based on."""
+    yield "## Verdict"
+    yield f"**{found.verdict.capitalize()}**: {SAID[found.verdict]}"
+    if found.effects:
+        yield bullets(
+            f"{values(effect)}; probability {chance(effect.probability)}"
+            for effect in found.effects
+        )
+        shared = " Names that are not told apart share it." if found.verdict == "ambiguous" else ""
+        yield PROBABILITY + shared
+    for names in found.equivalent:
+        yield f"Not told apart here: {joined(names)}."
+    yield "It rests on this:"
+    yield bullets(_statistics(found))
 
 
-def _statistics(found: Discrepancy) -> Iterator[Text]:
+def _statistics(found: Discrepancy) -> Iterator[str]:
     """Yield the statistics of the verdict."""
     judged = found.assessment
-    form = judged.form
+    form, limits = judged.form, Thresholds()
     yield (
         f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
         f"1; the doubt about the noise allows up to {number(judged.ratio_allowed, 4)}. On what was "
         f"held out it is {number(judged.ratio_held, 4)}."
     )
-    further = () if form.further is None else (" (", Name(form.further), " would take up most)")
-    limits, count = Thresholds(), len(form.chances)
-    left: dict[str, tuple[str | Name, ...]] = {
-        "slow": ("as much in the slow part of the residuals",),
-        "torque": ("as much torque over angle, velocity, amplitude, phase or time",),
-        "runs": ("the parameters of the runs as far apart",),
-        "effects": ("as much for an effect that is not in the model to explain", *further),
+    left = {
+        "slow": "as much in the slow part of the residuals",
+        "torque": "as much torque over angle, velocity, amplitude, phase or time",
+        "runs": "the parameters of the runs as far apart",
+        "effects": "as much for an effect that is not in the model to explain",
     }
+    if form.further is not None:
+        left["effects"] += f" ({code(form.further)} would take up most)"
     if judged.identified:
         most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
-        left["held_out"] = (f"{number(most, 3)} of chi-squared over degrees of freedom held out",)
+        left["held_out"] = f"{number(most, 3)} of chi-squared over degrees of freedom held out"
     rare = f"below {number(RARE, 1)}"
-    for key, words in left.items():
+    for key, what in left.items():
         chance_of = form.chances[key]
         said = f"of {number(chance_of, 2)}" if chance_of > RARE else rare
-        yield ("Noise alone would leave ", *words, f" with a probability {said}.")
+        yield f"Noise alone would leave {what} with a probability {said}."
+    count = len(form.chances)
     yield (
         f"The least of these {count} probabilities, times {count} because so many were looked at, "
         f"is {number(form.chance, 2) if form.chance > RARE else rare}. Below "
@@ -92,7 +104,7 @@ def _statistics(found: Discrepancy) -> Iterator[Text]:
     )
 
 
-def gap(found: Discrepancy) -> Iterator[Section]:
+def gap(found: Discrepancy) -> Iterator[str | Picture]:
     """Yield the gap before and after, and the error of forecasts."""
     own = found.gap
     floor = mrad(own.held_out_noise_floor)
@@ -100,47 +112,35 @@ def gap(found: Discrepancy) -> Iterator[Section]:
         ("fitted runs", mrad(own.before), mrad(own.after), mrad(own.noise_floor)),
         ("held out", mrad(own.held_out_before), mrad(own.held_out_after), floor),
     ]
-    each = [
-        (
-            ("held out: " if run.held_out else "", Name(run.name)),
-            mrad(run.before),
-            mrad(run.after),
-            mrad(run.noise_floor),
-        )
-        for run in own.by_run
-    ]
-    names = joined(dict.fromkeys(run.name for run in found.data.held))
-    parts = "Held out: stretches of " if found.data.inside else "Held out: "
+    for run in own.by_run:
+        name = f"{'held out: ' if run.held_out else ''}{code(run.name)}"
+        rows.append((name, mrad(run.before), mrad(run.after), mrad(run.noise_floor)))
+    parts = "stretches of " if found.data.inside else ""
     after = "; before is the baseline, after the model found" if found.adds else ""
-    yield Section(
-        "The gap",
-        (
-            (
-                f"Root mean squares of record less model{after}. {parts}",
-                *names,
-                ". No parameter was fitted to that.",
-            ),
-            compared(found, Table(("residual", "before", "after", "noise"), (*rows, *each))),
-            *noise_of(found),
-            Picture("gap", "Residual by run, and the error of forecasts against their horizon."),
-            Picture("residuals", "Record less model where the baseline misses most."),
-        ),
+    yield "## The gap"
+    yield (
+        f"Root mean squares of record less model{after}. Held out: {parts}"
+        f"{joined(dict.fromkeys(run.name for run in found.data.held))}. No parameter was fitted to "
+        "that."
     )
-    if found.forecasts:
-        ahead = tuple(row for f in found.forecasts for row in _ahead(f))
-        blocks = (
-            (
-                "From starts on held-out data each model runs forward without any further reading; "
-                "its state at the start comes from the swing before. Root mean square errors:"
-            ),
-            compared(found, Table(("runs", "ahead", "before", "after", "noise"), ahead)),
-        )
-        chaotic = (
+    yield before_and_after(found, ("residual", "before", "after", "noise"), rows)
+    yield from noise_of(found)
+    yield Picture("gap", "Residual by run, and the error of forecasts against their horizon.")
+    yield Picture("residuals", "Record less model where the baseline misses most.")
+    if not found.forecasts:
+        return
+    yield "## How far ahead the models see"
+    yield (
+        "From starts on held-out data each model runs forward without any further reading; its "
+        "state at the start comes from the swing before. Root mean square errors:"
+    )
+    ahead = [row for forecast in found.forecasts for row in _ahead(forecast)]
+    yield before_and_after(found, ("runs", "ahead", "before", "after", "noise"), ahead)
+    if any(forecast.kind == "forced" for forecast in found.forecasts):
+        yield (
             "A forced motion may be chaotic; then what the noise hides of the state grows in every "
             "model."
         )
-        forced = any(forecast.kind == "forced" for forecast in found.forecasts)
-        yield Section("How far ahead the models see", (*blocks, *([chaotic] if forced else ())))
 
 
 def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
@@ -156,32 +156,26 @@ def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
         )
 
 
-def where(found: Discrepancy) -> Iterator[Section]:
+def where(found: Discrepancy) -> Iterator[str | Picture]:
     """Yield the bins where torque is lacking, and the errors of periods and peaks."""
-    clearest: dict[str, dict[str, Any]] = {}
-    for row in found.where:
-        clearest.setdefault(row["over"], row)
-    blocks: tuple[Block, ...] = (
-        (
+    yield "## Where the gap is"
+    if found.where:
+        yield "The torque per moment of inertia that the baseline lacks stands out most clearly:"
+        yield bullets(map(_place, found.clearest))
+        yield (
+            "Each is fitted by itself, as if the torque went by that quantity alone, beyond what "
+            "damping, friction, frequency and initial states can take up. Where it really goes by "
+            "another, it may come out too large, and with either sign."
+        )
+    else:
+        yield (
             f"The torque that the baseline lacks stands out nowhere by more than {STANDS_OUT:g} "
             "standard errors."
-        ),
-    )
-    if clearest:
-        blocks = (
-            "The torque per moment of inertia that the baseline lacks stands out most clearly:",
-            [_place(row) for row in clearest.values()],
-            (
-                "Each is fitted by itself, as if the torque went by that quantity alone, beyond "
-                "what damping, friction, frequency and initial states can take up. Where it really "
-                "goes by another, it may come out too large, and with either sign."
-            ),
         )
-    picture = Picture("torque", "Torque that is lacking, with bands of 95 %.")
-    yield Section("Where the gap is", (*blocks, picture))
-    rows: list[tuple[Text, ...]] = [
+    yield Picture("torque", "Torque that is lacking, with bands of 95 %.")
+    rows = [
         (
-            ("held out: " if one.held_out else "", Name(one.name)),
+            f"{'held out: ' if one.held_out else ''}{code(one.name)}",
             *(
                 f"{number(getattr(one.errors[m], what))} %" if m in one.errors else ""
                 for what in ("period_rms", "peak_rms")
@@ -190,19 +184,16 @@ def where(found: Discrepancy) -> Iterator[Section]:
         )
         for one in found.cycles
     ]
-    if rows:
-        head = ("free run", "periods, before", "after", "peaks, before", "after")
-        yield Section(
-            "Periods and peaks",
-            (
-                (
-                    "Each model runs forward from the first measured peak, as in the paper's "
-                    "figure 7. Root mean square errors:"
-                ),
-                compared(found, Table(head, tuple(rows))),
-                Picture("figure_7", "Errors of simulated periods and peaks."),
-            ),
-        )
+    if not rows:
+        return
+    yield "## Periods and peaks"
+    yield (
+        "Each model runs forward from the first measured peak, as in the paper's figure 7. Root "
+        "mean square errors:"
+    )
+    head = ("free run", "periods, before", "after", "peaks, before", "after")
+    yield before_and_after(found, head, rows)
+    yield Picture("figure_7", "Errors of simulated periods and peaks.")
 
 
 def _place(row: dict[str, Any]) -> str:
@@ -214,7 +205,7 @@ def _place(row: dict[str, Any]) -> str:
     )
 
 
-def noise_of(found: Discrepancy) -> Iterator[Text]:
+def noise_of(found: Discrepancy) -> Iterator[str]:
     """Yield which noise is meant, and where chi-squared shows more than root mean squares."""
     residuals, noise = [], []
     for run, own in zip(found.data.fitted, found.best.fitted.fit.residuals, strict=False):
@@ -226,12 +217,9 @@ def noise_of(found: Discrepancy) -> Iterator[Text]:
     uneven = high > UNEVEN * low
     if uneven:
         yield (
-            (
-                "The noise is that of the readings used, each at its own speed: about "
-                f"{mrad(low)} where they are slow and {mrad(high)} where they are fast. ("
-            ),
-            Name("pendmap look"),
-            " gives one number for a whole record.)",
+            "The noise is that of the readings used, each at its own speed: about "
+            f"{mrad(low)} where they are slow and {mrad(high)} where they are fast. "
+            f"({code('pendmap look')} gives one number for a whole record.)"
         )
     yield from _block_means(found)
     judged, gap = found.assessment, found.gap
@@ -248,18 +236,14 @@ def noise_of(found: Discrepancy) -> Iterator[Text]:
         )
 
 
-def _block_means(found: Discrepancy) -> Iterator[Text]:
+def _block_means(found: Discrepancy) -> Iterator[str]:
     """Yield the runs whose dense readings were averaged."""
     data = found.data
     for run, k in zip(data.fitted, data.fitted_of, strict=True):
         size = data.runs[k].time.size
         if run.time.size < size:
             yield (
-                f"The {size} readings of ",
-                Name(run.name),
-                (
-                    f" are denser than the motion needs: {run.time.size} means of them were "
-                    "fitted, and the noise above is that of the means. A reading by itself has "
-                    f"{mrad(data.readings[k].sigma)}."
-                ),
+                f"The {size} readings of {code(run.name)} are denser than the motion needs: "
+                f"{run.time.size} means of them were fitted, and the noise above is that of the "
+                f"means. A reading by itself has {mrad(data.readings[k].sigma)}."
             )

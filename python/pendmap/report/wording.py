@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.formatting import written
 from pendmap.model.labels import unit_of
-from pendmap.model.rig import own_name
-from pendmap.report.document import Name, Strong, Table
+from pendmap.report.document import code, plain, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from pendmap.diagnosis import Discrepancy, NamedEffect
-
-Parts = tuple[str | Name | Strong, ...]
 
 SMALL, LARGE = -4, 6
 """Powers of ten, from the first and below the second, of numbers without an exponent."""
@@ -91,88 +88,77 @@ def share(part: float) -> str:
     return f"{100 * part:.3g} %" if part > 0.99 else f"{100 * part:.0f} %"  # noqa: PLR2004
 
 
-def joined(names: Iterable[str], last: str = "and") -> Parts:
+def joined(names: Iterable[str], last: str = "and") -> str:
     """Return names joined as in a sentence."""
-    each = [Name(name) for name in names]
-    parts: list[str | Name | Strong] = []
-    for k, name in enumerate(each):
-        if k:
-            parts.append(f" {last} " if k == len(each) - 1 else ", ")
-        parts.append(name)
-    return tuple(parts)
+    each = [code(name) for name in names]
+    return f" {last} ".join([", ".join(each[:-1]), each[-1]] if len(each) > 1 else each)
 
 
-def quantity(effect: NamedEffect, parameter: str) -> str:
-    """Return a parameter of an effect with its interval of 95 % and its unit."""
-    value, bounds = effect.parameters[parameter], effect.ci95.get(parameter)
-    unit = unit_of(f"{effect.name}.{parameter}", lambda _: effect.definition)
-    after = f" {unit}".rstrip()
-    if bounds is None:
-        return f"{number(value, 4)}{after}"
-    width = (bounds[1] - bounds[0]) / 2
-    low, high = (within(bound, width) for bound in bounds)
-    return f"{within(value, width)}{after} (95 %: {low} to {high})"
+def values(effect: NamedEffect) -> str:
+    """Return an effect with its parameters, their intervals of 95 % and their units."""
+    said = []
+    for name, value in effect.parameters.items():
+        unit = unit_of(f"{effect.name}.{name}", lambda _: effect.definition)
+        after, bounds = plain(f" {unit}".rstrip()), effect.ci95.get(name)
+        if bounds is None:
+            said.append(f"{name} = {number(value, 4)}{after}")
+            continue
+        width = (bounds[1] - bounds[0]) / 2
+        low, high = (within(bound, width) for bound in bounds)
+        said.append(f"{name} = {within(value, width)}{after} (95 %: {low} to {high})")
+    return f"{code(effect.name)}, {', '.join(said)}"
 
 
-def values(effect: NamedEffect) -> Parts:
-    """Return an effect's name with its parameters."""
-    said = ", ".join(f"{name} = {quantity(effect, name)}" for name in effect.parameters)
-    return (Name(effect.name), f", {said}")
-
-
-def lead(found: Discrepancy) -> Parts:
+def lead(found: Discrepancy) -> str:
     """Return a diagnosis in one sentence."""
     names = joined(effect.name for effect in found.effects)
+    several = len(found.effects) > 1
     nearest = found.nearest.fitted.names
     gap, closed = found.gap, found.assessment.closed
     to = f"from {mrad(gap.held_out_before)} to {mrad(gap.held_out_after)}"
-    noise = f"the noise is {mrad(gap.held_out_noise_floor)}"
+    noise = f"the noise is {mrad(gap.held_out_noise_floor)}."
     if found.verdict == "none":
         return (
-            Strong("Nothing is missing"),
-            " that these records could show: what the model leaves is their noise, ",
-            f"{mrad(gap.noise_floor)}.",
+            "**Nothing is missing** that these records could show: what the model leaves is their "
+            f"noise, {mrad(gap.noise_floor)}."
         )
     if found.verdict == "named":
-        with_it = "With them" if len(found.effects) > 1 else "With it"
-        end = f". {with_it} the residual on held-out data falls {to}; {noise}."
-        return (Strong("The model lacks"), " ", *names, end)
+        return (
+            f"**The model lacks** {names}. With {'them' if several else 'it'} the residual on "
+            f"held-out data falls {to}; {noise}"
+        )
     if found.verdict == "ambiguous":
-        classes = [part for each in found.equivalent for part in ("; ", *joined(each, "or"))]
-        end = (
-            f". These records do not tell which. With the first, the residual on held-out data "
-            f"falls {to}; {noise}."
+        return (
+            f"**The model lacks one of a class**: "
+            f"{'; '.join(joined(each, 'or') for each in found.equivalent)}. These records do not "
+            f"tell which. With the first, the residual on held-out data falls {to}; {noise}"
         )
-        return (Strong("The model lacks one of a class"), ": ", *classes[1:], end)
     if found.verdict == "partial":
-        verb = "They close" if len(found.effects) > 1 else "It closes"
-        end = (
-            f", and something more. {verb} {share(closed)} of the squared gap: the residual on "
-            f"held-out data falls {to}; {noise}."
+        return (
+            f"**What the model lacks is nearly** {names}, and something more. "
+            f"{'They close' if several else 'It closes'} {share(closed)} of the squared gap: the "
+            f"residual on held-out data falls {to}; {noise}"
         )
-        return (Strong("What the model lacks is nearly"), " ", *names, end)
-    missing = Strong("Something is missing that no candidate explains")
-    end = f". The residual on held-out data is {mrad(gap.held_out_before)}; {noise}."
-    if not nearest:
-        return missing, end
-    verb = "close" if len(nearest) > 1 else "closes"
-    part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
-    near = f", {verb} {part}; no name is claimed."
-    return (missing, end, " What comes nearest, ", *joined(nearest), near)
-
-
-def compared(found: Discrepancy, table: Table) -> Table:
-    """Return a table, without the columns ``after`` where the best model is the baseline."""
-    if found.adds:
-        return table
-    kept = [k for k, name in enumerate(table.head) if not name.startswith(("after", "moved"))]
-    return Table(
-        tuple(table.head[k].replace("before", "baseline") for k in kept),
-        tuple(tuple(row[k] for k in kept) for row in table.rows),
-        table.words,
+    near = ""
+    if nearest:
+        part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
+        verb = "close" if len(nearest) > 1 else "closes"
+        near = f" What comes nearest, {joined(nearest)}, {verb} {part}; no name is claimed."
+    return (
+        "**Something is missing that no candidate explains**. The residual on held-out data is "
+        f"{mrad(gap.held_out_before)}; {noise}{near}"
     )
 
 
-def own_parameters(effects: Iterable[str]) -> set[str]:
-    """Return the parameters of a rig that are equivalent to one of these effects."""
-    return {own for effect in effects if (own := own_name(effect)) is not None}
+def before_and_after(
+    found: Discrepancy,
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    words: Sequence[str] = (),
+) -> str:
+    """Return a table, without the columns ``after`` where the best model is the baseline."""
+    if found.adds:
+        return table(head, rows, words)
+    kept = [k for k, name in enumerate(head) if not name.startswith(("after", "moved"))]
+    own = [head[k].replace("before", "baseline") for k in kept]
+    return table(own, [[row[k] for k in kept] for row in rows], words)

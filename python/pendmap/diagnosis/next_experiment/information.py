@@ -19,12 +19,12 @@ import numpy as np
 
 from pendmap.comparison.data import held_parts
 from pendmap.comparison.replay import Motion, run_forward
-from pendmap.diagnosis.candidates import add_candidates
+from pendmap.diagnosis.next_experiment.proposals import list_proposals
+from pendmap.diagnosis.scores import candidate_slopes
 from pendmap.errors import FitDiverged
 from pendmap.formatting import counted
 from pendmap.identification.parameters import PER_RUN
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
-from pendmap.identification.sensitivity import window_slopes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,13 +34,13 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.further import Reasons
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.next_experiment.proposals import Planned, Proposal, Start
+    from pendmap.diagnosis.fitted_model import Windows
+    from pendmap.diagnosis.next_experiment.proposals import Proposal, Start
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.sensitivity import WindowSlopes
 
     Floats = NDArray[np.float64]
-    Windows = tuple[tuple[int, int, int, float, float], ...]
 
 FOLLOWED: Final = 1e-9
 """Information of a direction over the greatest, below which it is not determined."""
@@ -110,33 +110,22 @@ class Columns:
     ) -> Columns:
         """Return the derivatives by the parameters of a fit and of candidates, in any shapes."""
         shared = tuple(dict.fromkeys(name for name in fit.names if not _of_one_run(name)))
-        places: dict[str, list[int]] = {}
-        first: list[WindowSlopes] = []
-        parts: list[list[Floats]] = []
         by_name: dict[str, list[Candidate]] = {}
         for candidate in candidates:
             by_name.setdefault(candidate.name, []).append(candidate)
-        # One shape of each effect at a time.
-        for batch in itertools.zip_longest(*by_name.values()) if by_name else [()]:
-            present = [candidate for candidate in batch if candidate is not None]
-            further = [name for candidate in present for name in candidate.free]
-            names, windows = window_slopes(fit, runs, further, add_candidates(fit.model, present))
-            wanted = [names.index(name) for name in further]
-            if not first:
-                kept = [names.index(name) for name in shared]
-                alone = [k for k, name in enumerate(names) if _of_one_run(name)]
-                first = windows
-                parts = [[w.columns[:, kept], w.columns[:, alone]] for w in windows]
-            for part, window, one in zip(parts, windows, first, strict=True):
-                part.insert(len(part) - 1, window.columns_as_in(one)[:, wanted])
-            for candidate in present:
-                at = len(shared) + sum(len(own) for own in places.values())
-                places[candidate.title] = list(range(at, at + len(candidate.free)))
-        joined = tuple(
-            dataclasses.replace(window, columns=np.hstack(part))
-            for window, part in zip(first, parts, strict=True)
-        )
-        return cls(shared, places, joined)
+        batches = itertools.zip_longest(*by_name.values())
+        passes = [[candidate for candidate in batch if candidate] for batch in batches] or [[]]
+        names, windows = candidate_slopes(fit, runs, passes)
+        places: dict[str, list[int]] = {}
+        end = len(shared)
+        for candidate in itertools.chain(*passes):
+            places[candidate.title] = list(range(end, end + len(candidate.free)))
+            end += len(candidate.free)
+        further = range(len(names), len(names) + end - len(shared))
+        alone = [k for k, name in enumerate(names) if _of_one_run(name)]
+        order = [*map(names.index, shared), *further, *alone]
+        ordered = (dataclasses.replace(w, columns=w.columns[:, order]) for w in windows)
+        return cls(shared, places, tuple(ordered))
 
     def information(
         self, run: int | None = None, samples: int | None = None, *, hold: bool = False
@@ -186,7 +175,7 @@ def _cut(window: WindowSlopes, samples: int, *, hold: bool) -> WindowSlopes | No
 
 
 class Prospects:
-    """Information of proposals, run by the model found.
+    """Information of proposals, by default of all that the rig could do, run by the model found.
 
     Proposals in which the model diverges are left out, with their number and reason in ``reasons``.
     """
@@ -195,18 +184,21 @@ class Prospects:
         self,
         data: DataSplit,
         found: ScoredModel,
-        menu: Sequence[Proposal],
         candidates: Sequence[Candidate],
         reasons: Reasons,
+        menu: Sequence[Proposal] | None = None,
     ) -> None:
         fit = found.fitted.fit
+        if menu is None:
+            menu = list_proposals(data, fit.model.w0)
         self.units = fit.model.units
         self.now = Columns.of(fit, data.fitted, candidates)
         self.old = self.now.information()
         self._hold = data.inside
         longest: dict[Start, float] = {}
-        for planned in (run for proposal in menu for run in proposal.runs):
-            longest[planned.start] = max(longest.get(planned.start, 0.0), planned.seconds)
+        for proposal in menu:
+            for start in proposal.runs:
+                longest[start] = max(longest.get(start, 0.0), proposal.length_s)
         read = float(np.median([np.median(np.diff(run.time)) for run in data.fitted]))
         self._step = max(read, math.tau / fit.model.w0 / PER_SWING)
         # Fewer samples have accordingly smaller errors.
@@ -226,23 +218,20 @@ class Prospects:
             windows=windows,
         )
         self._new = Columns.of(ahead, runs, candidates) if runs else None
-        self._known: dict[Planned, Information] = {}
+        self._known: dict[tuple[Start, float], Information] = {}
 
     def after(self, proposal: Proposal) -> Information:
         """Return the information of the records and a proposal together."""
         total = self.old
-        for planned in proposal.runs:
-            total += self._information(planned)
+        for start in proposal.runs:
+            key = start, proposal.length_s
+            if key not in self._known and self._new is not None:
+                samples = round(proposal.length_s / self._step) + 1
+                self._known[key] = self._new.information(
+                    self._starts.index(start), samples, hold=self._hold
+                )
+            total += self._known[key]
         return total
-
-    def _information(self, planned: Planned) -> Information:
-        if planned not in self._known and self._new is not None:
-            self._known[planned] = self._new.information(
-                self._starts.index(planned.start),
-                round(planned.seconds / self._step) + 1,
-                hold=self._hold,
-            )
-        return self._known[planned]
 
 
 def _simulated(  # noqa: PLR0913, PLR0917 (the model, the runs, how they are read)
@@ -261,10 +250,19 @@ def _simulated(  # noqa: PLR0913, PLR0917 (the model, the runs, how they are rea
     starts: list[Start] = []
     runs: list[FitRun] = []
     windows: list[tuple[int, int, int, float, float]] = []
-    for start, curve in _curves(motion, longest, step, floor, reasons).items():
+    for start, seconds in longest.items():
+        samples = round(seconds / step) + 1
+        time, lab = step * np.arange(samples, dtype=np.float64), start.lab_time_s
+        drive = None if start.drive is None else dict(start.drive)
+        run = FitRun(time, np.zeros(samples), floor, drive=drive, lab_time_s=lab)
+        try:
+            ((_, curve),) = run_forward(motion, [run], [(start.theta, start.velocity)])
+        except FitDiverged as error:
+            reasons["proposals"] = str(error)
+            continue
         speed = np.abs(curve[1])
         moves = np.flatnonzero(speed > MOVING * w0)
-        trusted = np.arange(speed.size) <= (moves[-1] if moves.size else 0)
+        trusted = np.arange(samples) <= (moves[-1] if moves.size else 0)
         if not np.isfinite(curve).all():
             reasons["proposals"] = "the motion leaves the range of numbers"
             continue
@@ -272,47 +270,13 @@ def _simulated(  # noqa: PLR0913, PLR0917 (the model, the runs, how they are rea
             reasons["proposals"] = "by the model nothing moves in it"
             continue
         sigma = scale * np.hypot(floor, late * speed)
-        run = _run(start, speed.size, step, sigma)
-        length = speed.size
+        length = samples
         if start.drive is not None:
             length = max(round(FORCED_WINDOW_SWINGS * math.tau / w0 / step), 3)
         windows += [
-            (len(runs), a, min(a + length, speed.size), float(curve[0, a]), float(curve[1, a]))
-            for a in range(0, speed.size - 2, length)
+            (len(runs), a, min(a + length, samples), float(curve[0, a]), float(curve[1, a]))
+            for a in range(0, samples - 2, length)
         ]
         starts.append(start)
-        runs.append(dataclasses.replace(run, trusted=trusted))
+        runs.append(dataclasses.replace(run, sigma=sigma, trusted=trusted))
     return starts, runs, tuple(windows)
-
-
-def _curves(
-    motion: Motion,
-    longest: dict[Start, float],
-    step: float,
-    floor: float,
-    reasons: Reasons,
-) -> dict[Start, Floats]:
-    """Return angle and velocity of each start, without those that diverge."""
-    runs = {
-        start: _run(start, round(seconds / step) + 1, step, floor)
-        for start, seconds in longest.items()
-    }
-    states = {start: (start.theta, start.velocity) for start in runs}
-    try:
-        every = run_forward(motion, list(runs.values()), list(states.values()))
-        return {start: curve for start, (_, curve) in zip(runs, every, strict=True)}
-    except FitDiverged:
-        found = {}
-        for start, run in runs.items():
-            try:
-                found[start] = run_forward(motion, [run], [states[start]])[0][1]
-            except FitDiverged as error:
-                reasons["proposals"] = str(error)
-        return found
-
-
-def _run(start: Start, samples: int, step: float, sigma: float | Floats) -> FitRun:
-    """Return a proposed run without readings."""
-    time = step * np.arange(samples, dtype=np.float64)
-    drive = None if start.drive is None else dict(start.drive)
-    return FitRun(time, np.zeros(samples), sigma, drive=drive, lab_time_s=start.lab_time_s)

@@ -15,7 +15,6 @@ from pendmap.diagnosis.next_experiment.power import (
     predict_separation,
 )
 from pendmap.diagnosis.thresholds import Thresholds
-from pendmap.model.effects import Effect
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -86,7 +85,8 @@ def detection_limits(
         wanted = required_gain(threshold, len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
-        if size > HUGE * _greatest(candidate, units):
+        most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
+        if size > HUGE * abs(candidate.effect(units, most).parameters[candidate.size]):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
@@ -96,16 +96,6 @@ def detection_limits(
         unseen = tuple(c for s, c in sizes if seen and not math.isfinite(s))
         limits[name] = Limit(size, candidate, unseen)
     return limits
-
-
-def _greatest(candidate: Candidate, units: Units) -> float:
-    """Return the greatest typical size of an effect, SI."""
-    entry = candidate.definition["parameters"][0]
-    bare = dict(candidate.shape) | {candidate.size: max(map(abs, entry["typical"]))}
-    if candidate.phase is not None:
-        bare[candidate.phase] = 0.0
-    effect = Effect(candidate.name, bare, formula=candidate.formula).given(units)
-    return abs(effect.parameters[candidate.size])
 
 
 @functools.cache

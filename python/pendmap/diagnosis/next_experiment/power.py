@@ -18,7 +18,6 @@ import numpy as np
 
 from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.diagnosis.next_experiment.information import Prospects
-from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.refit import Z95
 from pendmap.diagnosis.thresholds import Thresholds
 
@@ -72,8 +71,7 @@ def predict_separation(
         if alternative.alike and not alternative.contains
     ]
     shapes = {shape.title: shape for pair in pairs for shape in pair.shapes}
-    w0 = found.fitted.fit.model.w0
-    ahead = Prospects(data, found, list_proposals(data, w0), list(shapes.values()), reasons)
+    ahead = Prospects(data, found, list(shapes.values()), reasons)
     before = [_separation(ahead, ahead.old, found, pair) for pair in pairs]
     added = [
         [
@@ -135,8 +133,7 @@ def predict_interval(
     data: DataSplit, found: ScoredModel, level: float, reasons: Reasons
 ) -> Outlook | None:
     """Return the widest interval of an effect's size after each proposal."""
-    w0 = found.fitted.fit.model.w0
-    ahead = Prospects(data, found, list_proposals(data, w0), (), reasons)
+    ahead = Prospects(data, found, (), reasons)
     shared = ahead.now.shared
     # An effect that acts once does not recur.
     sizes = [c.free[0] for c in found.fitted.chosen if c.free[0] in shared and not c.once]
@@ -168,8 +165,7 @@ def predict_limits(
             faintest[name], least[name] = score.candidate, shown
     if not faintest:
         return None
-    w0 = found.fitted.fit.model.w0
-    ahead = Prospects(data, found, list_proposals(data, w0), list(faintest.values()), reasons)
+    ahead = Prospects(data, found, list(faintest.values()), reasons)
     now = _shown(ahead, ahead.old, faintest)
     ratios = []
     for total in map(ahead.after, ahead.menu):

@@ -80,38 +80,31 @@ class Start:
 
 
 @dataclasses.dataclass(frozen=True)
-class Planned:
-    """A run to be recorded."""
-
-    start: Start
-    seconds: float
-
-
-@dataclasses.dataclass(frozen=True)
 class Proposal:
     """An experiment to be recorded beside the present records."""
 
-    runs: tuple[Planned, ...]  # One or more, of equal length
+    runs: tuple[Start, ...]  # One or more, repetitions included
+    length_s: float  # Of each run, s
 
     @property
     def seconds(self) -> float:
         """Recording time, s."""
-        return sum(run.seconds for run in self.runs)
+        return sum([self.length_s] * len(self.runs))
 
     @property
     def wait_s(self) -> float:
         """The pause before it, s."""
-        return max(run.start.wait_s for run in self.runs)
+        return max(start.wait_s for start in self.runs)
 
     @property
     def starts(self) -> tuple[Start, ...]:
         """The different starts."""
-        return tuple(dict.fromkeys(run.start for run in self.runs))
+        return tuple(dict.fromkeys(self.runs))
 
     @property
     def what(self) -> str:
         """In words."""
-        each = f"{self.runs[0].seconds:g} s"
+        each = f"{self.length_s:g} s"
         first, *others = self.starts
         if others:
             ends = " and one ".join(start.what for start in (first, *others))
@@ -145,12 +138,12 @@ def list_proposals(data: DataSplit, w0: float) -> tuple[Proposal, ...]:
     singles, pairs = _free(w0, ended, math.floor(100 * angle) / 100)
     singles = [s for s in (*singles, *_forced(data, w0, ended)) if possible(s)]
     pairs = [pair for pair in pairs if all(map(possible, pair))]
-    found = [Proposal((Planned(start, x),)) for start in singles for x in lengths]
+    found = [Proposal((start,), x) for start in singles for x in lengths]
     for x in lengths:
-        found += [Proposal((Planned(a, x), Planned(b, x))) for a, b in pairs]
+        found += [Proposal(pair, x) for pair in pairs]
         # The repetitions begin later, which changes little.
         found += [
-            Proposal((Planned(start, x),) * count)
+            Proposal((start,) * count, x)
             for start, count in itertools.product(singles, REPEATS)
             if start.wait_s == 0
         ]
