@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts import basins, names, palette, plane
+from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import QUIET, Axis, Chart, Image, Level, Mark, Panel, Points
 from pendmap.charts.legend import typeset
 from pendmap.errors import InputError
@@ -52,7 +52,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     if shown not in _LAYERS:
         raise InputError(f"layer must be one of {', '.join(_LAYERS)} in a diagram, got {shown!r}")
     own = str(dataset.attrs["varied"])
-    name = basins.symbol(own, str(dataset[own].attrs.get("units", "1")))
+    name = names.symbol(own, str(dataset[own].attrs.get("units", "1")))
     ends = plane.outer_edges(dataset, own)
     every = families(dataset)
     units = Units.of(dataset.attrs)
@@ -74,7 +74,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Panel("exponent", "", across, rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
-    fixed = basins.parameters(dataset.attrs, [own])
+    fixed = names.parameters(dataset.attrs, [own])
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",

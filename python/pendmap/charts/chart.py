@@ -120,7 +120,7 @@ class Areas(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Colours:
-    """How an image's values become colours, and the name of the bar beside it.
+    """Colour scale of an image, and the name of the bar beside it.
 
     ``scale`` is ``linear``, ``log``, ``centred`` (two halves about 0) or ``counts`` (whole numbers
     in steps); ``beyond`` says which ends values exceed.
@@ -186,6 +186,14 @@ class Text(Mark):
 
 
 @dataclass(frozen=True, eq=False)
+class Table(Mark):
+    """Rows of words over a whole panel; words of the first column begin, others end at a line."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, eq=False)
 class Panel:
     """Two axes and what stands between them.
 
@@ -204,7 +212,6 @@ class Panel:
     share: float = 1.0
     note: Sequence[tuple[str, str]] = ()
     bare: bool = False
-    least: float = 0.0
 
     @property
     def where(self) -> str:
@@ -218,7 +225,7 @@ class Chart:
 
     ``rows`` are the names of the panels that a figure shows, from the top, by default all in one;
     ``heights`` are the shares of the rows, ``ratio`` the height of a panel over its width, and
-    ``size`` the inches of the figure where it goes by these. Rows of fewer panels than ``columns``
+    ``size`` the inches of the figure where it has a size. Rows of fewer panels than ``columns``
     are not filled. A recording shows all panels: one at a
     time as ``tabs``, or below one another; ``remark`` ends its legend.
     """
@@ -236,7 +243,6 @@ class Chart:
     tabs: bool = False
     remark: str = ""
     notes: Sequence[str] = ()
-    legend: Literal["below", "above", "none"] = "below"
 
     def panel(self, name: str) -> Panel:
         """Return the panel of a name."""
@@ -265,6 +271,25 @@ class Chart:
                 raise InputError(f"no layer {layer!r}: this figure has one part")
             raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
         return dataclasses.replace(self, rows=((layer,),), heights=(), size=size)
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Charts in columns under one title: the title of each is a heading, its size in inches.
+
+    One ``legend`` at the top names the marks of all charts; else each chart has its own.
+    """
+
+    title: str
+    subtitle: str
+    columns: Sequence[Sequence[Chart]]
+    _: dataclasses.KW_ONLY
+    legend: bool = False
+
+
+def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
+    """Return a panel without a frame, 1 wide and ``high`` from the top down."""
+    return Panel(name, "", Axis("", (0.0, 1.0)), Axis("", (high, 0.0)), marks, bare=True)
 
 
 def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:

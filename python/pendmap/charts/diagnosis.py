@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,20 +20,21 @@ from pendmap.charts.chart import (
     Mark,
     Panel,
     Points,
+    Sheet,
     Span,
     bars,
     holding,
 )
-from pendmap.charts.methods import NOISE, look
+from pendmap.charts.identification import errors_of
+from pendmap.charts.methods import NOISE, Z95, look
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from pendmap.charts.chart import Floats
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-
-Floats = npt.NDArray[np.float64]
 
 ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"
 """Unit of a torque per moment of inertia."""
@@ -47,13 +49,14 @@ OVER_SAID: Final = {
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 """Candidates that are not told apart from what was found, and all others."""
-Z95: Final = 1.959963984540054
 RUNS: Final = 3
 """Runs whose residuals are drawn: those that the baseline misses most."""
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged: what a model lacks is slower."""
 WIDE: Final = 8.0
 """Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
+CYCLES: Final = 3
+"""Free runs in figure 7: those held out first, then the longest."""
 RANKED: Final = 8
 """Candidates in the ranking."""
 SIZE: Final = (8.6, 12.2)
@@ -128,6 +131,20 @@ def parts(found: Discrepancy) -> dict[str, Chart]:
         panels = [coefficients(found, name) for name in shown]
         made["runs"] = _of_rows("Run by run", "bars and band: 95 %", [panels], [1.0], (8.6, 3.5))
     return made
+
+
+def cycles(found: Discrepancy) -> Sheet | None:
+    """Return errors of simulated periods and peaks, of both models, for each free run."""
+    runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
+    charts = []
+    for one in runs:
+        errors = one.errors
+        if not found.adds:
+            errors = {"baseline": errors["before"]} if "before" in errors else {}
+        title = one.name + (", held out" if one.held_out else "")
+        charts.append(dataclasses.replace(errors_of(errors, one.peaks, title), size=(8.6, 3.0)))
+    said = "from the first measured peak on"
+    return Sheet("Simulated periods and peaks", said, [charts]) if charts else None
 
 
 def _title(found: Discrepancy) -> str:

@@ -1,4 +1,4 @@
-"""Colours that go by an attractor's name: the same attractor looks the same in every picture.
+"""Colours of attractors by their names: an attractor looks alike in every picture.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
@@ -119,7 +119,7 @@ _LAPS = (
     (0, 0.18, "slightly darker"),
     (255, 0.25, "slightly lighter"),
 )
-"""What a family's colours are mixed with when they begin again, how much, and in words."""
+"""Grey that a family's colours are mixed with when they begin again, its share, and in words."""
 
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
@@ -129,7 +129,7 @@ _MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
 
 @dataclass(frozen=True)
 class _Read:
-    """What a name tells: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
+    """Parts of a name: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
 
     kind: str
     n: int

@@ -12,8 +12,8 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.charts.chart import Floats
 
-Floats = npt.NDArray[np.float64]
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
 
@@ -169,6 +169,16 @@ def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
     shift = _offset(low, high)
     make = angle_ticks if angle and not shift else plain_ticks
     return shift, make(low - shift, high - shift)
+
+
+def power(value: float) -> str:
+    """Return a label of a logarithmic axis, short for any power of ten."""
+    if value == 0:
+        return "0"
+    size = math.log10(abs(value))
+    if abs(size - round(size)) < 1e-9 and not -3 <= size <= 3:  # noqa: PLR2004
+        return f"${'-' * (value < 0)}10^{{{round(size)}}}$"
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}", value < 0)
 
 
 def shifted(name: str, shift: float) -> str:

@@ -38,7 +38,7 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
     "trajectory": {"theta": ("time",), "section_time": ("period",)},
 }
-"""What variables of a result are over, whatever is selected from it."""
+"""Dimensions that variables of a result must have in any selection of it."""
 
 _CELLS = {
     "basins": ("label", "settle_periods", "net_turns"),
@@ -48,7 +48,7 @@ _CELLS = {
 """Variables over the axes of a picture."""
 
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
-"""Beginnings of the names of attributes that nobody can tell of a part of a map."""
+"""Beginnings of the names of attributes that hold for a whole map alone."""
 
 _BLOCK = 1_000_000
 """Cells that are counted at a time, so that a large map is never converted whole."""
