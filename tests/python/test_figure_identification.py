@@ -18,7 +18,7 @@ import pendmap
 from decays import decay, record
 from pendmap import render
 from pendmap.charts import chart as charts
-from pendmap.charts import decrement, half_cycles, identification, methods
+from pendmap.charts import decrement, half_cycles, identification, marks, methods
 from pendmap.charts.names import signed
 from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
@@ -67,7 +67,7 @@ def report(name: str) -> IdentificationReport:
 
 
 @functools.cache
-def drawn(name: str, size: charts.Ends | None = None, **given: Any) -> Figure:  # noqa: ANN401
+def drawn(name: str, size: marks.Ends | None = None, **given: Any) -> Figure:  # noqa: ANN401
     with rc_context(style.RC):
         sheet = identification.sheet(report(name), **given)
         figure = drawing.draw(sheet, size=size, dpi=100.0)

@@ -11,7 +11,8 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
-from pendmap.charts.chart import ALARM, INK, QUIET, Chart, Colours, Image, Mark, Panel, Points
+from pendmap.charts.chart import Chart, Panel
+from pendmap.charts.marks import ALARM, INK, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
 from pendmap.formatting import counted, with_error
 from pendmap.units import VELOCITY, Units

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names, palette, plane
-from pendmap.charts.chart import QUIET, Axis, Chart, Image, Level, Mark, Panel, Points
+from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
 from pendmap.errors import InputError
 from pendmap.units import Units
 

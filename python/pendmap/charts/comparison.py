@@ -9,23 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Sheet,
-    Span,
-    Text,
-    bare,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.identification import error_panels, residuals
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Span, Text
 from pendmap.charts.methods import MEASURED, look, nothing
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.forced_summary import written
@@ -37,7 +23,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.comparison import Comparison
     from pendmap.comparison.forced import Statistic
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts.chart import QUIET, Axis, Band, Chart, Level, Line, Mark, Panel, Points
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points
 from pendmap.charts.methods import EVEN, MEASURED, MINUS, NOISE, NOISE_SAID, ODD, Z95, look, nothing
 from pendmap.formatting import Estimate, estimate_text
 from pendmap.identification.methods.combined import CUT
@@ -22,7 +23,7 @@ from pendmap.identification.table1 import first_state, simulated_peaks
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.identification import Identification, IdentificationReport, Peaks
 
 DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"

@@ -9,30 +9,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Band,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Sheet,
-    Span,
-    bars,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
 from pendmap.charts.identification import errors_of
+from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
 from pendmap.charts.methods import NOISE, Z95, look
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
 

@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    bars,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, bars
 from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
 from pendmap.charts.record import UNUSED
 from pendmap.units import Units
@@ -29,7 +18,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.records import Run
 

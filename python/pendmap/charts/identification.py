@@ -11,22 +11,8 @@ import numpy as np
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.charts import decrement, half_cycles, names
-from pendmap.charts.chart import (
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Sheet,
-    Table,
-    Text,
-    bare,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
 from pendmap.charts.methods import MEASURED, MINUS, NOISE, NOISE_SAID, Z95, drawn, look, nothing
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text
@@ -37,8 +23,8 @@ from pendmap.signal.robust import span
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.charts.chart import Floats
     from pendmap.charts.half_cycles import Course
+    from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
     from pendmap.identification.methods.joint import JointFit
     from pendmap.model import Rig

@@ -10,28 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names, palette
-from pendmap.charts.chart import (
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Dash,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    bars,
-)
+from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
 from pendmap.formatting import counted, written
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 SIGMAS: Final = 2.0
 """Standard errors on each side that a band covers."""

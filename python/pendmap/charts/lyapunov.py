@@ -8,23 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from pendmap.charts import names, palette, plane
-from pendmap.charts.chart import (
-    DASHED,
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    Steps,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import DASHED, INK, QUIET, Band, Level, Line, Mark, Points, Span, Steps
 from pendmap.formatting import counted, with_error
 from pendmap.units import Units
 

@@ -7,19 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names
-from pendmap.charts.chart import (
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Dash,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Text,
-)
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import INK, QUIET, Band, Dash, Line, Mark, Points, Text
 
 if TYPE_CHECKING:
     import xarray as xr

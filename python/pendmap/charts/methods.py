@@ -6,7 +6,8 @@ import dataclasses
 import textwrap
 from typing import TYPE_CHECKING, Final
 
-from pendmap.charts.chart import QUIET, Chart, Text, bare
+from pendmap.charts.chart import Chart, bare
+from pendmap.charts.marks import QUIET, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

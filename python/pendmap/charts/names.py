@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import plane
-from pendmap.charts.chart import DOTTED, QUIET, Axis, Level, Mark, holding
+from pendmap.charts.chart import Axis, holding
+from pendmap.charts.marks import DOTTED, QUIET, Level, Mark
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.quantities import COUNTERPARTS
@@ -17,7 +18,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from pendmap.charts.chart import Ends, Floats
+    from pendmap.charts.marks import Ends, Floats
 
 _TAU: Final = "\N{GREEK SMALL LETTER TAU}"
 _THETA: Final = "\N{GREEK SMALL LETTER THETA}"

@@ -9,15 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names, palette, plane
-from pendmap.charts.chart import INK, QUIET, Chart, Line, Mark, Panel, Points
+from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import INK, QUIET, Line, Mark, Points
 from pendmap.formatting import counted
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 MOST: Final = 16
 """Orbits that are named: of more the legend says how many there are."""

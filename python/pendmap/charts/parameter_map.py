@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from pendmap.charts import names, palette, plane, tongues
-from pendmap.charts.chart import Axis, Chart, Colours, Image, Line, Mark, Panel, together
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:

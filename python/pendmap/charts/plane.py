@@ -12,7 +12,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi

@@ -10,20 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names
-from pendmap.charts.chart import (
-    ALARM,
-    QUIET,
-    Axis,
-    Chart,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    Steps,
-    Text,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
 from pendmap.formatting import moment
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
@@ -31,7 +19,7 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import true_runs
 
 if TYPE_CHECKING:
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.records import Experiment, Run
 
 USED: Final = "#1d3557"

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Line, Panel
+from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.curves import envelope
+from pendmap.charts.marks import Line
 from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 COLUMNS: Final = 20
 """Runs up to which there are two columns; of more there are three."""

@@ -11,18 +11,8 @@ import numpy.typing as npt
 from pendmap.analysis.critical_curves import PLANES, in_plane, window
 from pendmap.analysis.tongues import NEAR
 from pendmap.charts import names
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Chart,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Text,
-    together,
-)
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +20,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 _CURVES: Final = {
     -1: ("minus", "exact, multiplier \N{MINUS SIGN}1 (period 2)", "#0072b2", "#56b4e9"),

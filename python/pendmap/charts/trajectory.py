@@ -9,14 +9,15 @@ import numpy as np
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
-from pendmap.charts.chart import QUIET, Axis, Chart, Level, Line, Mark, Panel, Points, Span, holding
+from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.curves import envelope
+from pendmap.charts.marks import QUIET, Level, Line, Mark, Points, Span
 from pendmap.units import Units
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
 LATE: Final = 0.2
 """The last share of a trajectory, drawn dark, so that what it settles to stands out."""

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts.chart import Areas, Axis, Chart, Ends, Line, Mark, Panel, Text
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import Areas, Ends, Line, Mark, Text
 
 if TYPE_CHECKING:
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
 
     Point = tuple[float, float]
 

@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Line, Panel, Points, holding
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import Line, Points
 from pendmap.units import Units
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pendmap.charts import registry
-from pendmap.charts.chart import Image, Sheet
+from pendmap.charts.chart import Sheet
+from pendmap.charts.marks import Image
 from pendmap.errors import InputError
 from pendmap.render import marks, style, ticks
 
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase, SubFigure
 
-    from pendmap.charts.chart import Chart, Ends, Mark, Panel
+    from pendmap.charts.chart import Chart, Panel
+    from pendmap.charts.marks import Ends, Mark
 
 LEFT: Final = 0.1
 HEAD: Final = 0.72

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from pendmap.charts import chart as charts
+from pendmap.charts import marks as charts
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from pendmap.charts.chart import Mark
+    from pendmap.charts.marks import Mark
 
 TABLE, APART = 8.0, 0.14
 """Size of a table's letters, and inches between its columns at least."""

@@ -16,7 +16,7 @@ from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.table1 import first_state
 
 if TYPE_CHECKING:
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport
     from pendmap.records import Run
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     import rerun as rr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.diagnosis import Discrepancy
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun

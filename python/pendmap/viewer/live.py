@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import rerun as rr
     import xarray as xr
 
-    from pendmap.charts.chart import Floats
+    from pendmap.charts.marks import Floats
     from pendmap.model import Pendulum, Rig
 
 ADDRESS: Final = "127.0.0.1:9876"
