@@ -18,7 +18,7 @@ import pendmap
 from decays import decay, record
 from pendmap import render
 from pendmap.charts import chart as charts
-from pendmap.charts import decrement, half_cycles, identification, marks, methods
+from pendmap.charts import decrement, half_cycles, identification, methods
 from pendmap.charts.names import signed
 from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
@@ -26,7 +26,6 @@ from pendmap.identification.methods.decrement import recursion
 from pendmap.paper import pendulum
 from pendmap.records import Experiment, Run
 from pendmap.render import drawing, style
-from pendmap.render.written import save
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,7 +66,7 @@ def report(name: str) -> IdentificationReport:
 
 
 @functools.cache
-def drawn(name: str, size: marks.Ends | None = None, **given: Any) -> Figure:  # noqa: ANN401
+def drawn(name: str, size: tuple[float, float] | None = None, **given: Any) -> Figure:  # noqa: ANN401
     with rc_context(style.RC):
         sheet = identification.sheet(report(name), **given)
         figure = drawing.draw(sheet, size=size, dpi=100.0)
@@ -135,8 +134,7 @@ def test_files_are_whole(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == len(render.SUFFIXES)
 
 
-def test_the_pendulum(tmp_path: Path) -> None:
-    assert save(pendulum.chart(), tmp_path / "a.png").stat().st_size > 5000
+def test_the_pendulum() -> None:
     for size in (None, (9.0, 5.6), (5.6, 8.0)):
         with rc_context(style.RC):
             figure = drawing.draw(pendulum.chart(size), size=size, dpi=100.0)

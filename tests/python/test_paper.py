@@ -19,7 +19,6 @@ from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
 from pendmap.paper import tumbling
 from pendmap.render import drawing
-from pendmap.render.written import save
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -169,7 +168,7 @@ def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
         assert one.steady.reached[0].share == 1.0
         assert abs(one.steady.overestimate) < 0.01
         assert one.steady.rms < 0.02
-    save(comparison.steady(runs, "Steady", "rig"), tmp_path / "8.svg")
+    drawing.draw(comparison.steady(runs, "Steady", "rig")).savefig(tmp_path / "8.svg")
     drawn = (tmp_path / "8.svg").read_text()
     assert drawn.count("rotation 1:1") == 2
     assert "identified model" in drawn
@@ -194,7 +193,7 @@ def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path
         assert 10 < settled.median < 250
         assert np.isinf(settled.ensemble).mean() < 0.05
         assert 10 < settled.measured < 300
-    save(comparison.tumbling(runs, "Tumbling", "rig"), tmp_path / "9.svg")
+    drawing.draw(comparison.tumbling(runs, "Tumbling", "rig")).savefig(tmp_path / "9.svg")
     drawn = (tmp_path / "9.svg").read_text()
     assert drawn.count("record (95 % of the ensemble)") == 2
     assert drawn.count("a member") >= 4
