@@ -281,7 +281,10 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     if _lacks(given, least):
         raise _no_room(given, least)
     figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)
-    _legend(figure, named, given[0], loc="upper left", bbox_to_anchor=(0.0, 1 - HEAD / given[1]))
+    engine: Any = figure.get_layout_engine()
+    _, low, _, tall = engine.get()["rect"]
+    below_head = (0.0, low + tall + foot / given[1])
+    _legend(figure, named, given[0], loc="upper left", bbox_to_anchor=below_head)
     letters = iter(LETTERS)
     panels = []
     columns = figure.subfigures(1, len(wide), squeeze=False, width_ratios=wide)[0]
