@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -89,6 +89,18 @@ class Chart:
     tabs: bool = False
     remark: str = ""
     notes: Sequence[str] = ()
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        subtitle: str,
+        rows: Sequence[Sequence[Panel]],
+        **look: Any,  # noqa: ANN401 (fields of a chart)
+    ) -> Chart:
+        """Return a chart of which a figure shows these rows of panels."""
+        names = [[panel.name for panel in row] for row in rows]
+        return cls(title, subtitle, [panel for row in rows for panel in row], rows=names, **look)
 
     def panel(self, name: str) -> Panel:
         """Return the panel of a name."""

@@ -171,14 +171,14 @@ def _forced(one: ForcedComparison) -> list[Panel]:
 
 
 def history(
-    one: ForcedComparison, names_of: Pair = PAIR, *, model: bool = False, title: str = "record"
+    one: ForcedComparison, pair: Pair = PAIR, *, model: bool = False, title: str = "record"
 ) -> Panel:
     """Return the angle in turns against time, of the record or a member; wells are bands."""
     reading, colour = (one.example[0], look(MODEL).colour) if model else (one.measured, MEASURED)
     turns, every = reading / math.tau, max(1, one.time.size // SAMPLES)
     low, high = math.floor(turns.min() + 0.5), math.ceil(turns.max() - 0.5)
-    look_of: dict[str, Any] = {"colour": colour, "width": 0.6, "name": names_of[model]}
-    marks: list[Mark] = [Line(one.time[::every], turns[::every], **look_of)]
+    style: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[model]}
+    marks: list[Mark] = [Line(one.time[::every], turns[::every], **style)]
     if high - low < WELLS:
         wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
         marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
@@ -199,7 +199,7 @@ def phase(one: ForcedComparison, *, model: bool = False, title: str = "record") 
     return Panel(f"phase {title}", title, *sides, [Line(*curve.T, colour=colour, width=0.4)])
 
 
-def cycles(one: ForcedComparison, title: str, names_of: Pair = PAIR) -> Panel:
+def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
     """Return the steady state of a record as points, and the model's as a line."""
     found, model = one.steady, look(MODEL)
     marks: list[Mark] = []
@@ -215,14 +215,14 @@ def cycles(one: ForcedComparison, title: str, names_of: Pair = PAIR) -> Panel:
             "fill": "none",
             "size": 4.0,
             "edge_width": 0.8,
-            "name": names_of[0],
+            "name": pair[0],
         }
         marks = [Points(*at, colour=MEASURED, **circle)]
         if found.model is not None:
             theta, velocity = found.model.theta, found.model.velocity
             theta = np.append(theta, theta[0] + math.tau * found.model.w)
             curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
-            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=names_of[1]))
+            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
     sides = names.phase_plane((-reach, reach), plane.padded(speeds), _SI)
     return Panel(f"cycles {one.run.name}", title, *sides, marks)
 
@@ -281,9 +281,9 @@ def _column(left: float, right: float, base: float, high: float) -> Floats:
 def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart:
     """Return a phase plane for each run: the record as points, the model as a line."""
     panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
-    rows = [[panel.name for panel in panels[k : k + 2]] for k in range(0, len(panels), 2)]
+    rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
     size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
-    return Chart(title, subtitle, panels, rows=rows, columns=2, size=size)
+    return Chart.of(title, subtitle, rows, columns=2, size=size)
 
 
 def _reached(one: ForcedComparison) -> str:
@@ -311,8 +311,7 @@ def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> She
         member: dict[str, Any] = {"model": True, "title": "a member"}
         above = [history(one, OF_PAPER), history(one, OF_PAPER, **member)]
         below = [phase(one), phase(one, **member), statistics(one)]
-        rows = [[panel.name for panel in row] for row in (above, below)]
         heading = f"{_drive(one)}: {counted(one.ensemble.members, 'member')} of the ensemble"
-        look_of: dict[str, Any] = {"rows": rows, "heights": (0.7, 1.0), "size": (WIDTH, 4.4)}
-        charts.append(Chart(heading, "", [*above, *below], **look_of))
+        style = {"heights": (0.7, 1.0), "size": (WIDTH, 4.4)}
+        charts.append(Chart.of(heading, "", [above, below], **style))
     return Sheet(title, subtitle, [charts], legend=True)

@@ -77,16 +77,11 @@ def part(report: IdentificationReport) -> Chart:
     few = len(peaks) < 3  # noqa: PLR2004 (a half cycle on either side)
     whole = _whole(course, peaks, thin=few or not run.peaks_only)
     columns = [] if few else [_near(report, course, *near) for near in _spans(peaks)]
-    rows = list(zip(*columns, strict=True))
+    rows = [[whole], *zip(*columns, strict=True)]
     shares = [1.0, 0.35] if run.peaks_only else [1.0, 0.8, 0.28]
-    return Chart(
-        "The record and its half cycles",
-        "",
-        [whole, *(panel for row in rows for panel in row)],
-        rows=[["whole"], *([panel.name for panel in row] for row in rows)],
-        heights=[1.1, *(shares if rows else [])],
-        size=(8.6, 2.4 if few else 4.6 if run.peaks_only else 5.6),
-    )
+    size = (8.6, 2.4 if few else 4.6 if run.peaks_only else 5.6)
+    heights = [1.1, *([] if few else shares)]
+    return Chart.of("The record and its half cycles", "", rows, heights=heights, size=size)
 
 
 def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:

@@ -162,14 +162,8 @@ def decays(report: IdentificationReport) -> Chart:
     near = [_near(course, made, *one, only=run.peaks_only) for one in zip(said, spans, strict=True)]
     shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
     shown += [last] if last else []
-    return Chart(
-        title,
-        "",
-        [panel for row in shown for panel in row],
-        rows=[[panel.name for panel in row] for row in shown],
-        heights=(1.7, 1.35, 1.5, 0.75)[: len(shown)],
-        size=(WIDTH, 6.3 + 1.3 * len(last)),
-    )
+    heights, size = (1.7, 1.35, 1.5, 0.75)[: len(shown)], (WIDTH, 6.3 + 1.3 * len(last))
+    return Chart.of(title, "", shown, heights=heights, size=size)
 
 
 def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:

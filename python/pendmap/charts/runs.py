@@ -57,15 +57,9 @@ def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
         line = Line(*_curve(run), colour=_COLOUR, width=0.7)
         panels.append(Panel(str(k), run.title, clock, up, [line]))
     wide, high = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * rows)
-    return Chart(
-        title,
-        subtitle,
-        panels,
-        rows=[[p.name for p in panels[k : k + columns]] for k in range(0, len(runs), columns)],
-        columns=columns,
-        size=(wide, high),
-        letters=False,
-    )
+    grid = [panels[k : k + columns] for k in range(0, len(runs), columns)]
+    look = {"columns": columns, "size": (wide, high), "letters": False}
+    return Chart.of(title, subtitle, grid, **look)
 
 
 def _curve(run: RunPanel) -> tuple[Floats, Floats]:

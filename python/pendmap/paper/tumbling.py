@@ -31,15 +31,9 @@ def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
         f"\N{GREEK SMALL LETTER GAMMA} = {damping};   time history, phase plane ({min(periods)} "
         f"periods), Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section ({points} points)"
     )
-    columns = [_column(run, k) for k, run in enumerate(runs)]
-    return Chart(
-        title or "Trajectories",
-        shared,
-        [panel for column in columns for panel in column],
-        rows=[[column[row].name for column in columns] for row in range(3)],
-        heights=(0.7, 1.0, 1.0),
-        size=(0.6 + 3.1 * len(runs), 9.0),
-    )
+    rows = list(zip(*(_column(run, k) for k, run in enumerate(runs)), strict=True))
+    size = (0.6 + 3.1 * len(runs), 9.0)
+    return Chart.of(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
 
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:

@@ -215,8 +215,8 @@ def _log(stream: rr.RecordingStream, root: str, one: Beside, larger: float) -> N
     for look, left, pivot in ((BEFORE, one.before, pivots[1]), (AFTER, one.after, pivots[2])):
         path, theta = f"{at}/data/{look.name}", one.record - larger * left
         runs.series(stream, f"{root}/angle/{look.name}", one.time, one.record - left, look)
-        of_residual = Series(look.name, look.colour, 1.2)
-        runs.residual(stream, f"{root}/residual/{look.name}", one.time, left, of_residual)
+        look_left = Series(look.name, look.colour, 1.2)
+        runs.residual(stream, f"{root}/residual/{look.name}", one.time, left, look_left)
         runs.pendulum(stream, f"{path}/record", one.time, one.record, RECORD, THIN, pivot)
         runs.pendulum(stream, path, one.time, theta, look, BROAD, pivot)
     runs.noise(stream, f"{root}/residual", one.time, one.sigma)
