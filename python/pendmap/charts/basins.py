@@ -237,13 +237,7 @@ def finite_time(dataset: xr.Dataset) -> bool:
 
 
 def refuse_too_large(dataset: xr.Dataset) -> None:
-    """Refuse a dataset whose picture would need more memory than is free.
-
-    Raises
-    ------
-    MemoryError
-        With what it needs and what is free.
-    """
+    """Refuse a dataset whose picture would need more memory than is free, with a MemoryError."""
     _core.reckon(
         "values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE
     )
@@ -316,13 +310,7 @@ def layers(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def named(dataset: xr.Dataset, layer: str) -> str:
-    """Return the name of the layer that ``layer`` names, itself or by its variable.
-
-    Raises
-    ------
-    InputError
-        If the map has no such layer; the message lists those it has.
-    """
+    """Return the layer of this name or variable; refuse one that the map lacks."""
     for name, variable in VARIABLES.items():
         if layer in (name, variable) and variable in dataset:
             return name

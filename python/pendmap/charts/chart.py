@@ -114,13 +114,7 @@ class Chart:
         return [[self.panel(name) for name in row] for row in self.rows]
 
     def only(self, layer: str | None, size: Ends | None = None) -> Chart:
-        """Return the chart with one of its panels alone, all of it without a name.
-
-        Raises
-        ------
-        InputError
-            If it has no panel of that name.
-        """
+        """Return the chart with one of its panels alone, all of it without a name."""
         if layer is None:
             return self
         known = [panel.name for row in self.shown for panel in row]

@@ -58,13 +58,7 @@ def sheet(
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Sheet:
-    """Return the parts in one column; more than two in two columns of nearly equal height.
-
-    Raises
-    ------
-    InputError
-        For an unknown part, or none.
-    """
+    """Return the parts in one column; more than two in two columns of nearly equal height."""
     wanted = list(PARTS) if parts is None else list(parts)
     unknown = [name for name in wanted if name not in PARTS]
     if unknown or not wanted:

@@ -28,17 +28,7 @@ Z95: Final = 1.959963984540054
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """Look of a method in a picture.
-
-    Parameters
-    ----------
-    label : str
-        Name in a legend.
-    colour : str
-        ``#rrggbb``.
-    dash : str
-        Dashes of its line, as matplotlib writes them; lines that lie on one another stay visible.
-    """
+    """Name in a legend, colour ``#rrggbb`` and dash of a method's line, as matplotlib writes it."""
 
     label: str
     colour: str

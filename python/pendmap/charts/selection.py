@@ -55,21 +55,10 @@ _BLOCK = 1_000_000
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result, or a selection of one, ready to be drawn.
+    """Return a result, or a selection of one, ready to be drawn; refuse what cannot be.
 
     Axes rise, dimensions stand in one order, and of a selection shares, tables and summary are
     those of the part, or say that they are of the whole. Of a whole result nothing changes.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result of pendmap, or what selecting, reversing and transposing made of one.
-
-    Raises
-    ------
-    InputError
-        If it is a list of starts, an axis has no values or only one without a range, a variable
-        is missing or over other dimensions, or a table that others refer to is not whole.
     """
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:

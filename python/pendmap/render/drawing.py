@@ -49,13 +49,7 @@ _SMALLEST: Final = 0.9
 
 
 def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
-    """Return the figure of a chart or of a sheet of charts; ``size`` is in inches.
-
-    Raises
-    ------
-    InputError
-        If ``size`` leaves no room for the panels.
-    """
+    """Return the figure of a chart or of a sheet; refuse a size in inches without room for it."""
     if isinstance(chart, Sheet):
         return _sheet(chart, size, dpi)
     figure, needed = _made(chart, size or _size(chart), dpi)
@@ -329,13 +323,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
 
 
 def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
-    """Place the panels, fold titles that are too long for them, and write notes beneath.
-
-    Returns
-    -------
-    bool
-        Whether there is room for the panels.
-    """
+    """Place the panels, fold long titles, write notes beneath; return whether there is room."""
     engine: Any = figure.get_layout_engine()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
