@@ -72,8 +72,8 @@ class Chart:
     ``rows`` are the names of the panels that a figure shows, from the top, by default all in one;
     ``heights`` are the shares of the rows, ``ratio`` the height of a panel over its width, and
     ``size`` the inches of the figure where it has a size. Rows of fewer panels than ``columns``
-    are not filled. A recording shows all panels: one at a
-    time as ``tabs``, or below one another; ``remark`` ends its legend.
+    are not filled. A recording shows all panels: one at a time as ``tabs``, or below one another;
+    ``remark`` ends its legend.
     """
 
     title: str
