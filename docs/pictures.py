@@ -22,11 +22,12 @@ from pendmap import (
     simulate,
     virtual_rig,
 )
+from pendmap.charts import comparison
 from pendmap.diagnosis import diagnose
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
-from pendmap.paper.draw import draw_motions
 from pendmap.render import style
+from pendmap.render.written import save
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
@@ -128,14 +129,12 @@ def planes() -> None:
 def forced() -> None:
     """A rig's runs that tumble beside the ensemble of the model that its decay gives."""
     model = paper_figures.report().methods["combined_repaired"].rig
-    draw_motions(
+    sheet = comparison.tumbling(
         paper_motions.tumbling(model),
-        HERE / "tumbling.png",
-        steady=False,
-        title="Tumbling until it settles",
-        subtitle="virtual rig, and the model that was identified from its free decay",
-        dpi=110,
+        "Tumbling until it settles",
+        "virtual rig, and the model that was identified from its free decay",
     )
+    save(sheet, HERE / "tumbling.png", dpi=110)
 
 
 if __name__ == "__main__":

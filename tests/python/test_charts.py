@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from drawn import made, named, written
 from pendmap import InputError, render, viewer
 from pendmap.charts import chart as charts
-from pendmap.charts import registry
+from pendmap.charts import marks, registry
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 X = np.linspace(1.0, 100.0, 50)
-CELLS = charts.Colours("height", "viridis", 0.0, 1.0)
+CELLS = marks.Colours("height", "viridis", 0.0, 1.0)
 
 
 def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> charts.Chart:
@@ -30,20 +30,20 @@ def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) ->
     size = min(cells, 4)
     across, up = charts.Axis("x (s)", (1.0, 100.0), "log"), charts.Axis("y (rad)", (-2.0, 2.0))
     curves = (
-        charts.Line(X, y, name="a line", path="line", colour="#d55e00"),
-        charts.Points(X[::9], y[::9], name="points", path="points", colour="#0072b2"),
-        charts.Band(X, y - 0.1, y + 0.1, name="a band", path="band", alpha=0.3),
-        charts.Level(0.5, path="level", dash=charts.DASHED),
-        charts.Span((2.0, 3.0), colour="#eeeeee", name="a span"),
-        charts.Areas([np.array([(1, -1), (2, -1), (2, 0)])], colour="#cccccc", name="an area"),
-        charts.Text(0.5, 0.9, "words", inside=True),
+        marks.Line(X, y, name="a line", path="line", colour="#d55e00"),
+        marks.Points(X[::9], y[::9], name="points", path="points", colour="#0072b2"),
+        marks.Band(X, y - 0.1, y + 0.1, name="a band", path="band", alpha=0.3),
+        marks.Level(0.5, path="level", dash=marks.DASHED),
+        marks.Span((2.0, 3.0), colour="#eeeeee", name="a span"),
+        marks.Areas([np.array([(1, -1), (2, -1), (2, 0)])], colour="#cccccc", name="an area"),
+        marks.Text(0.5, 0.9, "words", inside=True),
     )
-    bins = charts.Steps(np.array([1.0, 10.0, 100.0]), np.array([0.5, 1.0]), path="bins")
-    classes = charts.Image(
+    bins = marks.Steps(np.array([1.0, 10.0, 100.0]), np.array([0.5, 1.0]), path="bins")
+    classes = marks.Image(
         np.eye(size, dtype=np.uint8), (1, 5), (0, 1), path="cells",
         classes=[("no", "#ffffff"), ("yes", "#000000")],
     )  # fmt: skip
-    heights = charts.Image(np.eye(size), (1, 5), (0, 1), colours=CELLS, path="heights")
+    heights = marks.Image(np.eye(size), (1, 5), (0, 1), colours=CELLS, path="heights")
     plain = charts.Axis("a"), charts.Axis("b", (0.0, 1.0))
     return charts.Chart(
         "An example",
@@ -82,9 +82,9 @@ def test_a_builder_is_all_that_a_figure_needs(dataset: xr.Dataset, tmp_path: Pat
 
 def test_and_all_that_a_recording_needs(dataset: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(dataset, tmp_path)
-    marks = {f"/curves/data/{name}" for name in ("line", "points", "band", "level")}
+    drawn = {f"/curves/data/{name}" for name in ("line", "points", "band", "level")}
     images = {"/classes/data/cells", "/heights/data/heights"}
-    assert marks | images | {"/bins/data/bins", "/legend", "/summary"} <= set(back.columns)
+    assert drawn | images | {"/bins/data/bins", "/legend", "/summary"} <= set(back.columns)
     # Views have no logarithmic axes: powers of ten stand there.
     at = np.array(back.one("/curves/data/points", "Points2D:positions"))
     assert np.allclose(at, np.stack([np.log10(X[::9]), np.sin(X)[::9]], axis=1), atol=1e-6)

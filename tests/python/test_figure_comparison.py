@@ -13,10 +13,10 @@ from matplotlib.text import Text
 from decays import decay, record
 from drawn import written
 from pendmap import Rig, virtual_rig
+from pendmap.charts import comparison
 from pendmap.comparison import Comparison, Ensemble, compare
-from pendmap.paper import drawings
 from pendmap.records import Experiment, Run, read_experiment
-from pendmap.render import comparison, style
+from pendmap.render import drawing, style
 from pendmap.virtual_rig import RunPlan
 from test_figure_overlap import overlap, shown
 
@@ -39,7 +39,7 @@ def compared(count: int, seconds: float = 10.0) -> Comparison:
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
 def test_it_fits_a_screen_and_no_text_covers_another(count: int) -> None:
     with rc_context(style.RC):
-        figure = comparison.figure(compared(count), dpi=100.0)
+        figure = drawing.draw(comparison.sheet(compared(count)), dpi=100.0)
         figure.canvas.draw()
     wide, high = figure.get_size_inches()
     assert high < 0.75 * wide
@@ -64,9 +64,9 @@ def test_it_fits_a_screen_and_no_text_covers_another(count: int) -> None:
 
 def test_a_run_without_peaks_says_so() -> None:
     with rc_context(style.RC):
-        figure = comparison.figure(compared(1, seconds=0.4), dpi=50.0)
+        figure = drawing.draw(comparison.sheet(compared(1, seconds=0.4)), dpi=50.0)
     assert "Fewer than three peaks" in written(figure)
-    assert len(figure.axes) == 2
+    assert sum(axes.axison for axes in figure.axes) == 2
 
 
 @pytest.mark.parametrize("seconds", [20.0, 70.0])
@@ -86,9 +86,9 @@ def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_pat
     assert [one.steady is not None for one in found.forced] == [False, seconds > 60]
     with rc_context(style.RC):
         sheets = [
-            comparison.figure(found, dpi=100.0),
-            drawings.steady_figure(found.forced, dpi=100.0, title="Steady", subtitle="rig"),
-            drawings.tumbling_figure(found.forced, dpi=100.0, title="Tumbling", subtitle="rig"),
+            drawing.draw(comparison.sheet(found), dpi=100.0),
+            drawing.draw(comparison.steady(found.forced, "Steady", "rig"), dpi=100.0),
+            drawing.draw(comparison.tumbling(found.forced, "Tumbling", "rig"), dpi=100.0),
         ]
         for figure in sheets:
             figure.canvas.draw()

@@ -1,4 +1,4 @@
-"""What the figures of maps and trajectories show."""
+"""Content of the figures of maps and trajectories."""
 
 from __future__ import annotations
 

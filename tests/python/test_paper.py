@@ -13,10 +13,11 @@ from click.testing import CliRunner
 
 import pendmap
 from pendmap import virtual_rig
+from pendmap.charts import comparison
 from pendmap.cli.paper import command
-from pendmap.paper import draw as tumbling
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
+from pendmap.paper import tumbling
 from pendmap.render import drawing
 
 if TYPE_CHECKING:
@@ -137,14 +138,14 @@ def test_figure_2_is_persistent_tumbling_chaos_at_the_papers_points() -> None:
 
 def test_figure_2_has_a_column_for_each_point(tmp_path: Path) -> None:
     runs = paper_figures.tumbling(600)
-    sheet = drawing.draw(tumbling.tumbling_chart(runs, "Figure 2"), dpi=100)
+    sheet = drawing.draw(tumbling.chart(runs, "Figure 2"), dpi=100)
     assert len(sheet.axes) == 9
     sections = sheet.axes[6:]
     for axes, run in zip(sections, runs, strict=True):
         drawn = sum(len(line.get_xydata()) for line in axes.lines)
         assert drawn == run.sizes["period"]
     with pytest.raises(pendmap.InputError, match="no room"):
-        drawing.draw(tumbling.tumbling_chart(runs, None), size=(2.0, 2.0), dpi=100)
+        drawing.draw(tumbling.chart(runs), size=(2.0, 2.0), dpi=100)
     assert paper_figures.draw("2", tmp_path / "2.png").stat().st_size > 50_000
 
 
@@ -167,7 +168,7 @@ def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
         assert one.steady.reached[0].share == 1.0
         assert abs(one.steady.overestimate) < 0.01
         assert one.steady.rms < 0.02
-    tumbling.draw_motions(runs, tmp_path / "8.svg", steady=True, title="Steady", subtitle="rig")
+    drawing.draw(comparison.steady(runs, "Steady", "rig")).savefig(tmp_path / "8.svg")
     drawn = (tmp_path / "8.svg").read_text()
     assert drawn.count("rotation 1:1") == 2
     assert "identified model" in drawn
@@ -192,7 +193,7 @@ def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path
         assert 10 < settled.median < 250
         assert np.isinf(settled.ensemble).mean() < 0.05
         assert 10 < settled.measured < 300
-    tumbling.draw_motions(runs, tmp_path / "9.svg", steady=False, title="Tumbling", subtitle="rig")
+    drawing.draw(comparison.tumbling(runs, "Tumbling", "rig")).savefig(tmp_path / "9.svg")
     drawn = (tmp_path / "9.svg").read_text()
     assert drawn.count("record (95 % of the ensemble)") == 2
     assert drawn.count("a member") >= 4

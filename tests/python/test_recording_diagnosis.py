@@ -1,4 +1,4 @@
-"""Recordings of diagnoses, read back: record, both models, residuals, report."""
+"""Recordings of diagnoses, read back: the record beside both models, residuals, the report."""
 
 from __future__ import annotations
 

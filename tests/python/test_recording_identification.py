@@ -14,7 +14,7 @@ import pendmap
 import recorded
 from pendmap import InputError, viewer
 from pendmap.identification import identify_experiment
-from pendmap.viewer import comparison, decay, window
+from pendmap.viewer import comparison, identification, window
 from recordings import ReadBack
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def test_what_was_found_is_said(back: ReadBack, report: IdentificationReport) ->
         assert [low, high] == pytest.approx(ci95, abs=tenth)
     others = [(n, w) for n, each in report.methods.items() for w in each.warnings]
     assert others, "this record makes some methods warn"
-    assert all(f"{name.replace('_', ' ')}: {text}" in page for name, text in others)
+    assert all(f"{name}: {text}" in page for name, text in others)
 
 
 def test_the_views(back: ReadBack) -> None:
@@ -232,7 +232,7 @@ def test_a_record_that_begins_with_rotations(tmp_path: Path) -> None:
     near = np.interp(one.peaks.time, time, theta)
     assert np.allclose(one.peaks.amplitude, near, atol=0.03), "turns are counted as the record has"
     assert np.nanmax(np.abs(one.residual)) < 0.05
-    low, high = decay._frame(one, 6.2).y  # noqa: SLF001 (a frame is drawn, not logged)
+    low, high = identification._frame(one, 6.2).y  # noqa: SLF001 (a frame is drawn, not logged)
     assert low < velocity.min() < velocity.max() < high
 
 
@@ -268,7 +268,7 @@ def test_a_recording_is_whole_or_absent(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(decay, "_phase", interrupted)
+    monkeypatch.setattr(identification, "_phase", interrupted)
     with pytest.raises(KeyboardInterrupt):
         viewer.record_identification(report, file)
     assert file.read_bytes() == b"old"

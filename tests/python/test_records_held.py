@@ -10,6 +10,7 @@ import pytest
 
 import pendmap
 from accelerations import GRAVITY, SENSORS, TRUTH, column, experiment, handled, readings
+from drawn import written
 from pendmap import InputError
 from pendmap.comparison import compare
 from pendmap.comparison import free as compared
@@ -130,16 +131,15 @@ def test_a_made_angle_judges_no_model(tmp_path: Path) -> None:
 
 
 def test_figures_of_a_made_angle_say_why_they_judge_none(tmp_path: Path) -> None:
-    from pendmap.render import comparison, identification  # noqa: PLC0415 (slow to import)
+    from pendmap.charts import comparison, identification  # noqa: PLC0415 (slow to import)
+    from pendmap.render import drawing  # noqa: PLC0415 (likewise)
 
     time, _, force = readings(release=1.3, seconds=20)
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
     report = identify_experiment(read)
-    for made in (
-        identification.figure(report, dpi=50),
-        comparison.figure(compare(report.model, read), dpi=50),
-    ):
-        words = " ".join(text.get_text() for text in made.texts).replace("\n", " ")
+    for sheet in (identification.sheet(report), comparison.sheet(compare(report.model, read))):
+        made = drawing.draw(sheet, dpi=50)
+        words = written(made)
         assert "made of an acceleration, too roughly to judge a model" in words
         assert not any("error of each" in axes.get_title() for axes in made.axes)
 

@@ -253,6 +253,6 @@ def test_a_panel_a_run_and_gaps_where_samples_are_lost() -> None:
     assert np.flatnonzero(np.isnan(xy[:, 0])).tolist() == [40]
     assert figure.axes[0].get_xlabel() == "t (s)"
     assert figure.axes[0].get_ylabel().endswith("(rad)")
-    assert len(figure.axes[6].lines[0].get_xydata()) == 2 * records.BINS
+    assert records.BINS < len(figure.axes[6].lines[0].get_xydata()) <= 2 * records.BINS + 2
     with pytest.raises(InputError, match="one record or more"):
         render.draw_runs([], "a.png", title="", subtitle="")

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, Grid, Pendulum, Rig, render, viewer
-from pendmap.charts import basins
+from pendmap.charts import basins, names
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -208,9 +208,9 @@ def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None
 
 def test_axes_are_named_in_the_units_of_the_result() -> None:
     run = pendmap.simulate(SWING, 1.0, 3.0, 5.0)
-    parameters = basins.parameters(run.attrs)
+    parameters = names.parameters(run.attrs)
     assert parameters == (
-        "w0 = 6.2 rad/s,  c/m = 0.05 1/s,  p = 0.3,  Ω = 12 rad/s,  phase = 0.4,  "
+        "w0 = 6.2 rad/s,  c/m = 0.05 1/s,  p = 0.3,  Ω = 12 rad/s,  φ = 0.4 rad,  "
         "Tr = 0.08 rad/s²;   quadratic drag (q = 0.01 1/rad),  "
         "bearing harmonic (amplitude = 1.5 rad/s^2, n = 4, psi = 0.3 rad)"
     )

@@ -22,7 +22,7 @@ import synthetic
 from pendmap import viewer
 from pendmap.charts import palette
 from pendmap.identification import identify_experiment
-from pendmap.viewer import decay, window
+from pendmap.viewer import identification, window
 from recordings import ReadBack
 
 if TYPE_CHECKING:
@@ -96,7 +96,12 @@ def test_the_viewers_own_picture_of_an_identification(tmp_path: Path) -> None:
     report = identify_experiment(pendmap.read_experiment(record))
     file = viewer.record_identification(report, tmp_path / "a.rrd")
     shares = shares_of_colours(file, tmp_path, 5.0)
-    for series in (decay.RECORD, decay.MODEL, decay.PEAKS, decay.RESIDUAL):
+    for series in (
+        identification.RECORD,
+        identification.MODEL,
+        identification.PEAKS,
+        identification.RESIDUAL,
+    ):
         assert shares.get(series.colour, 0.0) > 2e-4, series.name
 
 

@@ -1,4 +1,4 @@
-"""Opening the viewer: what is refused, what is said where it cannot open."""
+"""Opening the viewer: refusals, and messages where it cannot open."""
 
 from __future__ import annotations
 

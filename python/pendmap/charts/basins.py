@@ -11,16 +11,13 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
-from pendmap.charts.chart import ALARM, INK, QUIET, Chart, Colours, Image, Mark, Panel, Points
+from pendmap.charts.chart import Chart, Panel
+from pendmap.charts.marks import ALARM, INK, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
 from pendmap.formatting import counted, with_error
-from pendmap.model import effects_of
-from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
     import numpy.typing as npt
     import xarray as xr
 
@@ -40,30 +37,6 @@ VARIABLES = {
     "entropy": "label_entropy",
 }
 """Layers by the name a user types, and the variable that holds each."""
-
-_SYMBOLS = {
-    "gamma": "\N{GREEK SMALL LETTER GAMMA}",
-    "p": "p",
-    "omega": "\N{GREEK SMALL LETTER OMEGA}",
-    "phase": "phase",
-    "torque": "torque",
-    "theta_r": "\N{GREEK SMALL LETTER THETA}r",
-    "lab_time": "lab time",
-}
-_SI_SYMBOLS = {
-    "w0": ("w0", "rad/s"),
-    "c_over_m": ("c/m", "1/s"),
-    "p": ("p", ""),
-    "Omega": ("\N{GREEK CAPITAL LETTER OMEGA}", "rad/s"),
-    "phi": ("phase", ""),
-    "torque": ("torque", "rad/s\N{SUPERSCRIPT TWO}"),
-    "Tr": ("Tr", "rad/s\N{SUPERSCRIPT TWO}"),
-    "lab_time_s": ("lab time", "s"),
-}
-
-LABORATORY = {"stroke_mm": "p", "frequency_hz": "Omega"}
-"""Quantities that a laboratory varies, and the parameter of a rig that each of them sets."""
-
 
 SMALL: Final = 0.64
 """Size of the panel of unreliable labels, relative to those that lead."""
@@ -110,7 +83,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     rows, columns = dataset["label"].shape
     return Chart(
         _title(dataset, shown),
-        f"{parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
+        f"{names.parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
         panels,
         rows=[[panel.name] for panel in panels] if ratio < FLAT else (),
         ratio=ratio,
@@ -264,13 +237,7 @@ def finite_time(dataset: xr.Dataset) -> bool:
 
 
 def refuse_too_large(dataset: xr.Dataset) -> None:
-    """Refuse a dataset whose picture would need more memory than is free.
-
-    Raises
-    ------
-    MemoryError
-        With what it needs and what is free.
-    """
+    """Refuse a dataset whose picture would need more memory than is free, with a MemoryError."""
     _core.reckon(
         "values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE
     )
@@ -343,13 +310,7 @@ def layers(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def named(dataset: xr.Dataset, layer: str) -> str:
-    """Return the name of the layer that ``layer`` names, itself or by its variable.
-
-    Raises
-    ------
-    InputError
-        If the map has no such layer; the message lists those it has.
-    """
+    """Return the layer of this name or variable; refuse one that the map lacks."""
     for name, variable in VARIABLES.items():
         if layer in (name, variable) and variable in dataset:
             return name
@@ -388,32 +349,3 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
         "probability": "probability",
         "entropy": "entropy (nat)",
     }[layer]
-
-
-def symbol(name: str, unit: str = "1") -> str:
-    """Return the symbol of a parameter with its unit, a blank between them."""
-    own = _SYMBOLS.get(name) or _SI_SYMBOLS.get(name, (name, ""))[0]
-    return own if unit in ("", "1") else f"{own} ({unit})"
-
-
-def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
-    """Return the model's parameters in one line, in its units, then its effects.
-
-    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
-    there is no frequency and no phase; nor do those of ``without``, which vary.
-    """
-    without = {LABORATORY.get(name, name) for name in without}
-    driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
-    units = Units.of(attrs)
-    symbols = _SI_SYMBOLS if units.si else {key: (text, "") for key, text in _SYMBOLS.items()}
-    always = {"w0", "gamma", "c_over_m", "p", *(("omega", "Omega") if driven else ())}
-    never = set(without) | (set() if driven else {"omega", "phase", "Omega", "phi"})
-    never |= {COUNTERPARTS[name][0] for name in without if name in COUNTERPARTS}
-    parts = [
-        f"{symbol} = {float(attrs[key]):.6g} {unit}".rstrip().replace("-", "\N{MINUS SIGN}")
-        for key, (symbol, unit) in symbols.items()
-        if key in attrs and key not in never and (key in always or float(attrs[key]) != 0.0)
-    ]
-    acting = [effect.title(units, without) for effect in effects_of(attrs)]
-    said = ",  ".join(text.replace("_", " ").replace("-", "\N{MINUS SIGN}") for text in acting)
-    return ";   ".join([",  ".join(parts), *([said] if said else [])])

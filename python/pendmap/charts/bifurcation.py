@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts import basins, names, palette, plane
-from pendmap.charts.chart import QUIET, Axis, Chart, Image, Level, Mark, Panel, Points
+from pendmap.charts import names, palette, plane
+from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
 from pendmap.errors import InputError
 from pendmap.units import Units
 
@@ -52,7 +53,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     if shown not in _LAYERS:
         raise InputError(f"layer must be one of {', '.join(_LAYERS)} in a diagram, got {shown!r}")
     own = str(dataset.attrs["varied"])
-    name = basins.symbol(own, str(dataset[own].attrs.get("units", "1")))
+    name = names.symbol(own, str(dataset[own].attrs.get("units", "1")))
     ends = plane.outer_edges(dataset, own)
     every = families(dataset)
     units = Units.of(dataset.attrs)
@@ -74,7 +75,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Panel("exponent", "", across, rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
-    fixed = basins.parameters(dataset.attrs, [own])
+    fixed = names.parameters(dataset.attrs, [own])
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",

@@ -1,8 +1,7 @@
 """Charts: what a picture shows, as arrays and plain values; every renderer draws any chart.
 
-A chart has panels, a panel two axes and marks. Marks stand in the units of their axes. Where a mark
-has a ``name``, a legend names it; marks of one name share a line there. Where it has a ``path``, a
-recording holds it there, below the data of its panel. No drawing library is imported here.
+A chart has panels, a panel two axes and marks (:mod:`pendmap.charts.marks`), a sheet several
+charts. No drawing library is imported here.
 """
 
 from __future__ import annotations
@@ -12,22 +11,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
-Floats = npt.NDArray[np.float64]
-Dash = str | tuple[float, ...]
-Ends = tuple[float, float]
+    import numpy.typing as npt
 
-INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
-"""Colours of text and axes, of what is secondary, and of warnings."""
-
-DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)
-"""Dashes: lengths of lines and gaps, in widths of the line."""
+    from pendmap.charts.marks import Ends, Mark
 
 
 @dataclass(frozen=True)
@@ -45,144 +37,6 @@ class Axis:
     straight: float = 0.0
     factor: float = 1.0
     ticks: Sequence[tuple[float, str]] | None = None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Mark:
-    """Attributes of all marks; a mark of higher ``order`` covers the others."""
-
-    colour: str = INK
-    name: str = ""
-    path: str = ""
-    order: float | None = None
-    alpha: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Line(Mark):
-    """A line through points, broken where they are not numbers; ``halo`` is a colour around it."""
-
-    x: Floats
-    y: Floats
-    _: dataclasses.KW_ONLY
-    width: float = 1.2
-    dash: Dash = "-"
-    step: bool = False
-    halo: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Points(Mark):
-    """Separate points; ``fill`` and ``edge`` are by default the colour."""
-
-    x: Floats
-    y: Floats
-    _: dataclasses.KW_ONLY
-    marker: str = "o"
-    size: float = 3.0
-    fill: str = ""
-    edge: str = ""
-    edge_width: float = 0.0
-    halo: str = ""
-    clip: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Band(Mark):
-    """The area between two curves."""
-
-    x: Floats
-    low: Floats
-    high: Floats
-    _: dataclasses.KW_ONLY
-    step: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Steps(Mark):
-    """A histogram, ``n`` values over ``n + 1`` edges: its outline, or its area."""
-
-    edges: Floats
-    values: Floats
-    _: dataclasses.KW_ONLY
-    filled: bool = False
-    width: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Areas(Mark):
-    """Polygons, shape (m, 2) each; hatched, or full."""
-
-    shapes: Sequence[Floats]
-    _: dataclasses.KW_ONLY
-    hatch: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Colours:
-    """How an image's values become colours, and the name of the bar beside it.
-
-    ``scale`` is ``linear``, ``log``, ``centred`` (two halves about 0) or ``counts`` (whole numbers
-    in steps); ``beyond`` says which ends values exceed.
-    """
-
-    name: str
-    map: str
-    low: float
-    high: float
-    scale: Literal["linear", "log", "centred", "counts"] = "linear"
-    beyond: Literal["neither", "min", "max", "both"] = "neither"
-    ticks: Sequence[float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Image(Mark):
-    """Cells, row 0 lowest, between the ends of both axes.
-
-    ``values`` are numbers, shape (rows, columns), nan where there is none, and ``colours`` how they
-    are coloured; or they are numbers of ``classes``, pairs of name and colour.
-    """
-
-    values: npt.NDArray[Any]
-    x: Ends
-    y: Ends
-    _: dataclasses.KW_ONLY
-    colours: Colours | None = None
-    classes: Sequence[tuple[str, str]] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Level(Mark):
-    """A line across the panel at a value of one axis."""
-
-    value: float
-    _: dataclasses.KW_ONLY
-    axis: Literal["x", "y"] = "y"
-    width: float = 0.7
-    dash: Dash = "-"
-
-
-@dataclass(frozen=True, eq=False)
-class Span(Mark):
-    """Stretches of one axis, shaded across the panel, shape (n, 2)."""
-
-    ends: npt.ArrayLike
-    _: dataclasses.KW_ONLY
-    axis: Literal["x", "y"] = "x"
-
-
-@dataclass(frozen=True, eq=False)
-class Text(Mark):
-    """Words at a place, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
-
-    x: float
-    y: float
-    text: str
-    _: dataclasses.KW_ONLY
-    inside: bool = False
-    align: tuple[str, str] = ("center", "center")
-    boxed: bool = False
-    size: float = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +58,6 @@ class Panel:
     share: float = 1.0
     note: Sequence[tuple[str, str]] = ()
     bare: bool = False
-    least: float = 0.0
 
     @property
     def where(self) -> str:
@@ -218,9 +71,9 @@ class Chart:
 
     ``rows`` are the names of the panels that a figure shows, from the top, by default all in one;
     ``heights`` are the shares of the rows, ``ratio`` the height of a panel over its width, and
-    ``size`` the inches of the figure where it goes by these. Rows of fewer panels than ``columns``
-    are not filled. A recording shows all panels: one at a
-    time as ``tabs``, or below one another; ``remark`` ends its legend.
+    ``size`` the inches of the figure where it has a size. Rows of fewer panels than ``columns``
+    are not filled. A recording shows all panels: one at a time as ``tabs``, or below one another;
+    ``remark`` ends its legend.
     """
 
     title: str
@@ -236,7 +89,18 @@ class Chart:
     tabs: bool = False
     remark: str = ""
     notes: Sequence[str] = ()
-    legend: Literal["below", "above", "none"] = "below"
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        subtitle: str,
+        rows: Sequence[Sequence[Panel]],
+        **look: Any,  # noqa: ANN401 (fields of a chart)
+    ) -> Chart:
+        """Return a chart of which a figure shows these rows of panels."""
+        names = [[panel.name for panel in row] for row in rows]
+        return cls(title, subtitle, [panel for row in rows for panel in row], rows=names, **look)
 
     def panel(self, name: str) -> Panel:
         """Return the panel of a name."""
@@ -250,13 +114,7 @@ class Chart:
         return [[self.panel(name) for name in row] for row in self.rows]
 
     def only(self, layer: str | None, size: Ends | None = None) -> Chart:
-        """Return the chart with one of its panels alone, all of it without a name.
-
-        Raises
-        ------
-        InputError
-            If it has no panel of that name.
-        """
+        """Return the chart with one of its panels alone, all of it without a name."""
         if layer is None:
             return self
         known = [panel.name for row in self.shown for panel in row]
@@ -267,19 +125,23 @@ class Chart:
         return dataclasses.replace(self, rows=((layer,),), heights=(), size=size)
 
 
-def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
-    """Return lines, shape (n, 2) each, as one that is broken between them: x and y."""
-    gap = np.full((1, 2), np.nan)
-    parts = [part for line in lines for part in (line, gap)]
-    both = np.concatenate([np.empty((0, 2)), *parts])
-    return both[:, 0], both[:, 1]
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Charts in columns under one title: the title of each is a heading, its size in inches.
+
+    One ``legend`` at the top names the marks of all charts; else each chart has its own.
+    """
+
+    title: str
+    subtitle: str
+    columns: Sequence[Sequence[Chart]]
+    _: dataclasses.KW_ONLY
+    legend: bool = False
 
 
-def bars(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Floats, Floats]:
-    """Return upright bars from low to high as one broken line: x and y."""
-    at, bottom, top = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, low, high)))
-    gap = np.full(at.shape, np.nan)
-    return np.repeat(at, 3), np.stack([bottom, top, gap], axis=1).ravel()
+def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
+    """Return a panel without a frame, 1 wide and ``high`` from the top down."""
+    return Panel(name, "", Axis("", (0.0, 1.0)), Axis("", (high, 0.0)), marks, bare=True)
 
 
 def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:

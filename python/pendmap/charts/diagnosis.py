@@ -2,37 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Band,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    bars,
-    holding,
-)
-from pendmap.charts.methods import NOISE, look
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
+from pendmap.charts.identification import errors_of
+from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
+from pendmap.charts.methods import NOISE, Z95, look
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from pendmap.charts.marks import Floats
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-
-Floats = npt.NDArray[np.float64]
 
 ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"
 """Unit of a torque per moment of inertia."""
@@ -47,13 +35,14 @@ OVER_SAID: Final = {
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 """Candidates that are not told apart from what was found, and all others."""
-Z95: Final = 1.959963984540054
 RUNS: Final = 3
 """Runs whose residuals are drawn: those that the baseline misses most."""
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged: what a model lacks is slower."""
 WIDE: Final = 8.0
 """Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
+CYCLES: Final = 3
+"""Free runs in figure 7: those held out first, then the longest."""
 RANKED: Final = 8
 """Candidates in the ranking."""
 SIZE: Final = (8.6, 12.2)
@@ -78,56 +67,52 @@ def sheet(found: Discrepancy) -> Chart:
     # One run has nothing to be compared with.
     last = coefficients(found, shown[0]) if shown else torque(found, "amplitude")
     rows.append([ranking(found), last])
-    return _of_rows(_title(found), subtitle, rows, [*heights, 1.2, 1.2, 1.5], SIZE)
-
-
-def _of_rows(
-    title: str,
-    subtitle: str,
-    rows: Sequence[Sequence[Panel]],
-    heights: Sequence[float],
-    size: tuple[float, float],
-) -> Chart:
-    return Chart(
-        title,
-        subtitle,
-        [panel for row in rows for panel in row],
-        rows=[[panel.name for panel in row] for row in rows],
-        heights=heights,
-        size=size,
-        letters=False,
-    )
+    heights += [1.2, 1.2, 1.5]
+    look = {"heights": heights, "size": SIZE, "letters": False}
+    return Chart.of(_title(found), subtitle, rows, **look)
 
 
 def parts(found: Discrepancy) -> dict[str, Chart]:
     """Return the charts of a report by the names that it has for them, those that show anything."""
     made: dict[str, Chart] = {}
-    rows: list[list[Panel]] = [[panel] for panel in residuals(found)]
-    said = "the runs that the baseline misses most"
-    made["residuals"] = _of_rows("Residuals", said, rows, [1.0] * len(rows), (8.6, 4.2))
+
+    def add(name: str, title: str, said: str, rows: list[list[Panel]], high: float) -> None:
+        made[name] = Chart.of(title, said, rows, size=(SIZE[0], high), letters=False)
+
+    rows = [[panel] for panel in residuals(found)]
+    add("residuals", "Residuals", "the runs that the baseline misses most", rows, 4.2)
     starts = " and ".join(f"{one.starts} {one.kind}" for one in found.forecasts)
     said = f"forecasts from {starts} starts on what was held out" if starts else ""
     panels = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
-    made["gap"] = _of_rows("The gap", said, [panels], [1.0], (8.6, 3.7))
+    add("gap", "The gap", said, [panels], 3.7)
     over = [name for name in OVER_SAID if _torque_rows(found, name)]
     if over:
-        pairs = [over[k : k + 2] for k in range(0, len(over), 2)]
-        rows = [[torque(found, name) for name in pair] for pair in pairs]
-        made["torque"] = _of_rows(
-            "Torque that the model lacks",
-            "per moment of inertia; bands: 95 %",
-            rows,
-            [1.0] * len(rows),
-            (8.6, 1.1 + 2.3 * len(rows)),
-        )
+        said = "per moment of inertia; bands: 95 %"
+        panels = [torque(found, name) for name in over]
+        rows = [panels[k : k + 2] for k in range(0, len(over), 2)]
+        add("torque", "Torque that the model lacks", said, rows, 1.1 + 2.3 * len(rows))
     if found.scores.best():
         said = "what each effect of the library would explain by itself"
-        made["ranking"] = _of_rows("Ranking", said, [[ranking(found)]], [1.0], (8.6, 3.5))
+        add("ranking", "Ranking", said, [[ranking(found)]], 3.5)
     shown = shown_coefficients(found)
     if shown:
         panels = [coefficients(found, name) for name in shown]
-        made["runs"] = _of_rows("Run by run", "bars and band: 95 %", [panels], [1.0], (8.6, 3.5))
+        add("runs", "Run by run", "bars and band: 95 %", [panels], 3.5)
     return made
+
+
+def cycles(found: Discrepancy) -> Sheet | None:
+    """Return errors of simulated periods and peaks, of both models, for each free run."""
+    runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
+    charts = []
+    for one in runs:
+        errors = one.errors
+        if not found.adds:
+            errors = {"baseline": errors["before"]} if "before" in errors else {}
+        title = one.name + (", held out" if one.held_out else "")
+        charts.append(dataclasses.replace(errors_of(errors, one.peaks, title), size=(8.6, 3.0)))
+    said = "from the first measured peak on"
+    return Sheet("Simulated periods and peaks", said, [charts]) if charts else None
 
 
 def _title(found: Discrepancy) -> str:

@@ -1,81 +1,364 @@
-"""Table 1 of a record as words: what each method finds, and what its simulation misses."""
+"""An identification: figures 4 to 7 of the paper and its table 1, for one record."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+import textwrap
+from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.charts.methods import look
+import numpy as np
+
+from pendmap.analysis.trajectory import simulate
+from pendmap.charts import decrement, half_cycles, names
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
+from pendmap.charts.methods import MEASURED, MINUS, NOISE, NOISE_SAID, Z95, drawn, look, nothing
+from pendmap.errors import InputError
 from pendmap.formatting import estimate_text
+from pendmap.identification.methods.registry import BEST
+from pendmap.identification.table1 import first_state, simulated_peaks
+from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
-    from pendmap.identification import IdentificationReport
+    from collections.abc import Callable, Mapping, Sequence
 
+    from pendmap.charts.half_cycles import Course
+    from pendmap.charts.marks import Floats
+    from pendmap.identification import IdentificationReport, PeakErrors, Peaks
+    from pendmap.identification.methods.joint import JointFit
+    from pendmap.model import Rig
+    from pendmap.records import Run
 
-QUANTITIES: Final = (("w0", "w0 (rad/s)"), ("c_over_m", "c/m (1/s)"), ("Tr", "Tr (rad/s\u00b2)"))
-"""What methods find: the name in a report, and that of the column."""
-MINUS: Final = "\N{MINUS SIGN}"
-"""How numbers in pictures are written."""
+WIDTH: Final = 8.6
+"""Inches across a column."""
+NEAR: Final = 5
+"""Half cycles of the near views."""
+SAMPLES: Final = 64
+"""Samples of a simulation in a swing."""
+MOST: Final = 6_000
+"""Residuals that are drawn."""
+DOTS: Final = 150
+"""Readings of a near view that are drawn."""
+LINE: Final = 0.2
+"""Inches of a row of the table."""
+LETTERS: Final = 110
+"""Letters of a line below the table."""
 RESTS: Final = "at rest"
-"""What stands for an error where a simulation has come to rest before."""
-_MANY: Final = 100.0
-_FEW: Final = 1e-3
+"""Entry of an error where a simulation has come to rest before."""
+NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
+QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s\u00b2)"}
+"""Estimates in the table, and the heads of their columns."""
+
+
+def sheet(
+    report: IdentificationReport,
+    *,
+    parts: Sequence[str] | None = None,
+    title: str | None = None,
+    subtitle: str | None = None,
+) -> Sheet:
+    """Return the parts in one column; more than two in two columns of nearly equal height."""
+    wanted = list(PARTS) if parts is None else list(parts)
+    unknown = [name for name in wanted if name not in PARTS]
+    if unknown or not wanted:
+        what = repr(unknown[0]) if unknown else "nothing"
+        raise InputError(f"parts must be among {', '.join(PARTS)}, got {what}")
+    charts = [make(report) for name, make in PARTS.items() if name in wanted]
+    if title is not None and len(charts) == 1:
+        charts = [dataclasses.replace(charts[0], title="")]
+    columns = [charts]
+    if len(charts) > 2:  # noqa: PLR2004
+        cuts = ((charts[:k], charts[k:]) for k in range(1, len(charts)))
+        columns = list(min(cuts, key=lambda both: max(map(_high, both))))
+    said = _said(report) if subtitle is None else subtitle
+    return Sheet(title or f"Identification: {report.run.name}", said, columns)
+
+
+def _high(column: Sequence[Chart]) -> float:
+    return sum(chart.size[1] for chart in column if chart.size)
+
+
+def _said(report: IdentificationReport) -> str:
+    """Return what was measured, in a line."""
+    run, peaks = report.run, report.peaks
+    if run.peaks_only:
+        return f"{len(peaks)} peaks, {span(run.time)}"
+    noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
+    if len(report.runs) > 1:
+        fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
+        return f"{fitted};   {span(run.time)}, {len(peaks)} peaks, {noise}"
+    used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
+    return f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {len(peaks)} peaks, {noise}"
+
+
+# The decay of each model beside the measured one: figure 6.
+
+
+@dataclasses.dataclass(frozen=True)
+class Decay:
+    """A model simulated from the first peak of a record, as the sensor would show it: s, rad."""
+
+    peak_time: Floats
+    peak: Floats
+    time: Floats
+    theta: Floats
+
+    @classmethod
+    def of(cls, rig: Rig, peaks: Peaks, zero: float) -> Decay:
+        """Return the simulation of a model whose sensor has a zero error, rad."""
+        turned, start = peaks.turned, first_state(peaks)
+        begun = dataclasses.replace(start, theta=start.theta - zero)
+        last = float(turned.time[-1])
+        peak_time, peak = simulated_peaks(rig, begun, last)
+        until = max(last - start.time, 1e-3) * 1.01
+        run = simulate(rig, begun.theta, 0.0, until, samples=SAMPLES)
+        time, theta = run["time"].values + start.time, run["theta"].values + zero
+        return cls(peak_time, peak + zero, time, theta)
+
+
+def _decays(report: IdentificationReport) -> dict[str, Decay]:
+    """Return the simulation of each method's model; none where there is too little to compare."""
+    if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
+        return {}
+    made = {}
+    for name in drawn(report.methods):
+        found = report.methods[name]
+        if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
+            continue
+        rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
+        zero = found["offset"] if "offset" in found.estimates else 0.0
+        made[name] = Decay.of(rig, report.peaks, zero)
+    return made
+
+
+def _line(x: Floats, y: Floats, method: str, width: float) -> Line:
+    one = look(method)
+    return Line(x, y, colour=one.colour, dash=one.dash, width=width, name=one.label)
+
+
+def decays(report: IdentificationReport) -> Chart:
+    """Return peaks, their differences, near views and residuals of every model."""
+    title = "The decay by each model"
+    made, run, turned = _decays(report), report.run, report.peaks.turned
+    last = [] if report.joint is None else [_left(report, report.joint)]
+    if not made:
+        chart = nothing(title, report.table.left_out or NOTHING)
+        if not (report.table.left_out and last):
+            return chart
+        rows = [["nothing"], ["residual"]]
+        both = [*chart.panels, *last]
+        return dataclasses.replace(chart, panels=both, rows=rows, size=(WIDTH, 2.6))
+    ends = holding(turned.time, margin=0.01)
+    course = half_cycles.course_of(run, report.peaks)
+    spans = half_cycles.first_and_last(turned, NEAR)
+    said = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
+    near = [_near(course, made, *one, only=run.peaks_only) for one in zip(said, spans, strict=True)]
+    shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
+    shown += [last] if last else []
+    heights, size = (1.7, 1.35, 1.5, 0.75)[: len(shown)], (WIDTH, 6.3 + 1.3 * len(last))
+    return Chart.of(title, "", shown, heights=heights, size=size)
+
+
+def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
+    size = np.abs(turned.amplitude)
+    spots: dict[str, Any] = {"colour": MEASURED, "size": 2.4, "order": 5.0, "name": "measured"}
+    marks: list[Mark] = [Points(turned.time, size, **spots)]
+    marks += [_line(one.peak_time, np.abs(one.peak), name, 1.3) for name, one in made.items()]
+    up = Axis("peak |\N{GREEK SMALL LETTER THETA}| (rad)", (0.0, 1.06 * float(size.max())))
+    title = "peaks, simulated from the first one on"
+    return Panel("peaks", title, Axis("", ends, ticks=()), up, marks)
+
+
+def _differences(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
+    """Return what each simulated peak is larger than the measured one of its number."""
+    number = turned.index - turned.index[0]
+    curves, marks = [], _noise(turned.time, 1e3 * Z95 * turned.stderr_amplitude)
+    for name, one in made.items():
+        simulated = np.full(int(number[-1]) + 1, math.nan)
+        count = min(simulated.size, one.peak.size)
+        simulated[:count] = np.abs(one.peak[:count])
+        away = 1e3 * (simulated[number] - np.abs(turned.amplitude))
+        curves.append(away[1:])
+        marks.append(_line(turned.time[1:], away[1:], name, 1.2))
+    least = 1e3 * float(np.median(turned.stderr_amplitude))
+    least = least if 0 < least < math.inf else 1e-12
+    up, lines = names.signed(curves, "difference (mrad)", least=least)
+    title = "simulated less measured peak"
+    return Panel("differences", title, Axis(names.TIME, ends), up, [*marks, *lines])
+
+
+def _noise(x: Floats, error: Floats) -> list[Mark]:
+    """Return the band of the noise about 0, with a name where it is known."""
+    name = NOISE_SAID if np.any(error > 0) else ""
+    return [Band(x, -error, error, colour=NOISE, order=0.0, name=name)]
+
+
+def _near(
+    course: Course,
+    made: Mapping[str, Decay],
+    title: str,
+    ends: tuple[float, float],
+    *,
+    only: bool,
+) -> Panel:
+    inside = np.flatnonzero((course.time >= ends[0]) & (course.time <= ends[1]))
+    inside = inside[:: 1 if only else max(1, inside.size // DOTS)]
+    time, theta = course.time[inside], course.theta[inside]
+    size = 4.0 if only else 1.5
+    marks: list[Mark] = [Points(time, theta, colour=MEASURED, size=size, order=5.0)]
+    values = [theta]
+    for name, one in made.items():
+        shown = (one.time >= ends[0]) & (one.time <= ends[1])
+        marks.append(_line(one.time[shown], one.theta[shown], name, 1.1))
+        values.append(one.theta[shown])
+    # A model that decays too slowly would make the measured swing a line.
+    bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
+    up = names.angle(holding(np.clip(np.concatenate(values), -bound, bound)))
+    return Panel(title, title, Axis(names.TIME, ends), up, marks)
+
+
+def _left(report: IdentificationReport, joint: JointFit) -> Panel:
+    residual, sigma = joint.fit.residuals[0], joint.readings[0].sigma
+    title = "the record less the trajectory fitted to it"
+    return residuals(report.run, residual, sigma, BEST, title)
+
+
+def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
+    """Return the residuals of a model over a record, with its noise as lines.
+
+    Of a gyroscope they are the rates that it reads.
+    """
+    gyroscope = run.gyroscope
+    size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
+    away = size * np.where(run.trusted, residual, np.nan)
+    every, noise = max(1, away.size // MOST), size * sigma
+    known = np.abs(away[np.isfinite(away)])
+    top = max(1.4 * float(np.percentile(known, 99.5)), 1.6 * noise) if known.size else noise
+    dots: dict[str, Any] = {"colour": look(method).colour, "size": 1.2}
+    marks: list[Mark] = [Points(run.time[::every], away[::every], **dots)]
+    lines: dict[str, Any] = {"colour": MEASURED, "width": 0.8, "dash": "--"}
+    name = "standard deviation of its noise"
+    marks += [Level(end, name=name, **lines) for end in (-noise, noise)]
+    return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
+
+
+# The error of each simulated period and peak: figure 7.
+
+
+def errors(report: IdentificationReport) -> Chart:
+    """Return the errors of every model."""
+    title, known = "What simulated periods and peaks miss of the measured ones", report.table.errors
+    if report.table.left_out:
+        return nothing(title, report.table.left_out)
+    return errors_of({name: known[name] for name in drawn(known)}, report.peaks, title)
+
+
+def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Chart:
+    """Return the errors of periods and peaks by model."""
+    if not known:
+        return nothing(title, NOTHING)
+    said = ("of each period", "of each peak; time runs to the left")
+    return Chart(title, "", error_panels(known, peaks, said), size=(WIDTH, 3.6))
+
+
+def error_panels(
+    known: Mapping[str, PeakErrors], peaks: Peaks, titles: tuple[str, str]
+) -> list[Panel]:
+    """Return the errors of periods and peaks, percent, over the band of the noise of the peaks."""
+    some, turned = next(iter(known.values())), peaks.turned
+    at = np.searchsorted(turned.time, some.period_time)
+    variance = turned.stderr_time**2
+    error = Z95 * 100 * np.sqrt(variance[at] + variance[at + 2]) / some.period
+    order = np.argsort(some.peak)
+    wide = Z95 * 100 * (turned.stderr_amplitude / some.peak)[order]
+    ends = (max(float(np.min(some.peak[1:])), 1e-9) / 1.15, float(np.max(some.peak[1:])) * 1.15)
+    size = Axis("measured peak |\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
+    time = holding(some.period_time, margin=0.02)
+    panels: list[Panel] = []
+    for name, across, noise, curves in (
+        (
+            "periods",
+            Axis(names.TIME, time),
+            _noise(some.period_time, error),
+            {name: (each.period_time, each.period_error) for name, each in known.items()},
+        ),
+        (
+            "peaks",
+            size,
+            _noise(some.peak[order], wide),
+            {name: (each.peak[1:], each.peak_error[1:]) for name, each in known.items()},
+        ),
+    ):
+        up, lines = names.signed([y for _, y in curves.values()], "error (%)")
+        own = [_line(*curve, method, 1.1) for method, curve in curves.items()]
+        title = titles[len(panels)]
+        panels.append(Panel(f"{name} {title}", title, across, up, [*noise, *own, *lines]))
+    return panels
+
+
+# Table 1.
 
 
 def columns(report: IdentificationReport) -> list[str]:
     """Return the names of the columns."""
-    errors = [
-        f"period {row.measured:.3g} s" if row.what == "period" else f"peak {row.measured:.3g} rad"
-        for row in report.table.rows
-    ]
+    units = {"period": "s", "peak": "rad"}
+    measured = [f"{row.what} {row.measured:.3g} {units[row.what]}" for row in report.table.rows]
     overall = [] if report.table.left_out else ["periods, rms", "peaks, rms"]
-    return ["method", *(said for _, said in QUANTITIES), *errors, *overall]
+    return ["method", *QUANTITIES.values(), *measured, *overall]
 
 
 def rows(report: IdentificationReport) -> list[list[str]]:
     """Return a row for each method that can be applied; errors in percent, absolute."""
-    made = []
+    made, dash = [], "\N{EN DASH}"
     for name, found in report.methods.items():
         if not found.applicable:
             continue
-        cells = [look(name).label]
-        cells += [
-            estimate_text(found.estimates[key], minus=MINUS)
-            if key in found.estimates
-            else "\N{EN DASH}"
-            for key, _ in QUANTITIES
-        ]
+        known = [found.estimates.get(key) for key in QUANTITIES]
+        cells = [dash if one is None else estimate_text(one, minus=MINUS) for one in known]
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
         if not report.table.left_out:
             errors = report.table.errors.get(name)
-            cells += (
-                ["\N{EN DASH}"] * 2
-                if errors is None
-                else [
-                    _percent(errors.period_rms),
-                    _percent(errors.peak_rms),
-                ]
-            )
-        made.append(cells)
-    return made
-
-
-def refused(report: IdentificationReport) -> list[tuple[str, str]]:
-    """Return the methods that cannot be applied, and why."""
-    made = []
-    for name, found in report.methods.items():
-        if not found.applicable:
-            why = found.warnings[-1] if found.warnings else "not applicable"
-            made.append((look(name).label, why))
+            overall = () if errors is None else (errors.period_rms, errors.peak_rms)
+            cells += [_percent(error) for error in overall] or [dash, dash]
+        made.append([look(name).label, *cells])
     return made
 
 
 def _percent(value: float) -> str:
-    """Return three digits, or that the simulation rests by then."""
+    """Return three digits without an exponent, or that the simulation rests by then."""
     if math.isnan(value):
         return RESTS
-    if value >= _MANY:
-        return f"{value:.0f}"
-    if value >= _FEW or value == 0:
-        return f"{value:.3g}"
-    return f"{value:.0e}"
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"  # noqa: PLR2004
+
+
+def table(report: IdentificationReport) -> Chart:
+    """Return table 1 of a record, and beneath it the methods that cannot be applied and why."""
+    head = [name.replace(" ", "\n", 1) if " " in name else f"\n{name}" for name in columns(report)]
+    body = rows(report)
+    notes = ["in brackets: standard error of the last digits"] if body else []
+    if any(RESTS in row for row in body):
+        notes[0] += f";   {RESTS}: the simulation stands still by then"
+    for name, found in report.methods.items():
+        if not found.applicable:
+            why = found.warnings[-1] if found.warnings else "not applicable"
+            notes += textwrap.wrap(f"{look(name).label}: {why}", LETTERS, subsequent_indent="    ")
+    down = 2.5 + len(body)
+    words = [
+        Text(0.0, down + k, text, colour=QUIET, align=("left", "bottom"), size=8.0)
+        for k, text in enumerate(notes)
+    ]
+    high = down + len(notes) - 0.9
+    panel = bare("table", Table(head, body), *words, high=high)
+    title = "Damping by each method, and what its simulation misses (%)"
+    return Chart(title, "", [panel], size=(WIDTH, 0.55 + LINE * high))
+
+
+PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {
+    "record": half_cycles.part,
+    "decrement": decrement.part,
+    "decay": decays,
+    "errors": errors,
+    "table": table,
+}
+"""Parts of the sheet by the names a user types: figures 4, 5, 6, 7 and table 1."""

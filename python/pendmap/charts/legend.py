@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import palette
+from pendmap.formatting import with_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,8 +89,7 @@ def percent(share: float, stderr: float = math.nan) -> str:
     """Return a share in percent, with as many digits as its standard error supports."""
     if not math.isfinite(stderr) or stderr <= 0:
         return f"{100 * share:.3g} %"
-    digits = max(0, min(6, 1 - math.floor(math.log10(100 * stderr))))
-    return f"{100 * share:.{digits}f} \N{PLUS-MINUS SIGN} {100 * stderr:.{digits}f} %"
+    return with_error(100 * share, 100 * stderr, "\N{PLUS-MINUS SIGN}") + " %"
 
 
 def typeset(name: str) -> str:

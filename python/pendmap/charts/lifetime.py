@@ -9,30 +9,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import basins, palette
-from pendmap.charts.chart import (
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Dash,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    bars,
-)
+from pendmap.charts import names, palette
+from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
 from pendmap.formatting import counted, written
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-Floats = npt.NDArray[np.float64]
+    from pendmap.charts.marks import Floats
 
 SIGMAS: Final = 2.0
 """Standard errors on each side that a band covers."""
@@ -64,7 +50,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     if dataset.sizes["tail_begin"] > 1:
         panels.append(_tail(dataset))
     starts = counted(int(dataset.attrs["starts"]), "start")
-    subtitle = f"{basins.parameters(dataset.attrs)};   {starts}"
+    subtitle = f"{names.parameters(dataset.attrs)};   {starts}"
     size = (9.6 if len(panels) > 1 else 6.0, 4.6)
     return Chart(_title(dataset), subtitle, panels, size=size).only(layer, (6.0, 4.6))
 

@@ -6,34 +6,17 @@ import math
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from pendmap.charts import basins, names, palette, plane
-from pendmap.charts.chart import (
-    DASHED,
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    Steps,
-    holding,
-)
+from pendmap.charts import names, palette, plane
+from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import DASHED, INK, QUIET, Band, Level, Line, Mark, Points, Span, Steps
 from pendmap.formatting import counted, with_error
 from pendmap.units import Units
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-Floats = npt.NDArray[np.float64]
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
 _BINS: Final = 60
@@ -61,7 +44,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         panels.append(_attractor(dataset))
     return Chart(
         _title(dataset),
-        f"{basins.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        f"{names.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
         panels,
         rows=rows,
         size=(_WIDTHS[len(rows[0])], 4.3),

@@ -6,20 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.charts import basins
-from pendmap.charts.chart import (
-    INK,
-    QUIET,
-    Axis,
-    Band,
-    Chart,
-    Dash,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Text,
-)
+from pendmap.charts import names
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import INK, QUIET, Band, Dash, Line, Mark, Points, Text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +62,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     up = Axis("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g", (0.0, top))
     panel = Panel("melnikov", "", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
-    return Chart(title, basins.parameters(a), [panel], ratio=0.68).only(layer)
+    return Chart(title, names.parameters(a), [panel], ratio=0.68).only(layer)
 
 
 def _highest(p: np.ndarray, own: float) -> float:

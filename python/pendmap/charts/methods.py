@@ -1,36 +1,34 @@
-"""What methods of identification are called in pictures, and their colours."""
+"""Names and colours of methods of identification in pictures, and what their panels share."""
 
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from typing import TYPE_CHECKING, Final
+
+from pendmap.charts.chart import Chart, bare
+from pendmap.charts.marks import QUIET, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
 
 ODD: Final = "#d55e00"
 EVEN: Final = "#0072b2"
 """Half cycles that begin at a peak of odd or even number."""
 MEASURED: Final = "#222222"
-"""What was measured."""
+"""Colour of measured values."""
 NOISE: Final = "#d9d9d9"
-"""Name of the band that the noise of the readings explains."""
+NOISE_SAID: Final = "95 % of the readings' noise"
+"""Colour and name of the band that the noise of the readings explains."""
+MINUS: Final = "\N{MINUS SIGN}"
+"""Sign of negative numbers in pictures."""
+Z95: Final = 1.959963984540054
+"""Half the width of a 95 % interval, in standard errors."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """How a method is drawn.
-
-    Parameters
-    ----------
-    label : str
-        What it is called in a legend.
-    colour : str
-        ``#rrggbb``.
-    dash : str
-        Dashes of its line, as matplotlib writes them; lines that lie on one another stay visible.
-    """
+    """Name in a legend, colour ``#rrggbb`` and dash of a method's line, as matplotlib writes it."""
 
     label: str
     colour: str
@@ -58,7 +56,7 @@ _READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
 
 
 def look(method: str) -> Look:
-    """Return how a method is drawn; one that nobody knows is grey and has its own name."""
+    """Return the look of a method; an unknown one is grey, under its own name."""
     return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
 
 
@@ -67,3 +65,10 @@ def drawn(methods: Iterable[str]) -> list[str]:
     there = list(methods)
     printed = [name for name in _READINGS if name in there][:1]
     return [name for name in there if name not in _READINGS or name in printed]
+
+
+def nothing(title: str, why: str, letters: int = 90) -> Chart:
+    """Return a chart that says why there is nothing to draw, in lines of at most ``letters``."""
+    why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
+    words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
+    return Chart(title, "", [bare("nothing", words)], size=(8.6, 0.9))

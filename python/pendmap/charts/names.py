@@ -1,21 +1,47 @@
-"""What the axes of pictures are called, in the units of the dataset."""
+"""Names of axes and parameters in the units of a result, and the axes that many panels share."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import math
+from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.charts.chart import Axis
+import numpy as np
+
+from pendmap.charts import plane
+from pendmap.charts.chart import Axis, holding
+from pendmap.charts.marks import DOTTED, QUIET, Level, Mark
+from pendmap.model import effects_of
+from pendmap.model.labels import LABELS, unit_of
+from pendmap.model.quantities import COUNTERPARTS
+from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from pendmap.charts.chart import Ends
-    from pendmap.units import Units
+    from collections.abc import Collection, Mapping, Sequence
 
+    from pendmap.charts.marks import Ends, Floats
 
 _TAU: Final = "\N{GREEK SMALL LETTER TAU}"
 _THETA: Final = "\N{GREEK SMALL LETTER THETA}"
 
 ANGLE: Final = f"{_THETA} (rad)"
 """The angle, with its unit."""
+TIME: Final = "t (s)"
+"""Time in SI, with its unit."""
+_TURN: Final = 2.0
+"""Range of angles from which multiples of pi are their labels, rad."""
+_LONG: Final = 5
+"""Characters of a label beyond which an axis is in thousandths of its unit."""
+_MOSTLY: Final = 95
+"""Percent of the curve nearest to 0 in the straight part of a signed logarithmic axis."""
+_NEAR: Final = 12.0
+"""Reach of an axis, over its straight part, up to which it is not logarithmic."""
+_BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
+_SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
+"""Parameters of a model without dimensions and of one in SI, in the order of a subtitle."""
+_ALWAYS: Final = ("w0", "gamma", "c_over_m", "p", "omega", "Omega")
+"""Parameters that a subtitle has even where they are 0."""
+_LABORATORY: Final = {"stroke_mm": "p", "frequency_hz": "Omega"}
+"""Quantities that a laboratory varies, and the parameter of a rig that each of them sets."""
 
 
 def velocity(units: Units) -> str:
@@ -30,7 +56,7 @@ def speed(units: Units) -> str:
 
 def clock(units: Units) -> str:
     """Return the symbol of time with its unit, a blank between them."""
-    return "t (s)" if units.si else _TAU
+    return TIME if units.si else _TAU
 
 
 def per_time(units: Units) -> str:
@@ -41,3 +67,67 @@ def per_time(units: Units) -> str:
 def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
     """Return the axes of the phase plane."""
     return Axis(ANGLE, theta, "angle"), Axis(speed(units), velocity)
+
+
+def symbol(name: str, unit: str = "1") -> str:
+    """Return the symbol of a parameter with its unit, a blank between them."""
+    own = LABELS[name].symbol if name in LABELS else name
+    return own if unit in ("", "1") else f"{own} ({unit})"
+
+
+def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
+    """Return the model's parameters in one line, in its units, then its effects.
+
+    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
+    there is no frequency and no phase; nor do those of ``without``, which vary.
+    """
+    without = {_LABORATORY.get(name, name) for name in without}
+    driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
+    units = Units.of(attrs)
+    never = without | (set() if driven else {"omega", "phase", "Omega", "phi"})
+    never |= {COUNTERPARTS[name][0] for name in without if name in COUNTERPARTS}
+    parts = [
+        f"{LABELS[key].symbol} = {float(attrs[key]):.6g} {unit_of(key) if units.si else ''}"
+        for key in (_SI if units.si else _BARE)
+        if key in attrs and key not in never and (key in _ALWAYS or float(attrs[key]) != 0.0)
+    ]
+    acting = [effect.title(units, without).replace("_", " ") for effect in effects_of(attrs)]
+    listed = (",  ".join(part.rstrip() for part in each) for each in (parts, acting) if each)
+    return ";   ".join(listed).replace("-", "\N{MINUS SIGN}")
+
+
+def seconds(time: Floats) -> Axis:
+    """Return the axis of these times of a record."""
+    return Axis(TIME, holding(time, margin=0.01))
+
+
+def angle(ends: Ends, name: str = ANGLE) -> Axis:
+    """Return the axis of an angle or a rate: multiples of pi if long, thousandths if short."""
+    if name == ANGLE and ends[1] - ends[0] > _TURN:
+        return Axis(name, ends, "angle")
+    _, labels = plane.short_ticks(*ends, angle=False)
+    if max((len(text) for _, text in labels), default=0) > _LONG:
+        return Axis(name.replace("(rad", "(mrad"), ends, factor=1e3)
+    return Axis(name, ends)
+
+
+def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:
+    """Return an axis with powers of ten on both sides of 0, and lines where it changes its scale.
+
+    Nearly all of the curve nearest to 0 lies in the straight part, which is at least ``least``: its
+    noise makes no towers. An axis that reaches little farther is straight.
+    """
+    known = [each[np.isfinite(each)] for each in curves]
+    known = [each for each in known if np.any(each != 0)]
+    if not known:
+        return Axis(name, (-1.0, 1.0)), []
+    inner = min(float(np.percentile(np.abs(each), _MOSTLY)) for each in known)
+    inner = 10.0 ** math.ceil(math.log10(max(inner, least)) - 0.3)
+    low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
+    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
+    if max(-low, high) <= _NEAR * inner:
+        return Axis(name, holding([low, high, 0.0])), [zero]
+    ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
+    bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
+    said = f"{name}\nlog beyond \N{PLUS-MINUS SIGN}{plane.power(inner)}"
+    return Axis(said, ends, "signed", straight=inner), [zero, *bends]

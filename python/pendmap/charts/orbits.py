@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import basins, names, palette, plane
-from pendmap.charts.chart import INK, QUIET, Chart, Line, Mark, Panel, Points
+from pendmap.charts import names, palette, plane
+from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.legend import typeset
+from pendmap.charts.marks import INK, QUIET, Line, Mark, Points
 from pendmap.formatting import counted
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-Floats = npt.NDArray[np.float64]
+    from pendmap.charts.marks import Floats
 
 MOST: Final = 16
 """Orbits that are named: of more the legend says how many there are."""
@@ -51,7 +51,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     low, high = (units.bare(end, VELOCITY) for end in velocity)
     return Chart(
         _title(dataset),
-        basins.parameters(dataset.attrs) + over,
+        names.parameters(dataset.attrs) + over,
         [Panel("phase", "", across, up, marks)],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         remark="" if dataset.sizes["orbit"] else "No orbit was found.",

@@ -1,4 +1,4 @@
-"""Colours that go by an attractor's name: the same attractor looks the same in every picture.
+"""Colours of attractors by their names: an attractor looks alike in every picture.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
@@ -119,7 +119,7 @@ _LAPS = (
     (0, 0.18, "slightly darker"),
     (255, 0.25, "slightly lighter"),
 )
-"""What a family's colours are mixed with when they begin again, how much, and in words."""
+"""Grey that a family's colours are mixed with when they begin again, its share, and in words."""
 
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
@@ -129,7 +129,7 @@ _MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
 
 @dataclass(frozen=True)
 class _Read:
-    """What a name tells: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
+    """Parts of a name: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
 
     kind: str
     n: int
@@ -139,25 +139,9 @@ class _Read:
 
 
 def colour(name: str, kind: str | None = None) -> str:
-    """Return the colour of an attractor.
+    """Return the colour ``#rrggbb`` of an attractor, of ``undecided`` or ``failed``, by its name.
 
-    Parameters
-    ----------
-    name : str
-        The attractor's name, such as ``"rotation 1:+1"``, ``"oscillation 1:0 (-)"`` or
-        ``"tumbling chaos"``; also ``"undecided"`` and ``"failed"``.
-    kind : str, optional
-        Its kind, such as ``"rotation"``; needed only where the name does not begin with it.
-
-    Returns
-    -------
-    str
-        ``"#rrggbb"``, lower case. Equal for equal names, whatever else a map holds.
-
-    Examples
-    --------
-    >>> colour("rotation 1:+1"), colour("rotation 1:-1"), colour("rest")
-    ('#d55e00', '#0072b2', '#474747')
+    ``kind`` is needed only where the name does not begin with it.
     """
     return _shade(name, kind)[0]
 
@@ -213,18 +197,7 @@ def lap(name: str, kind: str | None = None) -> int:
 
 
 def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-    """Return colours for signed quantities: -1 and below dark blue, 0 white, 1 and above dark red.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        Quantities over the largest magnitude to be told apart.
-
-    Returns
-    -------
-    ndarray of uint8, shape (n, 3)
-        Red, green, blue; forward is red and backward blue, as with rotations.
-    """
+    """Return colours, shape (n, 3): -1 and below dark blue, 0 white, 1 and above dark red."""
     at = (np.clip(np.asarray(values, dtype=float), -1.0, 1.0) + 1.0) / 2.0 * (len(_DIVERGING) - 1)
     steps = np.arange(len(_DIVERGING))
     mixed = [np.interp(at, steps, _DIVERGING[:, channel]) for channel in range(3)]

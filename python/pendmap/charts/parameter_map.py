@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendmap.charts import basins, palette, plane, tongues
-from pendmap.charts.chart import Axis, Chart, Colours, Image, Line, Mark, Panel, together
+from pendmap.charts import names, palette, plane, tongues
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,9 +37,9 @@ _STRIPES: Final = 100
 _LEAST_HALF: Final = 0.05
 """Least part of the other one that a half of the exponents' scale reaches."""
 _MOST_COUNT: Final = 8
-"""Largest number with a colour of its own."""
+"""Largest number that has its own colour."""
 _MOST, _LEAST = 13, 0.002
-"""Kinds that are named: so many, and those in no fewer of the cells."""
+"""Greatest number of kinds that are named, and least share of the cells that they have."""
 
 _OTHERS = {"oscillation": "oscillation, other periods", "rotation": "rotation, others"}
 
@@ -157,7 +158,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     others = [one for one in _RECORDED if one in known and one not in leading]
     shown = [layer] if layer else [*leading, *others]
     varied = [str(dataset.attrs[which]) for which in ("columns", "rows")]
-    symbols = [basins.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in varied]
+    symbols = [names.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in varied]
     across, up = (plane.outer_edges(dataset, one) for one in varied)
     sides = Axis(symbols[0], across), Axis(symbols[1], up)
     lines = _curves(dataset)
@@ -166,7 +167,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         title = LAYERS.get(one, one) + ("; stripes: they coexist" if one == "kinds" else "")
         image = _image(dataset, one, across, up, cells)
         panels.append(Panel(one, title, *sides, [image, *lines]))
-    fixed = basins.parameters(dataset.attrs, varied)
+    fixed = names.parameters(dataset.attrs, varied)
     shape: tuple[Any, ...] = dataset["regime"].shape
     starts = int(dataset.attrs["starts"])
     size = f"{shape[1]} \N{MULTIPLICATION SIGN} {shape[0]} cells, {starts} starts each"

@@ -12,8 +12,8 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.charts.marks import Floats
 
-Floats = npt.NDArray[np.float64]
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
 
@@ -65,20 +65,11 @@ def outer_edges(dataset: xr.Dataset, name: str) -> tuple[float, float]:
 
 
 def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
-    """Return an array over cells as an image: each pixel has the cell that its centre lies in.
+    """Return an array over two rising axes as an image of at most ``limit`` pixels along each.
 
-    A pixel is a cell where cells are equally wide; else the narrowest has eight pixels. There are
-    at most ``limit`` along an axis, and they are chosen before anything is converted, so that a
-    large map is never copied whole.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        What the array is of, its axes rising.
-    array : xarray.DataArray
-        Values over two axes.
-    limit : int
-        Rows and columns at most.
+    Each pixel has the cell that its centre lies in. A pixel is a cell where cells are equally wide;
+    else the narrowest has eight. They are chosen before anything is converted: a large map is never
+    copied whole.
     """
     cells = {str(d): _cells(edges(dataset, str(d)), limit) for d in array.dims}
     return np.asarray(array.isel(cells).values)
@@ -171,6 +162,16 @@ def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
     return shift, make(low - shift, high - shift)
 
 
+def power(value: float) -> str:
+    """Return a label of a logarithmic axis, short for any power of ten."""
+    if value == 0:
+        return "0"
+    size = math.log10(abs(value))
+    if abs(size - round(size)) < 1e-9 and not -3 <= size <= 3:  # noqa: PLR2004
+        return f"${'-' * (value < 0)}10^{{{round(size)}}}$"
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}", value < 0)
+
+
 def shifted(name: str, shift: float) -> str:
     """Return an axis's name, symbol and unit with a blank between, with what is subtracted."""
     if not shift:
@@ -181,19 +182,9 @@ def shifted(name: str, shift: float) -> str:
 
 
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
-    """Return a curve on the cylinder, its angle wrapped to (-pi, pi] and cut where it wraps.
+    """Return a curve on the cylinder, shape (n + 3 m, 2), its angle wrapped to (-pi, pi].
 
-    Parameters
-    ----------
-    theta : array_like, shape (n,)
-        Angle in rad, unwrapped.
-    velocity : array_like, shape (n,)
-        Nondimensional velocity.
-
-    Returns
-    -------
-    ndarray, shape (n + 3 m, 2)
-        Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
+    Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
     """
     angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
     within = wrapped(angle)

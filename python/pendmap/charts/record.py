@@ -10,20 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names
-from pendmap.charts.chart import (
-    ALARM,
-    QUIET,
-    Axis,
-    Chart,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    Steps,
-    Text,
-    holding,
-)
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
 from pendmap.formatting import moment
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
@@ -31,9 +19,8 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import true_runs
 
 if TYPE_CHECKING:
+    from pendmap.charts.marks import Floats
     from pendmap.records import Experiment, Run
-
-Floats = npt.NDArray[np.float64]
 
 USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"
@@ -53,8 +40,6 @@ SHORT: Final = 2e-3
 """Share of the record under which a finding is a point, not a span."""
 WIDTH: Final = 8.6
 """Inches across a figure."""
-TURN: Final = 2.0
-"""Range of angles from which on multiples of pi are its labels, rad."""
 
 
 def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
@@ -99,11 +84,6 @@ def _listed(run: Run, letters: int) -> list[str]:
     return lines
 
 
-def angle(ends: tuple[float, float]) -> Axis:
-    """Return the axis of an angle: multiples of pi where it goes far."""
-    return Axis(names.ANGLE, ends, "angle" if ends[1] - ends[0] > TURN else "plain")
-
-
 def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
     """Return the samples: those for fitting, others, and outliers, which stand alone."""
     few: dict[str, Any] = {"size": 2.2}
@@ -142,8 +122,8 @@ def _history(run: Run) -> Panel:
     marks = _samples(run, run.time, 0.8)
     if spans:
         marks.append(Span(spans, colour=_BAND))
-    clock = Axis("t (s)", holding(run.time, margin=0.01))
-    return Panel("history", "", clock, angle(holding(run.theta)), marks)
+    clock = names.seconds(run.time)
+    return Panel("history", "", clock, names.angle(holding(run.theta)), marks)
 
 
 def _flags(run: Run, width: float) -> Panel:
@@ -246,7 +226,7 @@ def _many(experiment: Experiment, width: float) -> Chart:
         name = "t from the start (s)" if k + 1 == len(runs) else ""
         clock = Axis(name, (-0.01 * longest, 1.01 * longest))
         marks = _samples(run, run.time - run.time[0], 0.7)
-        up = angle(holding(run.theta, margin=0.08))
+        up = names.angle(holding(run.theta, margin=0.08))
         panels.append(Panel(str(k), _said(run), clock, up, marks))
     return Chart(
         f"Experiment {experiment.path.resolve().name}",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Builder(Protocol):
-    """Makes a chart: of one ``layer``, images of at most so many ``cells`` along a side."""
+    """Makes a chart: of one ``layer``, with images of at most ``cells`` along a side."""
 
     def __call__(self, dataset: xr.Dataset, *, layer: str | None, cells: int) -> Chart:
         """Return the chart."""

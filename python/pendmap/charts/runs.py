@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Line, Panel
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.curves import envelope
+from pendmap.charts.marks import Line
 from pendmap.units import Units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Floats = npt.NDArray[np.float64]
+    from pendmap.charts.marks import Floats
 
 COLUMNS: Final = 20
 """Runs up to which there are two columns; of more there are three."""
@@ -56,24 +57,16 @@ def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
         line = Line(*_curve(run), colour=_COLOUR, width=0.7)
         panels.append(Panel(str(k), run.title, clock, up, [line]))
     wide, high = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * rows)
-    return Chart(
-        title,
-        subtitle,
-        panels,
-        rows=[[p.name for p in panels[k : k + columns]] for k in range(0, len(runs), columns)],
-        columns=columns,
-        size=(wide, high),
-        letters=False,
-    )
+    grid = [panels[k : k + columns] for k in range(0, len(runs), columns)]
+    look = {"columns": columns, "size": (wide, high), "letters": False}
+    return Chart.of(title, subtitle, grid, **look)
 
 
 def _curve(run: RunPanel) -> tuple[Floats, Floats]:
     """Return the line of a record: broken where samples are lost, thinned where there are many."""
     time, theta = run.time, run.angle
     if time.size > 2 * BINS:
-        begins = np.linspace(0, time.size, BINS, endpoint=False).astype(int)
-        ends = (np.minimum.reduceat(theta, begins), np.maximum.reduceat(theta, begins))
-        return np.repeat(time[begins], 2), np.stack(ends, axis=1).ravel()
+        return envelope(time, theta, BINS)
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else math.inf
     lost = np.flatnonzero(steps > LOST * usual) + 1

@@ -38,7 +38,7 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
     "trajectory": {"theta": ("time",), "section_time": ("period",)},
 }
-"""What variables of a result are over, whatever is selected from it."""
+"""Dimensions that variables of a result must have in any selection of it."""
 
 _CELLS = {
     "basins": ("label", "settle_periods", "net_turns"),
@@ -48,28 +48,17 @@ _CELLS = {
 """Variables over the axes of a picture."""
 
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
-"""Beginnings of the names of attributes that nobody can tell of a part of a map."""
+"""Beginnings of the names of attributes that hold for a whole map alone."""
 
 _BLOCK = 1_000_000
 """Cells that are counted at a time, so that a large map is never converted whole."""
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result, or a selection of one, ready to be drawn.
+    """Return a result, or a selection of one, ready to be drawn; refuse what cannot be.
 
     Axes rise, dimensions stand in one order, and of a selection shares, tables and summary are
     those of the part, or say that they are of the whole. Of a whole result nothing changes.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result of pendmap, or what selecting, reversing and transposing made of one.
-
-    Raises
-    ------
-    InputError
-        If it is a list of starts, an axis has no values or only one without a range, a variable
-        is missing or over other dimensions, or a table that others refer to is not whole.
     """
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:

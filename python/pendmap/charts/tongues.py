@@ -10,19 +10,9 @@ import numpy.typing as npt
 
 from pendmap.analysis.critical_curves import PLANES, in_plane, window
 from pendmap.analysis.tongues import NEAR
-from pendmap.charts import basins
-from pendmap.charts.chart import (
-    QUIET,
-    Areas,
-    Axis,
-    Chart,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Text,
-    together,
-)
+from pendmap.charts import names
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,8 +20,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-
-Floats = npt.NDArray[np.float64]
+    from pendmap.charts.marks import Floats
 
 _CURVES: Final = {
     -1: ("minus", "exact, multiplier \N{MINUS SIGN}1 (period 2)", "#0072b2", "#56b4e9"),
@@ -87,7 +76,7 @@ def chart(
     order = sorted(_ROOTS, key=lambda plane: plane != first)
     return Chart(
         title,
-        basins.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
+        names.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
         [_panel(dataset, plane, marks) for plane in order],
         rows=[[first]],
         ratio=0.72,

@@ -6,18 +6,18 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.analysis.trajectory import energy
-from pendmap.charts import basins, names, plane
-from pendmap.charts.chart import QUIET, Axis, Chart, Level, Line, Mark, Panel, Points, Span, holding
+from pendmap.charts import names, plane
+from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.curves import envelope
+from pendmap.charts.marks import QUIET, Level, Line, Mark, Points, Span
 from pendmap.units import Units
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
+    from pendmap.charts.marks import Floats
 
 LATE: Final = 0.2
 """The last share of a trajectory, drawn dark, so that what it settles to stands out."""
@@ -46,7 +46,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
     return Chart(
         "Trajectory",
-        f"{basins.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        f"{names.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
         [
             _history(dataset, Axis(names.clock(units) if layer else "", ends)),
             _energy(dataset, Axis(names.clock(units), ends)),

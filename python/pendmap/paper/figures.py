@@ -99,11 +99,11 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
     from pendmap import render  # noqa: PLC0415
-    from pendmap.charts import tongues  # noqa: PLC0415
+    from pendmap.charts import comparison, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
-    from pendmap.paper import draw, drawings, motions  # noqa: PLC0415
-    from pendmap.render import drawing  # noqa: PLC0415
-    from pendmap.render.written import written  # noqa: PLC0415
+    from pendmap.paper import motions, pendulum  # noqa: PLC0415
+    from pendmap.paper import tumbling as chaos  # noqa: PLC0415
+    from pendmap.render.written import save  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
@@ -112,18 +112,17 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key in ("1", "2"):
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
-        if key == "1":
-            chart = tongues.chart(_critical(), title=title, marks=marks)
-        else:
-            chart = draw.tumbling_chart(tumbling(), title)
-        return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
+        return save(tongues.chart(_critical(), title=title, marks=marks), path)
+    if key == "2":
+        return save(chaos.chart(tumbling(), title), path)
     if key == "3":
-        return written(path, lambda dpi: drawings.figure(dpi=dpi, title=title))
+        return save(pendulum.chart(title=title), path)
     if key in ("8", "9"):
         make = motions.steady_states if key == "8" else motions.tumbling
         runs = make(report(seed).methods["combined_repaired"].rig, seed)
         subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
-        return draw.draw_motions(runs, path, steady=key == "8", title=title, subtitle=subtitle)
+        chart = comparison.steady if key == "8" else comparison.tumbling
+        return save(chart(runs, title, subtitle), path)
     found = report(seed)
     return render.draw_identification(
         found,

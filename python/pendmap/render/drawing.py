@@ -12,18 +12,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pendmap.charts import registry
-from pendmap.charts.chart import Image
+from pendmap.charts.chart import Sheet
+from pendmap.charts.marks import Image
 from pendmap.errors import InputError
 from pendmap.render import marks, style, ticks
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase, SubFigure
 
-    from pendmap.charts.chart import Chart, Ends, Mark, Panel
+    from pendmap.charts.chart import Chart, Panel
+    from pendmap.charts.marks import Ends, Mark
 
 LEFT: Final = 0.1
 HEAD: Final = 0.72
@@ -37,27 +39,32 @@ BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
 """Inches that names and labels take beside a panel, a bar, those below it, a row of a legend."""
 LEAST: Final = 0.5
 """Inches that a panel needs."""
+HEADING: Final = 0.32
+"""Inches of the heading of a chart on a sheet."""
+SMALLEST: Final = (0.88, 0.72)
+"""Width and height over their own with which a sheet remains readable."""
+LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 _SMALLEST: Final = 0.9
 """Size of a subtitle's letters, over their own, under which it takes a third line."""
 
 
-def draw(chart: Chart, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
-    """Return the figure of a chart; ``size`` is in inches.
-
-    Raises
-    ------
-    InputError
-        If ``size`` leaves no room for the panels.
-    """
-    figure, needed = _made(chart, size or chart.size or _natural(chart), dpi)
+def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
+    """Return the figure of a chart or of a sheet; refuse a size in inches without room for it."""
+    if isinstance(chart, Sheet):
+        return _sheet(chart, size, dpi)
+    figure, needed = _made(chart, size or _size(chart), dpi)
     if size is not None and _lacks(size, needed):
         least = _least(chart, dpi)
         if _lacks(size, least):
-            raise InputError(
-                f"size {size} leaves no room for the panels; it must be at least"
-                f" {least[0]:.1f} x {least[1]:.1f} inches"
-            )
+            raise _no_room(size, least)
     return figure
+
+
+def _no_room(size: Ends, least: Ends) -> InputError:
+    return InputError(
+        f"size {size} leaves no room for the panels; it must be at least"
+        f" {least[0]:.1f} x {least[1]:.1f} inches"
+    )
 
 
 def figure(
@@ -100,7 +107,7 @@ def _recoloured(chart: Chart, colormap: str) -> Chart:
 
 def _least(chart: Chart, dpi: float) -> Ends:
     """Return the least size with room for every panel and its words, in tenths of an inch."""
-    size = chart.size or _natural(chart)
+    size = _size(chart)
     _, least = _made(chart, size, dpi)
     for _ in range(9):
         least = (math.ceil(10 * least[0] - 1e-6) / 10, math.ceil(10 * least[1] - 1e-6) / 10)
@@ -115,18 +122,18 @@ def _lacks(size: Ends, needed: Ends) -> bool:
     return needed[0] > size[0] + 1e-6 or needed[1] > size[1] + 1e-6
 
 
-def _natural(chart: Chart) -> Ends:
-    """Return a size in inches in which the panels have their proportions."""
+def _size(chart: Chart) -> Ends:
+    """Return the size of a chart in inches: its own, or one of its panels' proportions."""
+    if chart.size is not None:
+        return chart.size
     rows = chart.shown
     stacked = len(rows) > 1 and all(len(row) == 1 for row in rows)
     wide = STACKED if stacked else ALONE if len(rows[0]) == 1 else WIDE
     across = [sum(panel.share for panel in row) * wide + _aside(row) for row in rows]
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
-    texts = marks.legend(_all_marks(chart))[1]
     width = max(across) + 0.15
     down = sum(heights) * wide * chart.ratio + BELOW * len(rows)
-    below = ROW * -(-len(texts) // _columns(texts, width)) + 0.1 if texts else 0.0
-    return width, down + HEAD + below + LINE * len(chart.notes)
+    return width, down + HEAD + _rows(_all_marks(chart), width) + LINE * len(chart.notes)
 
 
 def _aside(row: Sequence[Panel]) -> float:
@@ -134,30 +141,39 @@ def _aside(row: Sequence[Panel]) -> float:
     return BESIDE * len(row) + BAR * bars
 
 
-def _all_marks(chart: Chart) -> list[Any]:
+def _rows(named: list[Mark], width: float) -> float:
+    """Return the inches down a legend of these marks."""
+    texts = marks.legend(named)[1]
+    return ROW * -(-len(texts) // _columns(texts, width)) + 0.1 if texts else 0.0
+
+
+def _all_marks(chart: Chart) -> list[Mark]:
     return [mark for row in chart.shown for panel in row for mark in panel.marks]
 
 
 def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     """Return the figure of a chart, and the size in inches that it needs."""
-    texts = marks.legend(_all_marks(chart))[1] if chart.notes else []
     # The layout leaves room for a legend at the edge alone, not for one above notes.
-    rows = -(-len(texts) // _columns(texts, size[0]))
-    foot = LINE * len(chart.notes) + (ROW * rows + 0.1 if rows else 0.0)
+    foot = LINE * len(chart.notes) + _rows(_all_marks(chart) if chart.notes else [], size[0])
     figure = headed(size, dpi, chart.title, chart.subtitle, foot=foot)
     for k, line in enumerate(chart.notes):
         at = (0.06 + LINE * (len(chart.notes) - k)) / size[1]
         figure.text(LEFT / size[0], at, line, fontsize=8.5, va="top")
     axes = fill(figure, chart)
+    above = LINE * len(chart.notes) / size[1]
+    where: dict[str, Any] = {"bbox_to_anchor": (0.0, above, 1.0, 1.0)} if above else {}
+    _legend(figure, _all_marks(chart), size[0], loc="outside lower left", borderpad=0.1, **where)
     fits = settle(figure, [(axes[p.name], p) for row in chart.shown for p in row])
     return figure, _needed(figure, chart, axes) if fits else (1.15 * size[0], 1.15 * size[1])
 
 
-def headed(size: Ends, dpi: float, title: str, subtitle: str, *, foot: float = 0.0) -> Figure:
-    """Return an empty figure with title and subtitle, and room for ``foot`` inches below."""
+def headed(  # noqa: PLR0913 (size, words, and room around)
+    size: Ends, dpi: float, title: str, subtitle: str, *, foot: float = 0.0, below: float = 0.0
+) -> Figure:
+    """Return an empty figure with its head, and inches of room below this and at the foot."""
     figure = Figure(figsize=size, dpi=dpi, layout="constrained")
     FigureCanvasAgg(figure)
-    top, height = write_head(figure, title, subtitle), size[1]
+    top, height = write_head(figure, title, subtitle) + below, size[1]
     rect = (0.0, foot / height, 1.0, max(1 - (top + foot) / height, 1e-3))
     engine: Any = figure.get_layout_engine()
     engine.set(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=rect)
@@ -173,10 +189,10 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
     width, height = (float(side) for side in figure.get_size_inches())
     room = width - 2 * LEFT
     whole = style.inches(subtitle, style.RC["font.size"])
-    lines = [subtitle] if whole <= room else halves(subtitle)
-    if _SMALLEST * longest(lines) > room:
+    lines = [subtitle] if whole <= room else style.halves(subtitle)
+    if _SMALLEST * style.longest(lines) > room:
         lines = subtitle.split(";   ")
-    shrunk = room / max(longest(lines), 1e-3)
+    shrunk = room / max(style.longest(lines), 1e-3)
     # Letters of few pixels are set wider than in proportion.
     font = style.RC["font.size"] * (1.0 if shrunk >= 1 else 0.9 * shrunk)
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
@@ -188,8 +204,13 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
     return float(HEAD + LINE * (len(lines) - 1) - (0.0 if subtitle else LINE))
 
 
-def fill(figure: Figure | SubFigure, chart: Chart) -> dict[str, Axes]:
-    """Draw the panels of a chart and its legend into a figure; return the axes by their names."""
+def fill(
+    figure: Figure | SubFigure, chart: Chart, letters: Iterator[str] | None = None
+) -> dict[str, Axes]:
+    """Draw the panels of a chart into a figure; return the axes by their names.
+
+    ``letters`` number the panels; without them they begin anew, where there are several.
+    """
     rows = chart.shown
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
     shares = [panel.share for panel in rows[0]] if len(rows) == 1 else []
@@ -197,8 +218,8 @@ def fill(figure: Figure | SubFigure, chart: Chart) -> dict[str, Axes]:
     grid = figure.add_gridspec(
         len(rows), columns, height_ratios=list(heights), width_ratios=shares or None
     )
-    letters = iter("abcdefghijklmnopqrstuvwxyz")
-    several = chart.letters and sum(len(row) for row in rows) > 1
+    several = chart.letters and (letters is not None or sum(len(row) for row in rows) > 1)
+    letters = letters or iter(LETTERS)
     axes: dict[str, Axes] = {}
     for down, row in enumerate(rows):
         wide = 1 if chart.columns else columns // len(row)
@@ -218,31 +239,81 @@ def fill(figure: Figure | SubFigure, chart: Chart) -> dict[str, Axes]:
     for row in rows:
         for panel in row:
             _panel(axes[panel.name], panel)
-    handles, texts = marks.legend(_all_marks(chart)) if chart.legend != "none" else ([], [])
+    return axes
+
+
+def _legend(
+    figure: Figure | SubFigure,
+    named: list[Mark],
+    width: float,
+    **where: Any,  # noqa: ANN401 (as matplotlib takes it)
+) -> None:
+    handles, texts = marks.legend(named)
     if texts:
-        width = figure.bbox.width / _dpi(figure)
-        foot = LINE * len(chart.notes) * _dpi(figure)
-        where: Any = f"outside {'lower' if chart.legend == 'below' else 'upper'} left"
         figure.legend(
             handles,
             texts,
-            loc=where,
-            bbox_to_anchor=(0.0, foot / figure.bbox.height, 1.0, 1.0) if foot else None,
             ncols=_columns(texts, width),
-            borderpad=0.1,
             labelspacing=0.45,
             handlelength=1.7,
             handleheight=1.0,
             handletextpad=0.6,
             columnspacing=1.6,
+            **where,
         )
-    return axes
+
+
+def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
+    """Return the figure of charts in columns."""
+    every = [chart for column in sheet.columns for chart in column]
+    named = [mark for chart in every for mark in _all_marks(chart)] if sheet.legend else []
+    wide = [max(_size(chart)[0] for chart in column) for column in sheet.columns]
+    high = [sum(_size(chart)[1] for chart in column) for column in sheet.columns]
+    foot = _rows(named, sum(wide))
+    given = size or (sum(wide), max(high) + HEAD + foot)
+    least = (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot)
+    if _lacks(given, least):
+        raise _no_room(given, least)
+    figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)
+    engine: Any = figure.get_layout_engine()
+    _, low, _, tall = engine.get()["rect"]
+    below_head = (0.0, low + tall + foot / given[1])
+    _legend(figure, named, given[0], loc="upper left", bbox_to_anchor=below_head)
+    letters = iter(LETTERS)
+    panels = []
+    columns = figure.subfigures(1, len(wide), squeeze=False, width_ratios=wide)[0]
+    for part, column in zip(columns, sheet.columns, strict=True):
+        shares = [_size(chart)[1] for chart in column]
+        room = (given[1] - HEAD - foot) / sum(shares)
+        blocks = part.subfigures(len(column), 1, squeeze=False, height_ratios=shares)[:, 0]
+        for block, chart in zip(blocks, column, strict=True):
+            axes = _block(block, chart, room * _size(chart)[1], letters, own=not sheet.legend)
+            panels += [(axes[panel.name], panel) for row in chart.shown for panel in row]
+    settle(figure, panels)
+    return figure
+
+
+def _block(
+    figure: SubFigure, chart: Chart, high: float, letters: Iterator[str], *, own: bool
+) -> dict[str, Axes]:
+    """Draw a chart of a sheet with its heading, and its own legend beneath it."""
+    wide = figure.bbox.width / _dpi(figure)
+    named = _all_marks(chart) if own else []
+    heading = HEADING if chart.title else 0.05
+    above = heading + _rows(named, wide)
+    parts: Any = figure.subfigures(2, 1, height_ratios=(above, max(high - above, 0.1)))
+    head, body = parts
+    words: dict[str, Any] = {"fontsize": 10.5, "weight": "bold", "va": "center"}
+    head.text(LEFT / wide, 1 - 0.17 / above, chart.title, **words)
+    _legend(head, named, wide, loc="upper left", bbox_to_anchor=(0.0, 1 - heading / above))
+    return fill(body, chart, letters)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         marks.draw(axes, mark)
-    for artist in (*axes.lines, *axes.collections, *axes.images):
+    words = axes.texts if panel.bare else []
+    for artist in (*axes.lines, *axes.collections, *axes.images, *words):
         artist.set_in_layout(False)
     for which, side in (("x", panel.x), ("y", panel.y)):
         bare = dataclasses.replace(side, ticks=()) if panel.bare else side
@@ -252,22 +323,21 @@ def _panel(axes: Axes, panel: Panel) -> None:
 
 
 def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
-    """Place the panels, fold titles that are too long for them, and write notes beneath.
-
-    Returns
-    -------
-    bool
-        Whether there is room for the panels.
-    """
+    """Place the panels, fold long titles, write notes beneath; return whether there is room."""
     engine: Any = figure.get_layout_engine()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         engine.execute(figure)
         for axes, panel in panels:
             ticks.turn(axes)
+            needed = max((marks.across(mark) for mark in panel.marks), default=0.0)
+            if panel.bare and needed > _inches(axes)[0]:
+                for text in axes.texts:
+                    font = float(text.get_fontsize())
+                    text.set_fontsize(font * _inches(axes)[0] / needed)
             title, room = axes.get_title(loc="left"), _inches(axes)[0]
-            if title and width_of(title) > room + 0.15:
-                axes.set_title(folded(title, room))
+            if title and style.width_of(title) > room + 0.15:
+                axes.set_title(style.folded(title, room))
             if panel.note:
                 _note(axes, panel)
         engine.execute(figure)
@@ -314,8 +384,8 @@ def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
         )
         across.append(unit * sum(panel.share for panel in row))
         down += max(need[1] - one[1] for need, one in zip(least, have, strict=True))
-    texts = marks.legend(_all_marks(chart))[1] if chart.legend != "none" else []
-    words = [style.inches(chart.title, 12, bold=True), longest(halves(chart.subtitle))]
+    texts = marks.legend(_all_marks(chart))[1]
+    words = [style.inches(chart.title, 12, bold=True), style.longest(style.halves(chart.subtitle))]
     words.append(max((_entry(text) for text in texts), default=0.0))
     return max(width + max(across), max(words) + 2 * LEFT), height + down
 
@@ -323,10 +393,10 @@ def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
 def _room(axes: Axes, panel: Panel) -> Ends:
     """Return width and height that a panel needs."""
     bars = [mark.colours.name for mark in panel.marks if getattr(mark, "colours", None)]  # type: ignore[attr-defined]
-    words = [panel.y.name, *bars]
+    words = [*panel.y.name.split("\n"), *bars]
     high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
     title = axes.get_title(loc="left").replace("\n", " ")
-    wide = max(LEAST, panel.least, width_of(folded(title, 0.0)) - 0.15)
+    wide = max(LEAST, style.width_of(style.folded(title, 0.0)) - 0.15)
     if panel.note:
         wide = max(wide, 1.2)
         high = max(high, 0.9)
@@ -342,35 +412,6 @@ def _dpi(part: FigureBase) -> float:
     """Return the pixels per inch of the figure that a part belongs to."""
     whole: Any = part.get_figure(root=True)
     return float(whole.dpi)
-
-
-def width_of(title: str) -> float:
-    """Return how wide the longest line of a panel's title is, in inches."""
-    return max(style.inches(line, style.RC["axes.titlesize"]) for line in title.split("\n"))
-
-
-def folded(title: str, room: float) -> str:
-    """Return a title on two lines of nearly equal length, or more where there is less room."""
-    letters = max(len(line) for line in title.split("\n")) or 1
-    size = width_of(title) / letters
-    lines = title
-    for count in range(2, 4):
-        lines = textwrap.fill(title, max(-(-len(title) // count) + 3, 8))
-        if room == 0.0 or width_of(lines) <= room + 0.15 or size == 0:
-            break
-    return lines
-
-
-def halves(text: str) -> list[str]:
-    """Return a text on two lines as equal as can be, broken at one of its semicolons."""
-    parts = text.split(";   ")
-    both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
-    return min(both, key=longest, default=[text])
-
-
-def longest(lines: Sequence[str]) -> float:
-    """Return the inches of the longest line."""
-    return max(style.inches(line, style.RC["font.size"]) for line in lines)
 
 
 def _entry(text: str) -> float:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from pendmap.charts import chart as charts
+from pendmap.charts import marks as charts
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from pendmap.charts.chart import Mark
+    from pendmap.charts.marks import Mark
 
+TABLE, APART = 8.0, 0.14
+"""Size of a table's letters, and inches between its columns at least."""
 MANY: Final = 2000
 """Points from which on they are drawn as pixels also in a file of vectors."""
 
@@ -129,6 +131,36 @@ def _text(axes: Axes, mark: charts.Text) -> None:
     )
 
 
+def _table(axes: Axes, mark: charts.Table) -> None:
+    edges = np.cumsum(_columns(mark))
+    for down, row in enumerate([mark.head, *mark.rows]):
+        for k, text in enumerate(row):
+            axes.text(
+                edges[k] / edges[-1] if k else 0.0,
+                down + 1.4,
+                text,
+                color=style.INK if down else style.QUIET,
+                ha="right" if k else "left",
+                va="bottom",
+                fontsize=TABLE,
+                linespacing=1.15,
+            )
+
+
+def _columns(mark: charts.Table) -> list[float]:
+    """Return the inches across each column, its distance from the one before included."""
+    columns = zip(mark.head, *mark.rows, strict=True)
+    texts = ([line for cell in column for line in cell.split("\n")] for column in columns)
+    return [APART + max(style.inches(line, TABLE) for line in each) for each in texts]
+
+
+def across(mark: Mark) -> float:
+    """Return the inches that words need across a panel without a frame."""
+    if isinstance(mark, charts.Table):
+        return sum(_columns(mark))
+    return style.inches(mark.text, mark.size) if isinstance(mark, charts.Text) else 0.0
+
+
 def _image(axes: Axes, mark: charts.Image) -> None:
     where: dict[str, Any] = {
         "extent": (*mark.x, *mark.y),
@@ -174,6 +206,7 @@ _DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
     charts.Level: _level,
     charts.Span: _span,
     charts.Text: _text,
+    charts.Table: _table,
     charts.Image: _image,
 }
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from pendmap.charts.runs import of_runs
 from pendmap.errors import InputError
-from pendmap.render import drawing
-from pendmap.render.written import written
+from pendmap.render.written import save
 
 if TYPE_CHECKING:
     import os
@@ -60,7 +59,7 @@ def draw_record(
     from pendmap.charts import record  # noqa: PLC0415 (what reads records takes a while)
 
     chart = record.sheet(records, **({"width": size[0]} if size else {}))
-    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
+    return save(chart, path, size=size, dpi=dpi)
 
 
 def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
@@ -87,9 +86,9 @@ def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Pat
     OSError
         If the file cannot be written.
     """
-    from pendmap.render import comparison as sheet  # noqa: PLC0415 (scipy takes a while)
+    from pendmap.charts import comparison as charts  # noqa: PLC0415 (scipy takes a while)
 
-    return written(path, lambda dpi: sheet.figure(comparison, dpi=dpi))
+    return save(charts.sheet(comparison), path)
 
 
 def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -121,7 +120,7 @@ def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """
     from pendmap.charts import diagnosis  # noqa: PLC0415 (scipy takes a while)
 
-    return written(path, lambda dpi: drawing.draw(diagnosis.sheet(found), dpi=dpi))
+    return save(diagnosis.sheet(found), path)
 
 
 def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -187,8 +186,7 @@ def draw_runs(
     """
     if not runs:
         raise InputError("runs must hold one record or more, got []")
-    chart = of_runs(runs, title=title, subtitle=subtitle)
-    return written(path, lambda dpi: drawing.draw(chart, dpi=dpi))
+    return save(of_runs(runs, title=title, subtitle=subtitle), path)
 
 
 def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
@@ -237,13 +235,7 @@ def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 3.
     """
-    from pendmap.render import identification  # noqa: PLC0415 (likewise)
+    from pendmap.charts import identification as charts  # noqa: PLC0415 (likewise)
 
-    return written(
-        path,
-        lambda dpi: identification.figure(
-            report, parts=parts, size=size, dpi=dpi, title=title, subtitle=subtitle
-        ),
-        size=size,
-        dpi=dpi,
-    )
+    sheet = charts.sheet(report, parts=parts, title=title, subtitle=subtitle)
+    return save(sheet, path, size=size, dpi=dpi)

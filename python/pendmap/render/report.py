@@ -12,12 +12,9 @@ from pendmap import report
 from pendmap.charts import diagnosis
 from pendmap.files import whole_file, whole_folder
 from pendmap.render import drawing, style
-from pendmap.render import sheet as sheets
-from pendmap.render.blocks import Box
-from pendmap.render.errors import draw_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -31,38 +28,12 @@ SUFFIXES: Final = (".html", ".md")
 DPI: Final = 110.0
 """Pixels per inch: sharp on a screen, and the file stays under a megabyte."""
 
-WIDTH: Final = 8.6
-"""Inches of every figure."""
-
-CYCLES: Final = 3
-"""Free runs in figure 7: those held out first, then the longest."""
-
-
-def figure_7(found: Discrepancy, dpi: float) -> Figure | None:
-    """Return errors of simulated periods and peaks, of both models, for each free run."""
-    runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
-    if not runs:
-        return None
-    high = 3.0
-    size, said = (WIDTH, high * len(runs) + 0.72), "from the first measured peak on"
-    made = sheets.headed(size, dpi, "Simulated periods and peaks", said)
-    letters: Iterator[str] = iter(f"({letter}) " for letter in "abcdefghijklmnopqrstuvwxyz")
-    top = high * len(runs)
-    for one in runs:
-        top -= high
-        title = one.name + (", held out" if one.held_out else "")
-        errors = one.errors
-        if not found.adds:
-            errors = {"baseline": errors["before"]} if "before" in errors else {}
-        draw_errors(made, Box(0.0, top, WIDTH, high), errors, one.peaks, letters, title)
-    return made
-
 
 def figures(found: Discrepancy) -> dict[str, Figure]:
     """Return the figures by the names that the report has for them."""
     made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(found).items()}
-    cycles = figure_7(found, DPI)
-    return made | ({} if cycles is None else {"figure_7": cycles})
+    cycles = diagnosis.cycles(found)
+    return made | ({} if cycles is None else {"figure_7": drawing.draw(cycles, dpi=DPI)})
 
 
 def write(found: Discrepancy, path: Path) -> Path:

@@ -1,8 +1,9 @@
-"""How all figures look: type, ticks, colour bars, and how they are written."""
+"""Look of all figures: type, ticks, colour maps, words that fit, and writing to files."""
 
 from __future__ import annotations
 
 import functools
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -12,11 +13,11 @@ from matplotlib.textpath import TextPath
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
-
 
 INK = "#222222"
 QUIET = "#666666"
@@ -67,6 +68,35 @@ def inches(text: str, size: float | None = None, *, bold: bool = False) -> float
     return float(path.get_extents().width) / 72
 
 
+def width_of(title: str) -> float:
+    """Return how wide the longest line of a panel's title is, in inches."""
+    return max(inches(line, RC["axes.titlesize"]) for line in title.split("\n"))
+
+
+def folded(title: str, room: float) -> str:
+    """Return a title on two lines of nearly equal length, or more where there is less room."""
+    letters = max(len(line) for line in title.split("\n")) or 1
+    size = width_of(title) / letters
+    lines = title
+    for count in range(2, 4):
+        lines = textwrap.fill(title, max(-(-len(title) // count) + 3, 8))
+        if room == 0.0 or width_of(lines) <= room + 0.15 or size == 0:
+            break
+    return lines
+
+
+def halves(text: str) -> list[str]:
+    """Return a text on two lines as equal as can be, broken at one of its semicolons."""
+    parts = text.split(";   ")
+    both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
+    return min(both, key=longest, default=[text])
+
+
+def longest(lines: Sequence[str]) -> float:
+    """Return the inches of the longest line."""
+    return max(inches(line, RC["font.size"]) for line in lines)
+
+
 def colour_map(name: str) -> Colormap:
     """Return a matplotlib colour map by its name, if there is one."""
     if name not in mpl.colormaps:
@@ -76,7 +106,7 @@ def colour_map(name: str) -> Colormap:
 
 
 def resolution(dpi: float | None) -> float:
-    """Return the pixels per inch, 200 where nothing is said, if they are possible."""
+    """Return the pixels per inch, 200 by default, if they are possible."""
     if dpi is None:
         return 200.0
     low, high = DPI

@@ -107,10 +107,10 @@ def scale(axes: Axes, which: str, side: Axis) -> None:
 def _sets(side: Axis, low: float, high: float) -> Iterator[Labels]:
     """Sets of labels between two ends, the fullest first."""
     if side.scale == "log":
-        yield from ([(at, power(at)) for at in places] for places in powers(low, high))
+        yield from ([(at, plane.power(at)) for at in places] for places in powers(low, high))
     elif side.scale == "signed":
         yield from (
-            [(at, power(at)) for at in places] for places in signed(side.straight, low, high)
+            [(at, plane.power(at)) for at in places] for places in signed(side.straight, low, high)
         )
     else:
         factor = side.factor
@@ -171,14 +171,3 @@ def _folded(name: str) -> str:
     marks = [k for k, letter in enumerate(name[:-1], start=1) if letter in "_- ."]
     at = min(marks, key=lambda k: abs(2 * k - len(name)), default=0)
     return f"{name[:at]}\n{name[at:]}" if at else name
-
-
-def power(value: float) -> str:
-    """Return a label, short for any power of ten."""
-    if value == 0:
-        return "0"
-    sign = "\N{MINUS SIGN}" if value < 0 else ""
-    size = math.log10(abs(value))
-    if abs(size - round(size)) < 1e-9 and not -3 <= size <= 3:  # noqa: PLR2004
-        return f"${sign.replace(chr(0x2212), '-')}10^{{{round(size)}}}$"
-    return f"{sign}{abs(value):g}"

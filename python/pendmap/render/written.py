@@ -1,4 +1,4 @@
-"""Figures into files: complete, or not there."""
+"""Figures in files: complete, or not there."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 
 from pendmap.files import whole_file
-from pendmap.render import style
+from pendmap.render import drawing, style
 
 if TYPE_CHECKING:
     import os
@@ -16,8 +16,21 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from pendmap.charts.chart import Chart, Sheet
+
 SUFFIXES = (".png", ".svg", ".pdf")
 """The kinds of file that can be drawn."""
+
+
+def save(
+    chart: Chart | Sheet,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Write the figure of a chart, or of a sheet of charts, into a file; return its path."""
+    return written(path, lambda dpi: drawing.draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
 
 
 def written(

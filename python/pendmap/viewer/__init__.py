@@ -73,7 +73,7 @@ _OF_RECORDS = {
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
-    """What is made of records waits until it is asked for: importing fits takes half a second."""
+    """Import recordings of records when they are asked for: importing fits takes half a second."""
     if name not in _OF_RECORDS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_OF_RECORDS[name]), name)

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 
 from pendmap.charts import basins as layering
 from pendmap.charts import legend, palette, plane
+from pendmap.charts import names as axis_names
 from pendmap.units import Units
 from pendmap.viewer import frame
 
@@ -67,7 +68,10 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     frame.text(stream, "legend", _legend(dataset, listed))
     for one in shown:
         around.log(stream, ROOTS[one])
-        _LOGS[one](stream, dataset, around)
+        if one in _CLASSES:
+            _CLASSES[one](stream, dataset, around)
+        else:
+            _scalar(stream, dataset, around, one)
         if one == "labels" or not layering.finite_time(dataset):
             _attractors(stream, ROOTS[one], dataset, around, named=one == "labels")
     if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
@@ -109,70 +113,43 @@ def _image(
     stream.log(path, image, static=True)
 
 
+def _classes(dataset: xr.Dataset, shift: int) -> list[Any]:
+    """Return class, name and colour of each label, failed and undecided cells included."""
+    names = dict(zip(dataset["id"].values, dataset["attractor"].values, strict=True))
+    names = {-1: "failed", 0: "undecided"} | {int(i): str(name) for i, name in names.items()}
+    shades = legend.colours(dataset)
+    return [(i + shift, legend.typeset(n), shades[i + 1]) for i, n in sorted(names.items())]
+
+
 def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
     """Log the labels, shifted by 1: 0 failed, 1 undecided, 2 the first attractor."""
     label = plane.pixels(dataset, dataset["label"], CELLS)
-    colours = legend.colours(dataset)
-    kind = np.uint8 if len(colours) <= np.iinfo(np.uint8).max else np.uint16
+    kind = np.uint8 if len(legend.colours(dataset)) <= np.iinfo(np.uint8).max else np.uint16
     shifted = np.add(label, 1, dtype=np.int16).astype(kind)
-    names = {
-        int(i) + 1: str(n)
-        for i, n in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
-    }
-    names |= {0: "failed", 1: "undecided"}
-    context = [(i, legend.typeset(name), colours[i]) for i, name in sorted(names.items())]
-    stream.log(ROOTS["labels"], rr.AnnotationContext(context), static=True)
+    stream.log(ROOTS["labels"], rr.AnnotationContext(_classes(dataset, 1)), static=True)
     _image(stream, around, "labels", rr.SegmentationImage(shifted, opacity=1.0), label.shape)
     _swatches(stream, legend.entries(dataset), around)
 
 
-def _settle(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the periods to settle; cells that never do have 0, and their label's colour on top."""
-    settle = plane.pixels(dataset, dataset["settle_periods"], CELLS)
-    absent = settle < 0
-    sample = plane.pixels(dataset, dataset["settle_periods"], SAMPLE)
-    known = sample[sample >= 0]
-    low, high = 0.0, max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
-    kind = np.uint16 if int(settle.max()) <= np.iinfo(np.uint16).max else np.float32
-    _scalar(stream, around, "settle", np.maximum(settle, 0).astype(kind), (low, high))
-    _cover(stream, dataset, around, "settle", absent)
-
-
-def _exponent(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the finite-time exponent."""
-    values = plane.pixels(dataset, dataset["finite_time_exponent"], CELLS).astype(
-        np.float32, copy=False
-    )
-    absent = ~np.isfinite(values)
-    sample = plane.pixels(dataset, dataset["finite_time_exponent"], SAMPLE)
-    known = sample[np.isfinite(sample)]
-    low, high = (float(q) for q in np.quantile(known, [0.005, 0.995])) if known.size else (0.0, 1.0)
-    if high <= low:
-        low, high = low - 0.5, high + 0.5
-    _scalar(stream, around, "exponent", values, (low, high))
-    _cover(stream, dataset, around, "exponent", absent)
-
-
-def _probability(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the probability of the most likely end of each cell over draws of the parameters."""
-    values = plane.pixels(dataset, dataset["certainty"], CELLS)
-    _scalar(stream, around, "probability", values, (0.0, 1.0))
-
-
-def _entropy(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the entropy of the end of each cell over draws of the parameters."""
-    values = plane.pixels(dataset, dataset["label_entropy"], CELLS)
-    _scalar(stream, around, "entropy", values, (0.0, max(float(values.max()), 1e-3)))
-
-
 def _scalar(
-    stream: rr.RecordingStream,
-    around: frame.Frame,
-    layer: str,
-    values: npt.NDArray[Any],
-    limits: tuple[float, float],
+    stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame, layer: str
 ) -> None:
-    low, high = limits
+    """Log a layer of numbers; cells without one have their label's colour on top."""
+    array = dataset[layering.VARIABLES[layer]]
+    values, sample = (plane.pixels(dataset, array, most) for most in (CELLS, SAMPLE))
+    absent = values < 0 if layer == "settle" else ~np.isfinite(values)
+    known = sample[sample >= 0 if layer == "settle" else np.isfinite(sample)]
+    low, high = 0.0, 1.0
+    if layer == "settle":
+        high = max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
+        whole = np.uint16 if int(values.max()) <= np.iinfo(np.uint16).max else np.float32
+        values = np.maximum(values, 0).astype(whole)
+    elif layer == "exponent":
+        low, high = (float(q) for q in np.quantile(known, [0.005, 0.995])) if known.size else (0, 1)
+        low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
+        values = values.astype(np.float32, copy=False)
+    elif layer == "entropy":
+        high = max(float(values.max()), 1e-3)
     look: dict[str, Any] = {
         "colormap": _COLOUR_MAPS[layer],
         "depth_range": [low, high],
@@ -182,6 +159,8 @@ def _scalar(
     _image(stream, around, layer, rr.DepthImage(values, **look), values.shape)
     column = np.linspace(low, high, 256, dtype=np.float32)[:, None]
     around.bar(stream, ROOTS[layer], rr.DepthImage(column, **look), low=low, high=high)
+    if absent.any():
+        _cover(stream, dataset, around, layer, absent)
 
 
 def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
@@ -219,18 +198,10 @@ def _cover(
     absent: npt.NDArray[np.bool_],
 ) -> None:
     """Log the labels, shifted by 2, of cells without a value over a layer; 0 shows through."""
-    if not absent.any():
-        return
     label = plane.pixels(dataset, dataset["label"], CELLS)
     cover = np.where(absent, label + 2, 0).astype(np.uint16)
-    colours = legend.colours(dataset)
     path = f"{ROOTS[layer]}/data/without"
-    names = {1: "failed", 2: "undecided"} | {
-        int(i) + 2: str(n)
-        for i, n in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
-    }
-    context: list[Any] = [(0, "", (0, 0, 0, 0))]
-    context += [(i, name, colours[i - 1]) for i, name in sorted(names.items())]
+    context: list[Any] = [(0, "", (0, 0, 0, 0)), *_classes(dataset, 2)]
     stream.log(path, rr.AnnotationContext(context), static=True)
     stream.log(path, around.of_pixels(cover.shape), static=True)
     stream.log(path, rr.SegmentationImage(cover, opacity=1.0, draw_order=1.0), static=True)
@@ -303,7 +274,7 @@ def _tint(colour: tuple[int, int, int]) -> tuple[int, int, int]:
 
 def _legend(dataset: xr.Dataset, listed: list[legend.Entry]) -> str:
     """Return the legend as a table."""
-    lines = [f"**{layering.parameters(dataset.attrs)}**", ""]
+    lines = [f"**{axis_names.parameters(dataset.attrs)}**", ""]
     if not layering.reliable(dataset):
         lines += [f"**{layering.warning(dataset)}**", ""]
     if not listed:
@@ -322,11 +293,4 @@ def _legend(dataset: xr.Dataset, listed: list[legend.Entry]) -> str:
     return "\n".join(lines)
 
 
-_LOGS = {
-    "labels": _labels,
-    "settle": _settle,
-    "turns": _turns,
-    "exponent": _exponent,
-    "probability": _probability,
-    "entropy": _entropy,
-}
+_CLASSES = {"labels": _labels, "turns": _turns}

@@ -9,8 +9,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.charts import chart as charts
+from pendmap.charts import marks as charts
 from pendmap.charts import palette
+from pendmap.charts.chart import Panel, holding
 from pendmap.viewer import frame
 
 if TYPE_CHECKING:
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from pendmap.charts.chart import Axis, Chart, Floats, Mark
+    from pendmap.charts.chart import Axis, Chart
+    from pendmap.charts.marks import Floats, Mark
 
     Log = Callable[[rr.RecordingStream, str, Any, "Place"], None]
 
@@ -31,11 +33,11 @@ PALE: Final = {charts.INK: frame.INK, charts.QUIET: frame.INK}
 class Place:
     """Where a panel lies in a view; logarithmic axes show powers of ten."""
 
-    panel: charts.Panel
+    panel: Panel
     frame: frame.Frame
 
     @classmethod
-    def of(cls, panel: charts.Panel, ratio: float) -> Place:
+    def of(cls, panel: Panel, ratio: float) -> Place:
         """Return the place of a panel of this ratio of height to width."""
         sides = [_side(panel, which) for which in "xy"]
         (x, across), (y, up) = sides
@@ -58,10 +60,10 @@ class Place:
         return frame.pieces(lines, *zip(self.frame.x, self.frame.y, strict=True))
 
 
-def _side(panel: charts.Panel, which: str) -> tuple[charts.Ends, str]:
+def _side(panel: Panel, which: str) -> tuple[charts.Ends, str]:
     """Return the ends and the name of an axis, of a logarithmic one as powers of ten."""
     side: Axis = getattr(panel, which)
-    ends = side.ends or charts.holding(*(_values(mark, which) for mark in panel.marks))
+    ends = side.ends or holding(*(_values(mark, which) for mark in panel.marks))
     if side.scale != "log":
         return ends, side.name
     low, high = (float(np.log10(end)) for end in ends)
@@ -97,12 +99,12 @@ def blueprint(chart: Chart) -> rrb.Blueprint:
     return frame.screen(front, aside, shares=[11, 6])
 
 
-def _title(panel: charts.Panel) -> str:
+def _title(panel: Panel) -> str:
     text = panel.title or panel.name
     return text[:1].upper() + text[1:]
 
 
-def _recorded(panel: charts.Panel) -> bool:
+def _recorded(panel: Panel) -> bool:
     return any(mark.path for mark in panel.marks)
 
 

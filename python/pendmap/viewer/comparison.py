@@ -1,4 +1,4 @@
-"""A record beside its model: both readings, what is left, velocities, at instants to be drawn."""
+"""A record beside its model: readings, residual, velocities, at the instants that are drawn."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.table1 import first_state
 
 if TYPE_CHECKING:
+    from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport
     from pendmap.records import Run
-
-Floats = npt.NDArray[np.float64]
 
 INSTANTS = 20000
 """Instants of a run that are drawn; of a longer one every k-th, unless that leaves too few of each

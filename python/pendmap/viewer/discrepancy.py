@@ -1,29 +1,66 @@
-"""The recording of a diagnosis: record and both models side by side, what is left, the report."""
+"""The recording of a diagnosis: record and both models side by side, residuals, the report."""
 
 from __future__ import annotations
 
-import hashlib
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap import report
-from pendmap.charts import diagnosis
-from pendmap.errors import InputError
-from pendmap.files import whole_file
-from pendmap.viewer import beside, chart, columns, frame
+from pendmap.charts import diagnosis, names
+from pendmap.viewer import chart, frame, runs
+from pendmap.viewer.comparison import drawn_at
+from pendmap.viewer.runs import Series
 
 if TYPE_CHECKING:
     import os
 
-    from pendmap.diagnosis import Discrepancy
-    from pendmap.viewer.beside import Beside
+    import rerun as rr
 
-RATIO = 0.56
+    from pendmap.charts.marks import Floats
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+
+RATIO: Final = 0.56
 """Height of a panel over its width."""
+RECORD: Final = Series("record", (128, 128, 128), 1.0)
+BEFORE: Final = Series("before", (213, 94, 0), 1.6)
+AFTER: Final = Series("after", (0, 114, 178), 1.6)
+APART: Final = 2.5
+"""Lengths of the arm between two pivots."""
+THIN, BROAD = (0.8, 4.0, 3.0), (3.0, 10.0, 1.0)
+"""Radii of arm and bob, in points of the screen, and which lies on top: the greater one."""
+SEEN: Final = 0.3
+"""Angle by which the old model's pendulum stands off where it is off by three times its residual's
+root mean square, rad."""
+MOST: Final = 1000.0
+"""Greatest magnification of the deviations that are drawn."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A record (s, rad) and what two models leave of it (rad), with the noise of a reading.
+
+    A row without numbers ends what is before a gap; what does not count is no number.
+    """
+
+    name: str
+    time: Floats
+    record: Floats
+    before: Floats
+    after: Floats
+    sigma: float
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of what the old model leaves, rad; 0 where nothing counts."""
+        known = self.before[np.isfinite(self.before)]
+        return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
 
 def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -57,76 +94,129 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     OSError
         If the file cannot be written.
     """
-    shown = beside.beside(found)
-    latest = max(float(np.max(np.abs(one.time), initial=0.0)) for one in shown)
-    if latest > columns.LATEST:
-        raise InputError(
-            f"{found.data.experiment.path}: time is {latest:g} s: a recording holds up to "
-            f"{columns.LATEST:g} s"
-        )
-    larger = beside.magnified(shown)
+    shown = _beside(found)
+    source = Path(found.data.experiment.path)
+    runs.refuse_late(source, (one.time for one in shown))
+    larger = _magnified(shown)
     panels = [chart.Place.of(panel, RATIO) for panel in diagnosis.recorded(found)]
-    with whole_file(path, (".rrd",)) as part, frame.strict():
-        content = _content(found, shown)
-        # A layout holds for all recordings of an application, and this one has runs of its own.
-        recording = frame.identified(content, f"pendmap diagnosis {content[:6]}")
-        with frame.written(recording, _blueprint(shown, larger, panels), part):
-            _describe(recording, found, larger)
-            frame.text(recording, "summary", report.as_markdown(report.diagnosis(found), {}))
-            for number, one in enumerate(shown, 1):
-                beside.log(recording, f"run_{number}", one, larger)
-            for place in panels:
-                chart.log_panel(recording, place)
-    return Path(path)
-
-
-def _content(found: Discrepancy, shown: list[Beside]) -> str:
-    """Return a name that tells what was recorded: other readings or models, another name."""
-    estimates = [(n, e.value) for n, e in found.best.fitted.fit.estimates.items()]
-    digest = hashlib.blake2b(repr((found.verdict, estimates)).encode(), digest_size=12)
-    for one in shown:
-        for column in (one.time, one.record, one.before, one.after):
-            digest.update(np.ascontiguousarray(column).data)
-    return digest.hexdigest()
-
-
-def _describe(stream: rr.RecordingStream, found: Discrepancy, larger: float) -> None:
-    """Log the recording's name and, as properties, verdict, effects and gap."""
-    stream.send_recording_name(f"diagnosis of {Path(found.data.experiment.path).name}")
-    gap = found.gap
-    known: dict[str, float | str] = {
-        "kind": "diagnosis",
-        "verdict": found.verdict,
-        "effects": ", ".join(effect.name for effect in found.effects),
-        "noise_floor": gap.noise_floor,
-        "before": gap.before,
-        "after": gap.after,
-        "held_out_before": gap.held_out_before,
-        "held_out_after": gap.held_out_after,
-        "deviations_drawn_larger": larger,
-    }
-    stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
-
-
-def _blueprint(shown: list[Beside], larger: float, panels: list[chart.Place]) -> rrb.Blueprint:
-    """Return the layout: a tab a run and one of the panels, beside them the report."""
-    runs = [beside.views(f"run_{k}", one, larger) for k, one in enumerate(shown, 1)]
-    grid = rrb.Grid(
-        *(place.frame.view(place.panel.where, place.panel.title) for place in panels),
-        grid_columns=2,
-        name="Gap",
-    )
-    front = rrb.Tabs(*runs, *([grid] if panels else []), active_tab=_worst(shown))
+    tabs: list[rrb.Container] = [_views(f"run_{k}", one, larger) for k, one in enumerate(shown, 1)]
+    if panels:
+        views = [place.frame.view(place.panel.where, place.panel.title) for place in panels]
+        tabs.append(rrb.Grid(*views, grid_columns=2, name="Gap"))
+    # The run that the baseline misses most lies in front.
+    worst = int(np.argmax([one.rms / one.sigma for one in shown]))
     aside = rrb.TextDocumentView(origin="/summary", name="Report")
-    return frame.screen(front, aside, shares=[5, 3])
+    estimates = [(n, e.value) for n, e in found.best.fitted.fit.estimates.items()]
+    arrays = (a for one in shown for a in (one.time, one.record, one.before, one.after))
+
+    def log(stream: rr.RecordingStream) -> None:
+        for number, one in enumerate(shown, 1):
+            _log(stream, f"run_{number}", one, larger)
+        for place in panels:
+            chart.log_panel(stream, place)
+
+    gap = found.gap
+    return runs.write(
+        path,
+        source.name,
+        runs.content_of((found.verdict, estimates), arrays),
+        {
+            "kind": "diagnosis",
+            "verdict": found.verdict,
+            "effects": ", ".join(effect.name for effect in found.effects),
+            "noise_floor": gap.noise_floor,
+            "before": gap.before,
+            "after": gap.after,
+            "held_out_before": gap.held_out_before,
+            "held_out_after": gap.held_out_after,
+            "deviations_drawn_larger": larger,
+        },
+        report.as_markdown(report.diagnosis(found), {}),
+        frame.screen(rrb.Tabs(*tabs, active_tab=worst), aside, shares=[5, 3]),
+        log,
+    )
 
 
-def _worst(shown: list[Beside]) -> int:
-    """Return the run that the baseline misses most: it lies in front."""
-    sizes = [
-        float(np.sqrt(np.nanmean(one.before**2))) / one.sigma
-        if np.isfinite(one.before).any()
-        else 0
-        for one in shown
+def _beside(found: Discrepancy) -> list[Beside]:
+    """Return all runs, those that were held back whole after the others."""
+    data, base, best = found.data, found.base, found.best
+    fits, w0 = (base.fitted.fit, best.fitted.fit), found.base.fitted.fit.model.w0
+    held = (base.hold_out.fit, best.hold_out.fit)
+    made = []
+    for k, run in enumerate(data.fitted):
+        left = [_left(run, fit, k) for fit in fits]
+        if data.inside and data.fitted_of[k] in data.held_of:
+            # The stretches held back lie within the run, and the motion passes through them.
+            place = data.held_of.index(data.fitted_of[k])
+            back = [_left(data.held[place], fit, place) for fit in held]
+            left = [np.where(np.isfinite(b), b, a) for a, b in zip(left, back, strict=True)]
+        made.append(_drawn(run, left, run.name, w0))
+    if not data.inside:
+        for k, run in enumerate(data.held):
+            left = [_left(run, fit, k) for fit in held]
+            made.append(_drawn(run, left, f"{run.name}, held out", w0))
+    return made
+
+
+def _left(run: FitRun, fit: TrajectoryFit, place: int) -> Floats:
+    known = np.isfinite(fit.curves[place][0])
+    if run.trusted is not None:
+        known &= run.trusted
+    return np.where(known, fit.residuals[place], math.nan)
+
+
+def _drawn(run: FitRun, left: list[Floats], name: str, w0: float) -> Beside:
+    kept, cuts, instants = drawn_at(run.time, w0)
+    record, before, after = (
+        np.insert(column[kept], cuts, math.nan) for column in (run.theta, *left)
+    )
+    sigma = float(np.sqrt(np.mean(np.square(run.sigma))))
+    return Beside(name, instants, record, before, after, sigma)
+
+
+def _magnified(shown: list[Beside]) -> float:
+    """Return how much larger deviations of the pendulums are drawn: 1, 2, 5, 10, ..."""
+    wanted = SEEN / (3 * max(*(one.rms for one in shown), 1e-12))
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return float(np.clip(max(m * power for m in (1, 2, 5) if m * power <= wanted), 1.0, MOST))
+
+
+def _views(root: str, one: Beside, larger: float) -> rrb.Container:
+    """Return the views of a run: three pendulums above, angles and residuals beneath."""
+    times = f", deviations {larger:g} times larger" if larger > 1 else ""
+    pendulums = rrb.Spatial2DView(
+        origin=f"/{root}/pendulum",
+        name=f"Record, old model, new model{times}",
+        visual_bounds=rrb.VisualBounds2D(x_range=[-APART / 2, 2.5 * APART], y_range=[-1.15, 1.5]),
+    )
+    below = [
+        rrb.TimeSeriesView(origin=f"/{root}/{leaf}", name=name, plot_legend=runs.LEGEND)
+        for leaf, name in (
+            ("angle", f"{names.ANGLE}, {one.name}"),
+            ("residual", "Record less model (mrad)"),
+        )
     ]
-    return int(np.argmax(sizes))
+    return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4], name=one.name)
+
+
+def _log(stream: rr.RecordingStream, root: str, one: Beside, larger: float) -> None:
+    """Log one run: angles, residuals, and three pendulums side by side.
+
+    A model's pendulum hangs as the record's, which is thin behind it, and how far it is off that is
+    ``larger`` times larger.
+    """
+    runs.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
+    at = f"{root}/pendulum"
+    pivots = [APART * place for place in range(3)]
+    runs.pivots(stream, at, pivots)
+    labels = ["record", "old model", "new model"]
+    frame.write(stream, f"{at}/axes/names", [[x, 1.2] for x in pivots], labels)
+    runs.pendulum(stream, f"{at}/data/record", one.time, one.record, RECORD, BROAD)
+    for look, left, pivot in ((BEFORE, one.before, pivots[1]), (AFTER, one.after, pivots[2])):
+        path, theta = f"{at}/data/{look.name}", one.record - larger * left
+        runs.series(stream, f"{root}/angle/{look.name}", one.time, one.record - left, look)
+        look_left = Series(look.name, look.colour, 1.2)
+        runs.residual(stream, f"{root}/residual/{look.name}", one.time, left, look_left)
+        runs.pendulum(stream, f"{path}/record", one.time, one.record, RECORD, THIN, pivot)
+        runs.pendulum(stream, path, one.time, theta, look, BROAD, pivot)
+    runs.noise(stream, f"{root}/residual", one.time, one.sigma)

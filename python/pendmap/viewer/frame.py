@@ -1,4 +1,4 @@
-"""What all recordings share: the recording itself, and the frame of a phase plane on the screen."""
+"""Parts of all recordings: the recording itself, and the frame of a panel on the screen."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
 
 
 def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
-    """Return an empty recording that goes by this name, without the time of day in it.
+    """Return an empty recording of this name, without the time of day in it.
 
     The viewer shows all recordings of an application in the layout of the one opened first.
     """

@@ -2,23 +2,49 @@
 
 from __future__ import annotations
 
-import hashlib
+import math
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pendmap.charts import names, plane
 from pendmap.errors import InputError
-from pendmap.files import whole_file
-from pendmap.viewer import columns, decay, found, frame
+from pendmap.formatting import counted, interval, written
+from pendmap.identification.report import as_text
+from pendmap.model.labels import unit_of
+from pendmap.units import Units
+from pendmap.viewer import columns, frame, runs
+from pendmap.viewer.columns import Look
 from pendmap.viewer.comparison import Comparison, comparisons
+from pendmap.viewer.runs import Series
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterator
 
-    from pendmap.identification import IdentificationReport
+    from pendmap.identification import Estimate, IdentificationReport
+
+
+# The model is drawn broad, and the record thin upon it: so both are seen where they agree.
+RECORD: Final = Series("record", (230, 159, 0), 1.2)
+MODEL: Final = Series("model", (0, 114, 178), 4.0)
+PEAKS: Final = Series("peaks", (213, 94, 0))
+RESIDUAL: Final = Series("record less model", (0, 158, 115))
+LEFT_OUT: Final = Series("not for fitting", (204, 121, 167))
+THIN, BROAD = (1.5, 7.0, 3.0), (4.5, 13.0, 1.0)
+"""Radii of arm and bob, in points of the screen, and order, of the record and of the model."""
+CLOSE: Final = 4.0
+"""Swings that the close view shows on either side of the cursor."""
+SMALL, MARGIN = 2.0, 1.15
+"""Swings under the first, rad, get a phase plane that is wider than they are by the second."""
+REACH: Final = 1.15
+"""Half the width of the view of the pendulums, in lengths of the arm."""
+COMPARED: Final = ("w0", "c_over_m", "Tr")
+"""Parameters by which all methods are compared."""
 
 
 def record_identification(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
@@ -56,50 +82,35 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
         If the file cannot be written.
     """
     shown = comparisons(report)
-    latest = max(float(np.max(np.abs(one.time), initial=0.0)) for one in shown)
-    if latest > columns.LATEST:
-        raise InputError(
-            f"{report.run.name}: time is {latest:g} s: a recording holds up to {columns.LATEST:g} s"
-        )
-    w0 = _w0(report)
-    with whole_file(path, (".rrd",)) as part, frame.strict():
-        content = _content(report, shown)
-        # A layout holds for all recordings of an application, and this one has axes of its own.
-        recording = frame.identified(content, f"pendmap identification {content[:6]}")
-        with frame.written(recording, _blueprint(shown, w0), part):
-            _describe(recording, report)
-            frame.text(recording, "summary", found.page(report))
-            for number, one in enumerate(shown, 1):
-                decay.log(recording, f"run_{number}", one, w0)
-    return Path(path)
-
-
-def _w0(report: IdentificationReport) -> float:
-    """Return the natural frequency found, 1 where none was: it gives views their proportions."""
+    runs.refuse_late(report.run.name, (one.time for one in shown))
     try:
-        return float(report.model.w0)
+        w0 = float(report.model.w0)
     except InputError:
-        return 1.0
-
-
-def _content(report: IdentificationReport, shown: list[Comparison]) -> str:
-    """Return a name that tells what was recorded: other readings or estimates, another name."""
+        w0 = 1.0  # it gives views their proportions
+    tabs = [_views(f"run_{k}", one, w0) for k, one in enumerate(shown, 1)]
+    front = tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs, active_tab=0)
+    aside = rrb.TextDocumentView(origin="/summary", name="What was found")
     estimates = [(n, k, e.value) for n, m in report.methods.items() for k, e in m.estimates.items()]
-    digest = hashlib.blake2b(repr(estimates).encode(), digest_size=12)
-    for one in shown:
-        for column in (one.time, one.record, one.model):
-            digest.update(np.ascontiguousarray(column).data)
-    return digest.hexdigest()
+
+    def log(stream: rr.RecordingStream) -> None:
+        for number, one in enumerate(shown, 1):
+            _log(stream, f"run_{number}", one, w0)
+
+    return runs.write(
+        path,
+        Path(report.experiment.path).name,
+        runs.content_of(estimates, (a for one in shown for a in (one.time, one.record, one.model))),
+        _known(report),
+        "\n".join(_page(report)),
+        frame.screen(front, aside, shares=[5, 2]),
+        log,
+    )
 
 
-def _describe(stream: rr.RecordingStream, report: IdentificationReport) -> None:
-    """Log the recording's name and, as properties, what the best method found."""
-    stream.send_recording_name(f"identification of {Path(report.experiment.path).name}")
+def _known(report: IdentificationReport) -> dict[str, float | str]:
+    """Return the properties of a recording: what the best method found."""
     known: dict[str, float | str] = {"kind": "identification"}
-    try:
-        best = report.best
-    except InputError:
-        best = None
+    best = next((found for found in report.methods.values() if found.sound), None)
     if best is not None:
         known["method"] = best.method
         for name, each in best.estimates.items():
@@ -108,12 +119,168 @@ def _describe(stream: rr.RecordingStream, report: IdentificationReport) -> None:
                 known[f"{name}_low"], known[f"{name}_high"] = map(float, each.ci95)
     if report.joint is not None:
         known["rms"] = float(report.joint.fit.rms)
-    stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
+    return known
 
 
-def _blueprint(shown: list[Comparison], w0: float) -> rrb.Blueprint:
-    """Return the layout: a tab a run, beside it what was found."""
-    runs = [decay.views(f"run_{k}", one, w0) for k, one in enumerate(shown, 1)]
-    front = runs[0] if len(runs) == 1 else rrb.Tabs(*runs, active_tab=0)
-    aside = rrb.TextDocumentView(origin="/summary", name="What was found")
-    return frame.screen(front, aside, shares=[5, 2])
+def _page(report: IdentificationReport) -> Iterator[str]:
+    """Yield the tables of what was found, with intervals, and everything that was warned of."""
+    best = next((found for found in report.methods.values() if found.sound), None)
+    if best is None:
+        yield from ("**No method could be applied.**", "")
+    else:
+        yield from (f"## By {best.method.replace('_', ' ')}", "")
+        yield from ("| parameter | value | 95 % interval | unit |", "|---|---|---|---|")
+        for name, each in {**best.estimates, **best.derived}.items():
+            yield f"| {name} | {_cells(each)} | {unit_of(name)} |"
+    if report.joint is not None and report.joint.fit.rms:
+        fit = report.joint.fit
+        noise = ", ".join(f"{reading.sigma:.3g}" for reading in report.joint.readings)
+        readings = counted(fit.samples, "reading")
+        yield ""
+        yield (
+            f"Residuals: {fit.rms:.3g} rad rms in {readings}; noise seen without a model: "
+            f"{noise} rad."
+        )
+    # A table a parameter: one of all would be too wide for a column of the window.
+    for parameter in COMPARED:
+        known = {n: m.estimates for n, m in report.methods.items() if parameter in m.estimates}
+        if known:
+            yield from ("", f"## {parameter} ({unit_of(parameter)}) by each method", "")
+            yield from ("| method | value | 95 % interval |", "|---|---|---|")
+            for method, estimates in known.items():
+                yield f"| {method.replace('_', ' ')} | {_cells(estimates[parameter])} |"
+    yield from ("", "## Warnings, and the record", "")
+    # The lines of estimates stand in the tables.
+    yield from (f"- {line}" for line in as_text(report) if not line.startswith(" "))
+
+
+def _cells(each: Estimate) -> str:
+    return f"{written(each.value, each.stderr or 0.0)} | {interval(each)}"
+
+
+def _views(root: str, one: Comparison, w0: float) -> rrb.Container:
+    """Return the views of a run: pendulums and phase plane left; angle and residual right."""
+    bounds = rrb.VisualBounds2D(x_range=[-REACH, REACH], y_range=[-REACH, REACH + 0.35])
+    pendulums = rrb.Spatial2DView(
+        origin=f"/{root}/pendulum",
+        name="Record and model" if one.model.size else "Record",
+        visual_bounds=bounds,
+    )
+    left: list[rrb.View] = [pendulums, _frame(one, w0).view(f"{root}/phase", "Phase plane")]
+    around = CLOSE * math.tau / w0
+    close = rrb.VisibleTimeRange(
+        frame.TIMELINE,
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-around),
+        end=rrb.TimeRangeBoundary.cursor_relative(seconds=around),
+    )
+    right: list[rrb.View] = [
+        rrb.TimeSeriesView(
+            origin=f"/{root}/angle",
+            name=f"{names.ANGLE}, {one.name}",
+            axis_x=_whole(one),
+            plot_legend=runs.LEGEND,
+        ),
+        rrb.TimeSeriesView(
+            origin=f"/{root}/angle",
+            name=f"{names.ANGLE}, near the cursor",
+            time_ranges=[close],
+            plot_legend=runs.LEGEND,
+        ),
+    ]
+    if np.isfinite(one.residual).any():
+        # The axis holds the residuals that count and the noise's band.
+        least = max(1.5 * runs.BAND * one.sigma, 1e-12)
+        reach = 1.05 * runs.MILLI * max(float(np.nanmax(np.abs(one.residual))), least)
+        right.append(
+            rrb.TimeSeriesView(
+                origin=f"/{root}/residual",
+                name="Record less model (mrad)",
+                axis_x=_whole(one),
+                axis_y=rrb.ScalarAxis(range=(-reach, reach)),
+                plot_legend=runs.LEGEND,
+            )
+        )
+    return rrb.Horizontal(
+        rrb.Vertical(*left), rrb.Vertical(*right), column_shares=[3, 4], name=one.name
+    )
+
+
+def _whole(one: Comparison) -> rrb.TimeAxis:
+    """Return an axis that holds the whole record."""
+    if not one.time.size:
+        return rrb.TimeAxis()
+    low, high = float(one.time[0]), float(one.time[-1])
+    pad = max(0.02 * (high - low), 1e-3)
+    ends = (rr.TimeRangeBoundary.absolute(seconds=at) for at in (low - pad, high + pad))
+    return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
+
+
+def _frame(one: Comparison, w0: float) -> frame.Frame:
+    """Return a frame that holds record and model: the whole circle, or small swings enlarged."""
+    known = np.isfinite(one.record) & ~one.left_out
+    theta = np.concatenate([one.record[known], one.model[np.isfinite(one.model)]])
+    speed = np.concatenate([one.speed[known], one.model_speed])
+    widest = float(np.max(np.abs(plane.wrapped(theta)), initial=0.0))
+    reach = math.pi if not 0 < widest < SMALL else MARGIN * widest
+    speeds = speed[np.isfinite(speed)]
+    speeds = plane.padded(speeds if speeds.size else np.zeros(1))
+    return frame.Frame.phase((-reach, reach), speeds, Units(w0, si=True))
+
+
+def _log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> None:
+    """Log one run: angles and peaks, the residual over the noise, pendulums, the phase plane."""
+    out, angle, left = one.left_out, f"{root}/angle", f"{root}/residual"
+    record = replace(RECORD, width=0.0) if one.sparse else RECORD
+    runs.series(stream, f"{angle}/model", one.model_time, one.model, MODEL)
+    runs.series(stream, f"{angle}/record", one.time, one.record, record)
+    if not one.sparse:
+        runs.series(stream, f"{angle}/peaks", one.peaks.time, one.peaks.amplitude, PEAKS)
+    runs.series(stream, f"{angle}/left_out", one.time[out], one.record[out], LEFT_OUT)
+    known = np.isfinite(one.residual)
+    look = RESIDUAL if one.sparse else replace(RESIDUAL, size=1.0)
+    runs.residual(stream, f"{left}/residual", one.time[known], one.residual[known], look)
+    if known.any() and one.sigma:
+        runs.noise(stream, left, one.time, one.sigma)
+    _pendulums(stream, f"{root}/pendulum", one)
+    _frame(one, w0).log(stream, f"{root}/phase")
+    _phase(stream, f"{root}/phase/data", one)
+
+
+def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
+    """Log both pendulums on one pivot: the model's broad, the record's thin and upon it."""
+    runs.pivots(stream, path, [0.0])
+    parts = [(RECORD, one.time, one.record, THIN)]
+    if one.model.size:
+        parts.append((MODEL, one.model_time, one.model, BROAD))
+    for look, time, theta, size in parts:
+        runs.pendulum(stream, f"{path}/data/{look.name}", time, theta, look, size)
+    places = [[REACH * x, REACH + 0.1] for x in (-0.5, 0.5)][: len(parts)]
+    legend = rr.Points2D(
+        places,
+        colors=[look.colour for look, *_ in parts],
+        radii=rr.Radius.ui_points([bob for *_, (_, bob, _) in parts]),
+    )
+    stream.log(f"{path}/axes/legend", legend, static=True)
+    below = [[x, y + 0.05] for x, y in places]
+    frame.write(stream, f"{path}/axes/legend/names", below, [look.name for look, *_ in parts])
+
+
+def _phase(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
+    """Log the model's whole curve, the record's points, and the points that run along both."""
+    known = np.isfinite(one.record) & np.isfinite(one.speed) & ~one.left_out
+    places = np.stack([plane.wrapped(one.record[known]), one.speed[known]], axis=1)
+    if known.any():
+        small = rr.Radius.ui_points(2.5 if one.sparse else 0.7)
+        spots = rr.Points2D(places.astype(np.float32), colors=[RECORD.colour], radii=small)
+        stream.log(f"{path}/record", spots, static=True)
+        now = Look(RECORD.colour, 5.0, 42.0)
+        columns.points(stream, f"{path}/record_now", one.time[known], places, now)
+    if not one.model.size:
+        return
+    there = np.isfinite(one.model)
+    curve = plane.broken_at_wrap(one.model[there], one.model_speed[there]).astype(np.float32)
+    lines = rr.LineStrips2D([curve], colors=[MODEL.colour], radii=rr.Radius.ui_points(1.0))
+    stream.log(f"{path}/curve", lines, static=True)
+    at = np.stack([plane.wrapped(one.model[there]), one.model_speed[there]], axis=1)
+    now = Look(MODEL.colour, 8.0, 41.0)
+    columns.points(stream, f"{path}/model_now", one.model_time[there], at, now)

@@ -8,7 +8,6 @@ import uuid
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.errors import InputError
 from pendmap.viewer import frame, trajectory
@@ -18,9 +17,8 @@ if TYPE_CHECKING:
     import rerun as rr
     import xarray as xr
 
+    from pendmap.charts.marks import Floats
     from pendmap.model import Pendulum, Rig
-
-    Floats = npt.NDArray[np.float64]
 
 ADDRESS: Final = "127.0.0.1:9876"
 """Where a viewer listens unless it is told otherwise."""
@@ -95,7 +93,7 @@ class Live:
         self._waiting: list[Floats] = []
         self._before = np.empty((3, 0))
         self._sent = 0
-        # A name of its own each time: what goes by one name is one recording to the viewer.
+        # A new name each time: to the viewer, one name is one recording.
         self._stream: rr.RecordingStream = frame.identified(uuid.uuid4().hex)
         with frame.strict():
             url = f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
@@ -112,7 +110,7 @@ class Live:
             self._send()
 
     def finish(self, dataset: xr.Dataset) -> None:
-        """Send what is left, the whole phase curve and what the trajectory says of itself.
+        """Send the waiting samples, the whole phase curve and the summary.
 
         Raises
         ------

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from pendmap.charts.marks import Floats
+
     Attributes = Mapping[Any, Any]
 
-Floats = npt.NDArray[np.float64]
 
 ARM = (120, 130, 145)
 BOB = (213, 94, 0)
@@ -136,7 +137,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log what the trajectory says of itself, and what of a long one is shown."""
+    """Log the summary of the trajectory, and which part of a long one is shown."""
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
     units = Units.of(dataset.attrs)
     if units.si:
@@ -187,7 +188,7 @@ def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) ->
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: int) -> None:
-    """Log angle, velocity and energy against time, by their lowest and highest in so many bins."""
+    """Log angle, velocity and energy against time, by their extremes in each of ``bins``."""
     units, theta, velocity = Units.of(attrs), motion.theta, motion.velocity
     for name, values in (
         ("theta", theta),
@@ -214,7 +215,7 @@ def moving(
 
     The effective gravity 1 + p cos(omega tau + phase) is that of a pivot at height
     -(p / omega^2) cos(omega tau + phase). Samples before ``since`` have been logged and are there
-    for the trail; of the others every so many are.
+    for the trail; of the others one of ``every`` is.
     """
     time, theta, velocity = motion.time, motion.theta, motion.velocity
     omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))

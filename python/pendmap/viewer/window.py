@@ -15,7 +15,7 @@ from pathlib import Path
 from pendmap.errors import InputError
 
 MAGIC = b"RRF2"
-"""How a recording begins."""
+"""First bytes of a recording."""
 
 PATIENCE = 2.0
 """Seconds in which a viewer that cannot start is expected to say so."""
@@ -120,7 +120,7 @@ def check_display() -> None:
 
 
 def _display() -> bool:
-    """Whether there seems to be a display; that it answers is seen when the viewer starts."""
+    """Whether a display is set; whether it answers is seen when the viewer starts."""
     names = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
     return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
 

@@ -1,4 +1,4 @@
-"""Figure 2 of the paper as a chart; figures 8 and 9 in files."""
+"""Trajectories that tumble, a column each, as a chart (figure 2)."""
 
 from __future__ import annotations
 
@@ -6,34 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Line, Panel, Points, holding
-from pendmap.render.written import written
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import Line, Points
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
-    from pathlib import Path
 
     import xarray as xr
-
-    from pendmap.comparison import ForcedComparison
-
-
-def draw_motions(  # noqa: PLR0913 (what, where, and how)
-    runs: Sequence[ForcedComparison],
-    path: str | os.PathLike[str],
-    *,
-    steady: bool,
-    title: str,
-    subtitle: str,
-    dpi: float | None = None,
-) -> Path:
-    """Draw forced runs with a model of them into a file: steady states, or runs that tumble."""
-    from pendmap.paper import drawings  # noqa: PLC0415 (matplotlib takes a while)
-
-    make = drawings.steady_figure if steady else drawings.tumbling_figure
-    return written(path, lambda dpi: make(runs, dpi=dpi, title=title, subtitle=subtitle), dpi=dpi)
 
 
 HISTORY, CURVE = 60, 100
@@ -42,8 +22,8 @@ HISTORY, CURVE = 60, 100
 _INK = "#1d3557"
 
 
-def tumbling_chart(runs: Sequence[xr.Dataset], title: str | None) -> Chart:
-    """Return the chart of figure 2."""
+def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
+    """Return time history, phase plane and Poincare section, from the first instant."""
     gammas = sorted({float(run.attrs["gamma"]) for run in runs})
     damping = ", ".join(f"{gamma:g}" for gamma in gammas)
     periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]
@@ -51,15 +31,9 @@ def tumbling_chart(runs: Sequence[xr.Dataset], title: str | None) -> Chart:
         f"\N{GREEK SMALL LETTER GAMMA} = {damping};   time history, phase plane ({min(periods)} "
         f"periods), Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section ({points} points)"
     )
-    columns = [_column(run, k) for k, run in enumerate(runs)]
-    return Chart(
-        title or "Trajectories",
-        shared,
-        [panel for column in columns for panel in column],
-        rows=[[column[row].name for column in columns] for row in range(3)],
-        heights=(0.7, 1.0, 1.0),
-        size=(0.6 + 3.1 * len(runs), 9.0),
-    )
+    rows = list(zip(*(_column(run, k) for k, run in enumerate(runs)), strict=True))
+    size = (0.6 + 3.1 * len(runs), 9.0)
+    return Chart.of(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
 
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:

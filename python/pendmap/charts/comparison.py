@@ -1,0 +1,317 @@
+"""A comparison: a model over records that it was not fitted to, free decays and forced runs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.charts import names, plane
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.identification import error_panels, residuals
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Span, Text
+from pendmap.charts.methods import MEASURED, look, nothing
+from pendmap.comparison.forced import ForcedComparison
+from pendmap.comparison.forced_summary import written
+from pendmap.comparison.free import MODEL, RunComparison
+from pendmap.formatting import counted
+from pendmap.identification.methods.joint import as_angles
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pendmap.charts.marks import Floats
+    from pendmap.comparison import Comparison
+    from pendmap.comparison.forced import Statistic
+
+    Pair = tuple[str, str]
+    Compared = RunComparison | ForcedComparison
+
+ALL: Final = 3
+"""Runs up to which each has a row."""
+CHOSEN: Final = 2
+"""Rows where there are more: those held out first, then those that the model misses most."""
+WIDTH: Final = 11.6
+ROW: Final = 2.35
+ALONE: Final = 3.4
+OVERVIEW: Final = 1.95
+"""Inches: of the sheet, of a run's row, of the only one, of the panel of all runs. The whole is no
+higher than a screen is beside its width."""
+SPREAD: Final = 10.0
+"""Ratio of the greatest to the least residual from which they are drawn logarithmically."""
+HELD: Final = "#d55e00"
+NAMED: Final = 40
+"""Runs that are named below a panel at most."""
+DOTS: Final = 6_000
+"""Readings of a decay that are drawn."""
+SAMPLES: Final = 20_000
+"""Samples of a curve that are drawn."""
+WELLS: Final = 14
+"""Wells up to which each has a band."""
+WELL, ENSEMBLE = "#f0f0f0", "#9ecae1"
+"""Colours of every other well, and of an ensemble."""
+EVERY: Final = 3
+"""Samples of a measured cycle of which one is drawn."""
+BINS: Final = 24
+"""Bins of a histogram of an ensemble."""
+TALL: Final = 0.36
+"""Height of a histogram, over its row's."""
+PAIR: Final = ("record", "model")
+OF_PAPER: Final = ("virtual rig", "identified model")
+"""Names of what was measured and of the model: of a comparison, and in the paper's figures."""
+_SI: Final = Units(si=True)
+
+
+def sheet(comparison: Comparison) -> Sheet:
+    """Return a row a run, with record and model, the residual, figure 7; or the forced run's.
+
+    Where there are more than :data:`ALL` runs, all of them stand in one panel, and
+    :data:`CHOSEN` have rows.
+    """
+    every = comparison.every
+    many = len(every) > ALL
+    ranked = sorted(every, key=lambda one: (not one.run.hold_out, -_ratio(one)))
+    shown = ranked[:CHOSEN] if many else every
+    kinds = ((len(comparison.runs), "free decay"), (len(comparison.forced), "forced run"))
+    said = ", ".join(counted(count, kind) for count, kind in kinds if count)
+    charts = [_row(one, ALONE if len(shown) == 1 else ROW) for one in shown]
+    if many:
+        said += f"; below, {len(shown)} of them: held out first, then those missed most"
+        charts.insert(0, _overview(every))
+    return Sheet("Model against record", said, [charts], legend=True)
+
+
+def _ratio(one: Compared) -> float:
+    """Return the rms of what a model misses, over the record's noise."""
+    return one.rms / one.sigma if one.sigma > 0 else math.inf
+
+
+def _overview(runs: Sequence[Compared]) -> Chart:
+    """Return how far the model is from each run, in units of its noise."""
+    ratios = np.array([min(_ratio(one), 1e12) for one in runs])
+    held = np.array([one.run.hold_out for one in runs])
+    places = np.arange(len(runs), dtype=float)
+    marks: list[Mark] = [Level(1.0, colour=MEASURED, width=0.8, dash="--")]
+    for which, colour in ((~held, look(MODEL).colour), (held, HELD)):
+        marks.append(Points(places[which], ratios[which], colour=colour, size=5.0))
+    low, high = min(float(ratios.min()), 1.0), max(float(ratios.max()), 1.0)
+    up = Axis("rms / noise", (0.0, 1.15 * high))
+    if high > SPREAD * low:
+        up = Axis("rms / noise", (low / 1.5, high * 1.5), "log")
+    every = -(-len(runs) // NAMED)
+    ticks = [(float(k), runs[k].run.name) for k in range(0, len(runs), every)]
+    across = Axis("", (-0.5, len(runs) - 0.5), ticks=ticks)
+    title = "all runs: the residual over the noise" + ("; orange: held out" if held.any() else "")
+    return Chart("", "", [Panel("all", title, across, up, marks)], size=(WIDTH, OVERVIEW))
+
+
+def _row(one: Compared, high: float) -> Chart:
+    run = one.run
+    heading = (
+        f"{run.name}{', held out' if run.hold_out else ''}: rms {_small(one.rms)}, "
+        f"{_ratio(one):.3g} times the noise of {_small(one.sigma)}"
+    )
+    if isinstance(one, ForcedComparison):
+        heading += f", in {counted(one.windows, 'window')}"
+    panels = _forced(one) if isinstance(one, ForcedComparison) else _free(one)
+    return Chart(heading, "", panels, size=(WIDTH, high))
+
+
+def _small(angle: float) -> str:
+    """Return an angle in rad or mrad."""
+    return f"{angle:.3g} rad" if angle >= 1 else f"{1e3 * angle:.3g} mrad"
+
+
+def _free(one: RunComparison) -> list[Panel]:
+    """Return record and model, what is between them, and errors of periods and peaks."""
+    left = residuals(one.run, one.residual, one.sigma, MODEL, "record less model")
+    panels = [_over_record(one), left]
+    if one.errors is None:
+        few = "fewer than three peaks: no errors of periods and peaks"
+        why = one.table.left_out or next(iter(one.table.lost.values()), "") or few
+        return [*panels, *nothing("", why, 40).panels]
+    titles = ("error of each period", "error of each peak")
+    return [*panels, *error_panels({MODEL: one.errors}, one.peaks, titles)]
+
+
+def _over_record(one: RunComparison) -> Panel:
+    run, sensor = one.run, one.run.accelerometer
+    some = slice(None, None, max(1, run.time.size // DOTS))
+    factor = 1.0 if sensor is None else sensor.gain
+    readings = run.theta if sensor is None else factor * as_angles(run)
+    shown = np.where(run.trusted, readings, np.nan)
+    # The reading of the model: what the sensor makes of its angle stands in the residual alone.
+    angle = readings - factor * one.residual
+    if sensor is None and run.rod_sensor is not None:
+        angle = one.curve[0]  # a gyroscope reads no angle
+    made, model = np.where(run.trusted, angle, np.nan), look(MODEL)
+    dots: dict[str, Any] = {"colour": MEASURED, "size": 1.5, "name": PAIR[0]}
+    marks: list[Mark] = [
+        Points(run.time[some], shown[some], **dots),
+        Line(run.time[some], made[some], colour=model.colour, width=0.7, name=PAIR[1]),
+    ]
+    up = names.angle(holding(shown))
+    if sensor is not None:
+        unit = sensor.unit.replace("s2", "s\u00b2")
+        up = Axis(f"acceleration ({unit})", holding(shown))
+    return Panel("record", "record and model", names.seconds(run.time), up, marks)
+
+
+def _forced(one: ForcedComparison) -> list[Panel]:
+    """Return a forced run: the record, its phase plane, the model's, the statistics."""
+    panels = [history(one), phase(one)]
+    if one.steady is None or one.steady.measured.at_rest:
+        panels.append(phase(one, model=True, title="a member of the ensemble"))
+    else:
+        panels.append(cycles(one, one.steady.measured.kind))
+    return [*panels, statistics(one)]
+
+
+def history(
+    one: ForcedComparison, pair: Pair = PAIR, *, model: bool = False, title: str = "record"
+) -> Panel:
+    """Return the angle in turns against time, of the record or a member; wells are bands."""
+    reading, colour = (one.example[0], look(MODEL).colour) if model else (one.measured, MEASURED)
+    turns, every = reading / math.tau, max(1, one.time.size // SAMPLES)
+    low, high = math.floor(turns.min() + 0.5), math.ceil(turns.max() - 0.5)
+    style: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[model]}
+    marks: list[Mark] = [Line(one.time[::every], turns[::every], **style)]
+    if high - low < WELLS:
+        wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
+        marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
+    up = "\N{GREEK SMALL LETTER THETA}/2\N{GREEK SMALL LETTER PI} (turns)"
+    ends = holding(turns, margin=0.08)
+    clock = Axis(names.TIME, (float(one.time[0]), float(one.time[-1])))
+    return Panel(f"history {title}", title, clock, Axis(up, ends), marks)
+
+
+def phase(one: ForcedComparison, *, model: bool = False, title: str = "record") -> Panel:
+    """Return the path of the record or of a member in the phase plane, to one scale."""
+    path, colour = (one.measured, one.velocity), MEASURED
+    if model:
+        path, colour = one.example, look(MODEL).colour
+    reach = 1.08 * max(float(np.abs(v).max()) for v in (one.velocity, one.example[1]))
+    curve = plane.broken_at_wrap(path[0][:SAMPLES], path[1][:SAMPLES])
+    sides = names.phase_plane((-math.pi, math.pi), (-reach, reach), _SI)
+    return Panel(f"phase {title}", title, *sides, [Line(*curve.T, colour=colour, width=0.4)])
+
+
+def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
+    """Return the steady state of a record as points, and the model's as a line."""
+    found, model = one.steady, look(MODEL)
+    marks: list[Mark] = []
+    reach, speeds = math.pi, np.zeros(1)
+    if found is not None:
+        every = [cycle for cycle in (found.measured, found.model) if cycle is not None]
+        speeds = np.concatenate([cycle.velocity for cycle in every])
+        if found.measured.w == 0:
+            reach = 1.08 * max(float(np.abs(cycle.theta).max()) for cycle in every)
+        some = slice(None, None, EVERY)
+        at = plane.wrapped(found.measured.theta)[some], found.measured.velocity[some]
+        circle: dict[str, Any] = {
+            "fill": "none",
+            "size": 4.0,
+            "edge_width": 0.8,
+            "name": pair[0],
+        }
+        marks = [Points(*at, colour=MEASURED, **circle)]
+        if found.model is not None:
+            theta, velocity = found.model.theta, found.model.velocity
+            theta = np.append(theta, theta[0] + math.tau * found.model.w)
+            curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
+            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
+    sides = names.phase_plane((-reach, reach), plane.padded(speeds), _SI)
+    return Panel(f"cycles {one.run.name}", title, *sides, marks)
+
+
+def statistics(one: ForcedComparison) -> Panel:
+    """Return each statistic in a row: the ensemble's histogram, and the record's value as a mark.
+
+    What has not come by the record's end stands hatched at the right.
+    """
+    marks: list[Mark] = []
+    for k, each in enumerate(one.statistics):
+        base = k + 1.0
+        own, low, high = (written(each, value, 3) for value in (each.measured, *each.ci95))
+        unit = f" {each.unit}" if each.unit and math.isfinite(each.ci95[0]) else ""
+        said = f"{each.name} {own} ({low if low == high else f'{low} to {high}'}){unit}"
+        marks.append(Text(0.0, base - TALL - 0.07, said, align=("left", "bottom"), size=7.5))
+        marks += _histogram(each, base)
+    panel = bare("statistics", *marks, high=len(one.statistics))
+    return dataclasses.replace(panel, title="record (95 % of the ensemble)")
+
+
+def _histogram(each: Statistic, base: float) -> list[Mark]:
+    known = each.ensemble[np.isfinite(each.ensemble)]
+    ends = np.append(known, each.measured if math.isfinite(each.measured) else known[:0])
+    low, high = (float(ends.min()), float(ends.max())) if ends.size else (0.0, 1.0)
+    wide = high - low or 1.0
+    whole = not each.unit and wide < BINS
+    edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, low + wide, BINS + 1)
+    counts, edges = np.histogram(known, edges)
+    never = each.ensemble.size - known.size
+    unit = TALL / max(counts.max(initial=0), never, 1)
+    places = 0.9 * (edges - edges[0]) / (edges[-1] - edges[0])
+    columns = zip(places[:-1], places[1:], counts, strict=True)
+    made = [_column(left, right, base, unit * n) for left, right, n in columns if n]
+    marks: list[Mark] = [Areas(made, colour=ENSEMBLE, name="ensemble")]
+    if never:
+        last = [_column(0.95, 1.0, base, unit * never)]
+        name = "not settled by the end"
+        marks.append(Areas(last, colour=ENSEMBLE, name=name))
+        marks.append(Areas(last, colour="#ffffff", hatch="////", name=name))
+    marks.append(Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6))
+    at = 0.975
+    if math.isfinite(each.measured):
+        at = 0.9 * (each.measured - edges[0]) / (edges[-1] - edges[0])
+    up = np.array([base, base - TALL])
+    return [*marks, Line(np.full(2, at), up, colour=MEASURED, width=1.6)]
+
+
+def _column(left: float, right: float, base: float, high: float) -> Floats:
+    return np.array([(left, base), (right, base), (right, base - high), (left, base - high)])
+
+
+# The paper's figures 8 and 9.
+
+
+def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart:
+    """Return a phase plane for each run: the record as points, the model as a line."""
+    panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
+    rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
+    size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
+    return Chart.of(title, subtitle, rows, columns=2, size=size)
+
+
+def _reached(one: ForcedComparison) -> str:
+    found = one.steady
+    if found is None:
+        return "no steady state"
+    if found.model is None:
+        return f"{found.measured.kind}, not that of the model"
+    return f"{found.measured.kind}, amplitude of the model {100 * found.overestimate:+.2g} %"
+
+
+def _drive(one: ForcedComparison) -> str:
+    given = one.run.drive or {}
+    p, frequency = given.get("p") or 0.0, given.get("Omega") or 0.0
+    return f"p = {p:g}, \N{GREEK CAPITAL LETTER OMEGA} = {frequency:.4g} rad/s"
+
+
+def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:
+    """Return histories above, phase planes and statistics below, of each run.
+
+    A record and a member of the ensemble stand beside one another, never over one another.
+    """
+    charts = []
+    for one in runs:
+        member: dict[str, Any] = {"model": True, "title": "a member"}
+        above = [history(one, OF_PAPER), history(one, OF_PAPER, **member)]
+        below = [phase(one), phase(one, **member), statistics(one)]
+        heading = f"{_drive(one)}: {counted(one.ensemble.members, 'member')} of the ensemble"
+        style = {"heights": (0.7, 1.0), "size": (WIDTH, 4.4)}
+        charts.append(Chart.of(heading, "", [above, below], **style))
+    return Sheet(title, subtitle, [charts], legend=True)

@@ -1,0 +1,222 @@
+"""The record of a decay with its half cycles: angle, velocity and its sign (figure 4)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.charts import names
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, bars
+from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
+from pendmap.charts.record import UNUSED
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pendmap.charts.marks import Floats
+    from pendmap.identification import IdentificationReport, Peaks
+    from pendmap.records import Run
+
+NEAR: Final = 6
+"""Half cycles of a near view."""
+POINTS: Final = 500
+"""Places of a near view at which the velocity is computed."""
+SPAN: Final = 0.2
+"""Half width of the stretch a cubic is fitted to, over the length of a half cycle."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Course:
+    """A record as its peaks count it: the turns that it rests away from its start taken off.
+
+    Samples for fitting (s, rad), the number of the half cycle of each, -1 outside; all others.
+    """
+
+    time: Floats
+    theta: Floats
+    half: NDArray[np.int64]
+    other_time: Floats
+    other_theta: Floats
+
+
+def course_of(run: Run, peaks: Peaks) -> Course:
+    """Return a run's samples with the numbers of their half cycles."""
+    good = run.trusted
+    time, theta = run.time[good], run.theta[good]
+    away = 0.0
+    half = np.full(time.size, -1, np.int64)
+    if len(peaks):
+        at = np.interp(peaks.time, time, theta) - peaks.amplitude
+        away = math.tau * round(float(np.median(at)) / math.tau)
+        place = np.searchsorted(peaks.time, time, side="right") - 1
+        inside = (place >= 0) & (place < len(peaks) - 1)
+        place = np.clip(place, 0, max(len(peaks) - 2, 0))
+        if len(peaks) > 1:
+            whole = np.diff(peaks.index)[place] == 1
+            half = np.where(inside & whole, peaks.index[place], -1)
+    return Course(time, theta - away, half, run.time[~good], run.theta[~good] - away)
+
+
+def first_and_last(peaks: Peaks, count: int = NEAR) -> list[tuple[float, float]]:
+    """Return the spans of the first and the last half cycles; one span where these are all."""
+    time = peaks.time
+    if time.size <= 2 * count + 1:
+        return [(float(time[0]), float(time[-1]))]
+    return [(float(time[0]), float(time[count])), (float(time[-1 - count]), float(time[-1]))]
+
+
+def part(report: IdentificationReport) -> Chart:
+    """Return the whole record, and angle, velocity and its sign of the first and the last peaks."""
+    run, peaks = report.run, report.peaks
+    course = course_of(run, peaks)
+    few = len(peaks) < 3  # noqa: PLR2004 (a half cycle on either side)
+    whole = _whole(course, peaks, thin=few or not run.peaks_only)
+    columns = [] if few else [_near(report, course, *near) for near in _spans(peaks)]
+    rows = [[whole], *zip(*columns, strict=True)]
+    shares = [1.0, 0.35] if run.peaks_only else [1.0, 0.8, 0.28]
+    size = (8.6, 2.4 if few else 4.6 if run.peaks_only else 5.6)
+    heights = [1.1, *([] if few else shares)]
+    return Chart.of("The record and its half cycles", "", rows, heights=heights, size=size)
+
+
+def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:
+    spans = first_and_last(peaks)
+    said = ["the first half cycles", "the last half cycles"] if len(spans) > 1 else ["all of them"]
+    return list(zip(said, spans, strict=True))
+
+
+def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
+    """Return the whole record, as a line that is ``thin``, or as its peaks alone."""
+    none = np.empty(0)
+    cross: dict[str, Any] = {"marker": "|", "edge_width": 1.2, "name": "crossings of zero"}
+    circle: dict[str, Any] = {"fill": "white", "edge_width": 0.9, "name": "peaks"}
+    marks: list[Mark] = [
+        Line(none, none, colour=EVEN, width=2.0, name="even half cycles"),
+        Line(none, none, colour=ODD, width=2.0, name="odd half cycles"),
+        Points(none, none, colour=MEASURED, size=4.5, **circle),
+        Points(course.other_time, course.other_theta, colour=UNUSED, size=1.2),
+    ]
+    if peaks.crossing_time.size:
+        marks.append(Points(none, none, colour=MEASURED, size=7.0, **cross))
+    if thin:
+        marks += _coloured(course.time, course.theta, course.half, 0.6)
+    marks += _peaks(peaks, 1.6 if thin else 3.0, by_parity=not thin)
+    theta = np.concatenate([course.theta, course.other_theta])
+    more = "; grey: not for fitting" if course.other_time.size else ""
+    title = f"the whole record, {len(peaks)} peaks{more}"
+    clock = names.seconds(np.concatenate([course.time, course.other_time]))
+    return Panel("whole", title, clock, names.angle(holding(theta)), marks)
+
+
+def _near(
+    report: IdentificationReport, course: Course, title: str, span: tuple[float, float]
+) -> list[Panel]:
+    """Return angle, velocity and its sign over a span, from the top."""
+    run, peaks = report.run, report.peaks
+    ends = holding(span, margin=0.02)
+    clock, bare = Axis(names.TIME, ends), Axis("", ends, ticks=())
+    angle, values = _angle(course, peaks, ends, only=run.peaks_only)
+    panels = [Panel(f"angle {title}", title, bare, names.angle(holding(values)), angle)]
+    if not run.peaks_only:
+        velocity, values = _velocity(run, course, peaks, ends)
+        up = names.angle(holding(values), names.speed(Units(si=True)))
+        panels.append(Panel(f"velocity {title}", "", bare, up, velocity))
+    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, "\N{MINUS SIGN}1"), (0, "0"), (1, "1")])
+    return [*panels, Panel(f"sign {title}", "", clock, signs, _sign(peaks))]
+
+
+def _coloured(time: Floats, values: Floats, half: NDArray[np.int64], width: float) -> list[Mark]:
+    """Return a curve, each half cycle in the colour of its parity, the rest grey."""
+    marks: list[Mark] = []
+    for which, colour in (
+        (half < 0, UNUSED),
+        ((half >= 0) & (half % 2 == 0), EVEN),
+        ((half >= 0) & (half % 2 == 1), ODD),
+    ):
+        # One sample more at the end, so that the pieces meet.
+        shown = which | np.concatenate([[False], which[:-1]])
+        marks.append(Line(time, np.where(shown, values, np.nan), colour=colour, width=width))
+    return marks
+
+
+def _peaks(peaks: Peaks, size: float, *, by_parity: bool = False) -> list[Mark]:
+    look: dict[str, Any] = {"fill": "white", "edge_width": 0.4 + 0.11 * size, "order": 4.0}
+    return [
+        Points(
+            peaks.time[peaks.odd == odd],
+            peaks.amplitude[peaks.odd == odd],
+            colour=colour if by_parity else MEASURED,
+            size=size,
+            **look,
+        )
+        for odd, colour in ((False, EVEN), (True, ODD))
+    ]
+
+
+def _angle(
+    course: Course, peaks: Peaks, ends: tuple[float, float], *, only: bool
+) -> tuple[list[Mark], Floats]:
+    """Return the angle with its peaks, their 95 % intervals and the crossings; and all angles."""
+    near = (course.time >= ends[0]) & (course.time <= ends[1])
+    some = peaks.select((peaks.time >= ends[0]) & (peaks.time <= ends[1]))
+    known = some.select(np.isfinite(some.stderr_amplitude))
+    wide = Z95 * known.stderr_amplitude
+    cross = peaks.crossing_time[(peaks.crossing_time >= ends[0]) & (peaks.crossing_time <= ends[1])]
+    marks: list[Mark] = []
+    if not only:
+        marks += _coloured(course.time[near], course.theta[near], course.half[near], 1.1)
+    lines = bars(known.time, known.amplitude - wide, known.amplitude + wide)
+    marks += [
+        Line(*lines, colour=MEASURED, width=0.8, order=3.0),
+        *_peaks(some, 4.5, by_parity=only),
+        Level(0.0, colour=QUIET, width=0.6, order=0.0),
+        Points(cross, 0 * cross, colour=MEASURED, marker="|", size=8.0, edge_width=1.2),
+    ]
+    return marks, np.concatenate([course.theta[near], some.amplitude])
+
+
+def _velocity(
+    run: Run, course: Course, peaks: Peaks, ends: tuple[float, float]
+) -> tuple[list[Mark], Floats]:
+    """Return the velocity that was measured, or else the slopes of cubics through the samples."""
+    near = (course.time >= ends[0]) & (course.time <= ends[1])
+    time, half = course.time[near], course.half[near]
+    if run.velocity is not None:
+        speed = run.velocity[run.trusted][near]
+    else:
+        every = max(1, time.size // POINTS)
+        time, half = time[::every], half[::every]
+        within = (peaks.time >= ends[0]) & (peaks.time <= ends[1])
+        speed = _slopes(course, time, SPAN * float(np.median(np.diff(peaks.time[within]))))
+    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
+    return [*_coloured(time, speed, half, 1.1), zero], speed
+
+
+def _slopes(course: Course, at: Floats, reach: float) -> Floats:
+    """Return the slope in the middle of a cubic through the samples within a reach, rad/s."""
+    result = np.full(at.size, math.nan)
+    low = np.searchsorted(course.time, at - reach)
+    high = np.searchsorted(course.time, at + reach, side="right")
+    for k, (a, b) in enumerate(zip(low, high, strict=True)):
+        if b - a >= 5:  # noqa: PLR2004 (one more than a cubic has)
+            scaled = (course.time[a:b] - at[k]) / reach
+            powers = np.vander(scaled, 4, increasing=True)
+            result[k] = np.linalg.lstsq(powers, course.theta[a:b], rcond=None)[0][1] / reach
+    return result
+
+
+def _sign(peaks: Peaks) -> list[Mark]:
+    """Return the sign of the velocity: that of the way from each peak to the next."""
+    marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
+    for parity, colour in ((0, EVEN), (1, ODD)):
+        whole = np.flatnonzero((np.diff(peaks.index) == 1) & (peaks.index[:-1] % 2 == parity))
+        sign = np.sign(peaks.amplitude[whole + 1] - peaks.amplitude[whole])
+        begin, end, none = peaks.time[whole], peaks.time[whole + 1], np.zeros(whole.size)
+        corners = np.array([(begin, none), (end, none), (end, sign), (begin, sign)])
+        marks.append(Areas(list(corners.transpose(2, 0, 1)), colour=colour, alpha=0.85))
+    return marks

@@ -1,0 +1,188 @@
+"""Marks of charts: lines, points, bands, images and words, as arrays and plain values.
+
+Marks stand in the units of their axes. Where a mark has a ``name``, a legend names it; marks of one
+name share a line there. Where it has a ``path``, a recording holds it there, below the data of its
+panel.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+Floats = npt.NDArray[np.float64]
+Dash = str | tuple[float, ...]
+Ends = tuple[float, float]
+
+INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
+"""Colours of text and axes, of what is secondary, and of warnings."""
+DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)
+"""Dashes: lengths of lines and gaps, in widths of the line."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mark:
+    """Attributes of all marks; a mark of higher ``order`` covers the others."""
+
+    colour: str = INK
+    name: str = ""
+    path: str = ""
+    order: float | None = None
+    alpha: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Mark):
+    """A line through points, broken where they are not numbers; ``halo`` is a colour around it."""
+
+    x: Floats
+    y: Floats
+    _: dataclasses.KW_ONLY
+    width: float = 1.2
+    dash: Dash = "-"
+    step: bool = False
+    halo: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Points(Mark):
+    """Separate points; ``fill`` and ``edge`` are by default the colour."""
+
+    x: Floats
+    y: Floats
+    _: dataclasses.KW_ONLY
+    marker: str = "o"
+    size: float = 3.0
+    fill: str = ""
+    edge: str = ""
+    edge_width: float = 0.0
+    halo: str = ""
+    clip: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Mark):
+    """The area between two curves."""
+
+    x: Floats
+    low: Floats
+    high: Floats
+    _: dataclasses.KW_ONLY
+    step: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Steps(Mark):
+    """A histogram, ``n`` values over ``n + 1`` edges: its outline, or its area."""
+
+    edges: Floats
+    values: Floats
+    _: dataclasses.KW_ONLY
+    filled: bool = False
+    width: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Areas(Mark):
+    """Polygons, shape (m, 2) each; hatched, or full."""
+
+    shapes: Sequence[Floats]
+    _: dataclasses.KW_ONLY
+    hatch: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Colours:
+    """Colour scale of an image, and the name of the bar beside it.
+
+    ``scale`` is ``linear``, ``log``, ``centred`` (two halves about 0) or ``counts`` (whole numbers
+    in steps); ``beyond`` says which ends values exceed.
+    """
+
+    name: str
+    map: str
+    low: float
+    high: float
+    scale: Literal["linear", "log", "centred", "counts"] = "linear"
+    beyond: Literal["neither", "min", "max", "both"] = "neither"
+    ticks: Sequence[float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Image(Mark):
+    """Cells, row 0 lowest, between the ends of both axes.
+
+    ``values`` are numbers, shape (rows, columns), nan where there is none, and ``colours`` how they
+    are coloured; or they are numbers of ``classes``, pairs of name and colour.
+    """
+
+    values: npt.NDArray[Any]
+    x: Ends
+    y: Ends
+    _: dataclasses.KW_ONLY
+    colours: Colours | None = None
+    classes: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Level(Mark):
+    """A line across the panel at a value of one axis."""
+
+    value: float
+    _: dataclasses.KW_ONLY
+    axis: Literal["x", "y"] = "y"
+    width: float = 0.7
+    dash: Dash = "-"
+
+
+@dataclass(frozen=True, eq=False)
+class Span(Mark):
+    """Stretches of one axis, shaded across the panel, shape (n, 2)."""
+
+    ends: npt.ArrayLike
+    _: dataclasses.KW_ONLY
+    axis: Literal["x", "y"] = "x"
+
+
+@dataclass(frozen=True, eq=False)
+class Text(Mark):
+    """Words at a place, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
+
+    x: float
+    y: float
+    text: str
+    _: dataclasses.KW_ONLY
+    inside: bool = False
+    align: tuple[str, str] = ("center", "center")
+    boxed: bool = False
+    size: float = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Mark):
+    """Rows of words over a whole panel; words of the first column begin, others end at a line."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
+    """Return lines, shape (n, 2) each, as one that is broken between them: x and y."""
+    gap = np.full((1, 2), np.nan)
+    parts = [part for line in lines for part in (line, gap)]
+    both = np.concatenate([np.empty((0, 2)), *parts])
+    return both[:, 0], both[:, 1]
+
+
+def bars(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Return upright bars from low to high as one broken line: x and y."""
+    at, bottom, top = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, low, high)))
+    gap = np.full(at.shape, np.nan)
+    return np.repeat(at, 3), np.stack([bottom, top, gap], axis=1).ravel()
