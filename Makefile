@@ -12,7 +12,7 @@ demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
 develop: $(VENV)/.develop ## set up everything for work on pendmap itself
 
 # The modules of tests/rust that ask for the instruction set themselves: what the lanes compute.
-LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bpath()' tests/rust/*.rs)))
+LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bsimd()' tests/rust/*.rs)))
 PYTEST := $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
 test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
@@ -21,8 +21,8 @@ test: $(VENV)/.develop ## set up everything and run the tests, all but the thoro
 
 test-all: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
 	cargo test --locked --quiet
-	for path in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
-		PENDMAP_SIMD=$$path cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
+	for simd in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
+		PENDMAP_SIMD=$$simd cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
 	$(PYTEST)
 
 SEED ?= 1

@@ -8,7 +8,7 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use pendmap::attractor::{Catalogue, Effort};
 use pendmap::integrate::accuracy::choose;
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
@@ -23,11 +23,11 @@ fn search(criterion: &mut Criterion) {
     let axis = |name, half: f64| Axis::new(name, -half, half, 1000).expect("an axis");
     let plane = Starts::Grid { theta: axis("theta", PI), velocity: axis("velocity", 3.0) };
     let starts = plane.sampled_states(400, 0);
-    let path = Path::choose().expect("PENDMAP_SIMD names a path of this processor");
-    let mut group = criterion.benchmark_group(format!("search on {path}"));
+    let simd = InstructionSet::choose().expect("PENDMAP_SIMD names a simd of this processor");
+    let mut group = criterion.benchmark_group(format!("search on {simd}"));
     for (name, p, omega, count) in POINTS {
         let pendulum = Pendulum::new(0.1, p, omega, 0.0, 0.0).expect("in range");
-        let (strobe, _) = choose(&pendulum, &starts, 1e-6, path).expect("steps");
+        let (strobe, _) = choose(&pendulum, &starts, 1e-6, simd).expect("steps");
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);

@@ -1,5 +1,5 @@
 //! What each effect costs: the time of a step of a trajectory with it, beside that of a step of the
-//! fast path at the same number of steps a period; and the time of a period, beside the fast path's,
+//! fast route at the same number of steps a period; and the time of a period, beside the fast route's,
 //! where either takes the steps that it needs for an error of 1e-6.
 //!
 //! An effect that a user can write as a formula is measured as one too, beside the library's own.
@@ -11,18 +11,18 @@ use std::time::Instant;
 
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{State, Strobe};
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::effects::{Group, Mappable, Parameter};
 use pendmap::model::{Effect, Kind, Pendulum};
 
-#[path = "../tests/rust/rewritten.rs"]
+#[path = "../tests/rust/effects_as_formulas.rs"]
 #[allow(dead_code)] // the tests use more of it
-mod rewritten;
+mod effects_as_formulas;
 
-use rewritten::rewritten;
+use effects_as_formulas::rewritten;
 
-/// Trajectories: whole bundles on every path.
+/// Trajectories: whole bundles on every instruction set.
 const COUNT: usize = 6144;
 const STEPS: usize = 24;
 const PERIODS: usize = 2;
@@ -55,10 +55,10 @@ fn times(one: &Strobe, other: &Strobe) -> [f64; 2] {
 }
 
 /// The map with the steps that it needs.
-fn chosen(pendulum: &Pendulum, path: Path) -> Strobe {
+fn chosen(pendulum: &Pendulum, simd: InstructionSet) -> Strobe {
     let (theta, velocity) = columns();
     let starts: Vec<State> = theta.into_iter().zip(velocity).map(|s| [s.0, s.1]).collect();
-    choose(pendulum, &starts[..400], TOL, path).expect("steps").0
+    choose(pendulum, &starts[..400], TOL, simd).expect("steps").0
 }
 
 /// The effect in the middle of its typical range.
@@ -79,33 +79,33 @@ fn main() {
     };
     let base = Pendulum::new(0.0, 1.0, 2.0, 0.0, 0.0).expect("in range");
     let damped = Pendulum { gamma: 0.1, ..base.clone() };
-    for path in Path::ALL.into_iter().filter(|path| path.available()) {
-        let fast = Strobe::new(&damped, STEPS, path);
+    for simd in InstructionSet::ALL.into_iter().filter(|simd| simd.available()) {
+        let fast = Strobe::new(&damped, STEPS, simd);
         println!(
-            "{path}, {STEPS} steps a period  ns a step      over  steps for   period   formula"
+            "{simd}, {STEPS} steps a period  ns a step      over  steps for   period   formula"
         );
         println!(
-            "                                         fast path    {TOL:e}      over      over"
+            "                                         fast simd    {TOL:e}      over      over"
         );
         for kind in Kind::ALL {
             let definition = kind.definition();
             let absent = definition.group == Group::Reading || definition.mappable == Mappable::No;
-            if absent || !wanted(&[path.name(), definition.name]) {
+            if absent || !wanted(&[simd.name(), definition.name]) {
                 continue;
             }
             let base = if *kind == Kind::ViscousDamping { &base } else { &damped };
             let mut pendulum = base.clone().with_effect(typical(kind)).expect("once");
             pendulum.lab_time = 100.0;
-            let strobe = Strobe::new(&pendulum, STEPS, path);
+            let strobe = Strobe::new(&pendulum, STEPS, simd);
             let [own, reference] = times(&strobe, &fast);
             let formula = rewritten(&typical(kind)).map(|effect| {
                 let pendulum = base.clone().with_effect(effect).expect("once");
                 let pendulum = Pendulum { lab_time: 100.0, ..pendulum };
-                let [formula, library] = times(&Strobe::new(&pendulum, STEPS, path), &strobe);
+                let [formula, library] = times(&Strobe::new(&pendulum, STEPS, simd), &strobe);
                 format!("{:>9.2}", formula / library)
             });
-            let precise = chosen(&pendulum, path);
-            let [period, other] = times(&precise, &chosen(&damped, path));
+            let precise = chosen(&pendulum, simd);
+            let [period, other] = times(&precise, &chosen(&damped, simd));
             println!(
                 "  {:<26} {:>9.2} {:>9.2} {:>9} {:>9.2} {}",
                 definition.name,

@@ -8,9 +8,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use pendmap::fit::linear::linearise;
 use pendmap::fit::window::Window;
 use pendmap::fit::{Free, Problem, Record, Slot};
-use pendmap::integrate::course::Course;
-use pendmap::integrate::sample::sample;
-use pendmap::lanes::Path;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
+use pendmap::lanes::InstructionSet;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 const SAMPLES: usize = 2500;
@@ -66,8 +66,8 @@ fn windows(criterion: &mut Criterion) {
     let times: Vec<f64> = (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect();
     for Case { name, pendulum, free } in cases() {
         let mut group = criterion.benchmark_group(name);
-        let course = Course::new(&pendulum, true, TOLERANCE, |_, value| value).watched();
-        let motion = || sample(&course, 0.0, black_box(START), &times, |_, _| true).states;
+        let ode = OdeProblem::new(&pendulum, true, TOLERANCE, |_, value| value).watched();
+        let motion = || sample(&ode, 0.0, black_box(START), &times, |_, _| true).states;
         let readings = motion().iter().map(|[theta, _]| *theta).collect();
         group.bench_function("motion alone", |bencher| bencher.iter(motion));
 
@@ -90,9 +90,9 @@ fn windows(criterion: &mut Criterion) {
         let shaped = problem.shaped(0, &problem.start()).expect("in range");
         let columns = problem.columns(0);
         let window = Window { record: 0, from: 0, to: SAMPLES, start: START };
-        for path in Path::ALL.into_iter().filter(|path| path.available()) {
-            problem.path = path;
-            group.bench_function(path.name(), |bencher| {
+        for simd in InstructionSet::ALL.into_iter().filter(|simd| simd.available()) {
+            problem.simd = simd;
+            group.bench_function(simd.name(), |bencher| {
                 bencher.iter(|| linearise(&problem, &shaped, &columns, black_box(&window)));
             });
         }

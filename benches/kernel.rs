@@ -8,11 +8,11 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::choose;
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
-/// Trajectories: whole bundles on every path.
+/// Trajectories: whole bundles on every instruction set.
 const COUNT: usize = 1536;
 /// Periods in one call.
 const PERIODS: usize = 16;
@@ -26,16 +26,16 @@ fn plane() -> Starts {
     Starts::Grid { theta: axis("theta", std::f64::consts::PI), velocity: axis("velocity", 3.0) }
 }
 
-fn strobe(pendulum: &Pendulum, tol: f64, path: Path) -> Strobe {
-    choose(pendulum, &plane().sampled_states(200, 0), tol, path).expect("steps").0
+fn strobe(pendulum: &Pendulum, tol: f64, simd: InstructionSet) -> Strobe {
+    choose(pendulum, &plane().sampled_states(200, 0), tol, simd).expect("steps").0
 }
 
 fn columns() -> (Vec<f64>, Vec<f64>) {
     plane().sampled_states(COUNT, 1).into_iter().map(|s| (s[0], s[1])).unzip()
 }
 
-fn paths() -> impl Iterator<Item = Path> {
-    Path::ALL.into_iter().filter(|path| path.available())
+fn sets() -> impl Iterator<Item = InstructionSet> {
+    InstructionSet::ALL.into_iter().filter(|simd| simd.available())
 }
 
 fn map(criterion: &mut Criterion) {
@@ -44,10 +44,10 @@ fn map(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(format!("map, {name}"));
         group.throughput(Throughput::Elements((COUNT * PERIODS) as u64));
         for tol in [1e-6, 1e-9] {
-            for path in paths() {
-                let strobe = strobe(&pendulum, tol, path);
+            for simd in sets() {
+                let strobe = strobe(&pendulum, tol, simd);
                 let id =
-                    BenchmarkId::new(path.name(), format!("{tol:e}, {} steps", strobe.steps()));
+                    BenchmarkId::new(simd.name(), format!("{tol:e}, {} steps", strobe.steps()));
                 group.bench_function(id, |bencher| {
                     let (mut theta, mut velocity) = columns();
                     let mut turns = vec![0.0; COUNT];
@@ -72,9 +72,9 @@ fn stretch(criterion: &mut Criterion) {
     let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).expect("in range");
     let mut group = criterion.benchmark_group("map with tangent, p 1 omega 2");
     group.throughput(Throughput::Elements((COUNT * PERIODS) as u64));
-    for path in paths() {
-        let strobe = strobe(&pendulum, 1e-6, path);
-        group.bench_function(path.name(), |bencher| {
+    for simd in sets() {
+        let strobe = strobe(&pendulum, 1e-6, simd);
+        group.bench_function(simd.name(), |bencher| {
             let (mut theta, mut velocity) = columns();
             let mut turns = vec![0.0; COUNT];
             let mut tangents = (vec![FRAC_1_SQRT_2; COUNT], vec![FRAC_1_SQRT_2; COUNT]);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use pendmap::lanes::sine::{Coarse, Degree, Fine};
-use pendmap::lanes::{Isa, Job, Lane, Path, Real, dispatch};
+use pendmap::lanes::{InstructionSet, Isa, Job, Lane, Real, dispatch};
 
 /// Values in one call: whole bundles, in the first cache.
 const COUNT: usize = 1536;
@@ -39,13 +39,13 @@ fn numbers() -> Vec<f64> {
 fn measure<D: Degree>(criterion: &mut Criterion, name: &str, cosine: bool) {
     let mut group = criterion.benchmark_group(name);
     group.throughput(Throughput::Elements(COUNT as u64));
-    for path in Path::ALL.into_iter().filter(|path| path.available()) {
-        group.bench_function(BenchmarkId::from_parameter(path), |bencher| {
+    for simd in InstructionSet::ALL.into_iter().filter(|simd| simd.available()) {
+        group.bench_function(BenchmarkId::from_parameter(simd), |bencher| {
             let (source, mut numbers) = (numbers(), numbers());
             bencher.iter(|| {
                 numbers.copy_from_slice(black_box(&source));
                 let numbers = &mut numbers[..];
-                dispatch::run(path, Sines::<D> { numbers, cosine, degree: PhantomData });
+                dispatch::run(simd, Sines::<D> { numbers, cosine, degree: PhantomData });
             });
         });
     }

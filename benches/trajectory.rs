@@ -5,9 +5,9 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::Flight;
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::driver::Driver;
+use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::model::Pendulum;
 
 /// Name, gamma, friction, p and omega.
@@ -28,12 +28,12 @@ fn pendulums() -> impl Iterator<Item = (&'static str, Pendulum)> {
 fn trajectories(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("100 units of time at 1e-12 a step");
     for (name, pendulum) in pendulums() {
-        let course = Course::new(&pendulum, true, 1e-12, |_, value| value);
+        let ode = OdeProblem::new(&pendulum, true, 1e-12, |_, value| value);
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                let mut flight = Flight::new(&course, 0.0, black_box([2.8, 0.5]), 100.0);
-                flight.finish(|_| ());
-                flight.state
+                let mut driver = Driver::new(&ode, 0.0, black_box([2.8, 0.5]), 100.0);
+                driver.finish(|_| ());
+                driver.state
             });
         });
     }

@@ -75,7 +75,7 @@ pub enum Error {
         /// How many it has, and how many were given.
         given: [usize; 2],
     },
-    /// `PENDMAP_SIMD` names no path of this processor.
+    /// `PENDMAP_SIMD` names no instruction set of this processor.
     Simd {
         /// What was given.
         name: String,

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::trap::{Band, Ellipse};
-use crate::integrate::block::Block;
+use crate::integrate::kernel::block::Block;
 use crate::integrate::{State, Strobe};
 use crate::lanes::{Isa, Job, Lane, dispatch};
 use crate::model::Angle;
@@ -206,7 +206,7 @@ impl<'a> Watch<'a> {
                 ellipses: &self.scaled,
                 height: &mut self.height,
             };
-            let low = dispatch::run(self.job.strobe.path, heights);
+            let low = dispatch::run(self.job.strobe.simd, heights);
             self.clock += 1;
             let bands = !self.job.traps.bands.is_empty();
             if low < 1.0 || bands {

@@ -6,8 +6,8 @@ use nalgebra::Complex;
 
 use super::chaos::ChaoticSet;
 use super::kind::Kind;
+use super::long_runs::Senses;
 use super::region::Region;
-use super::walk::Senses;
 use crate::integrate::State;
 use crate::model::{Angle, Pendulum};
 use crate::orbit::PeriodicOrbit;

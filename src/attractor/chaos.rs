@@ -10,11 +10,11 @@ use super::capture::{self, Outcome, Traps};
 use super::effort::Effort;
 use super::groups::Groups;
 use super::kind::Kind;
+use super::long_runs::{Cut, Senses, Window, long_runs};
 use super::region::Region;
 use super::trap::Band;
-use super::walk::{Cut, Senses, Window, walk};
 use crate::integrate::Strobe;
-use crate::integrate::stroboscopic::State;
+use crate::integrate::kernel::stroboscopic::State;
 use crate::model::Angle;
 
 /// Stroboscopic points that are kept as a picture of the set.
@@ -86,7 +86,7 @@ pub fn sets(
 ) -> Vec<ChaoticSet> {
     let length = (periods / WINDOWS as u32).max(1);
     let mut runs =
-        Runs { strobe, traps, length, effort, cancel, walks: Vec::new(), captured: Vec::new() };
+        Runs { strobe, traps, length, effort, cancel, windows: Vec::new(), captured: Vec::new() };
     runs.sets(states, captured).unwrap_or_default()
 }
 
@@ -99,7 +99,7 @@ struct Runs<'a> {
     effort: &'a Effort,
     cancel: &'a AtomicBool,
     /// The windows of each before a trap took it.
-    walks: Vec<Vec<Window>>,
+    windows: Vec<Vec<Window>>,
     /// Whether a trap took it.
     captured: Vec<bool>,
 }
@@ -112,7 +112,7 @@ impl Runs<'_> {
     /// [`ROUNDS`] are left out. `None` if the search was cancelled.
     fn sets(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<Vec<ChaoticSet>> {
         self.add(states, captured)?;
-        let mut groups = Groups::new(&self.walks, &self.captured);
+        let mut groups = Groups::new(&self.windows, &self.captured);
         for _ in 0..ROUNDS {
             let unknown = groups.without_next();
             let few: Vec<State> = match unknown.as_slice() {
@@ -125,11 +125,11 @@ impl Runs<'_> {
             self.go_on(&unknown)?;
             let ends = self.captures(&few, self.length * WINDOWS as u32)?;
             self.add(&few, &ends)?;
-            groups = Groups::new(&self.walks, &self.captured);
+            groups = Groups::new(&self.windows, &self.captured);
         }
         let mut found = Vec::new();
         for class in groups.classes() {
-            let windows = groups.windows(&self.walks, &class);
+            let windows = groups.windows(&self.windows, &class);
             let set =
                 describe(self.strobe, &windows, self.length as usize, self.effort, self.cancel);
             let proved = groups.members(&class) >= self.effort.proved;
@@ -141,12 +141,12 @@ impl Runs<'_> {
     /// Watches from `states`; a run that repeats itself, as from a start exactly on an orbit that does not
     /// attract, shows no set.
     fn add(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<()> {
-        for (mut windows, captured) in self.walk(states, WINDOWS)?.into_iter().zip(captured) {
+        for (mut windows, captured) in self.long_runs(states, WINDOWS)?.into_iter().zip(captured) {
             windows.truncate(captured.map_or(WINDOWS, |at| (at / self.length) as usize));
             if closes(self.strobe.angle, &windows, self.effort.longest_cycle) {
                 windows.clear();
             }
-            self.walks.push(windows);
+            self.windows.push(windows);
             self.captured.push(captured.is_some());
         }
         Some(())
@@ -154,21 +154,21 @@ impl Runs<'_> {
 
     /// Watches these runs for another window.
     fn go_on(&mut self, runs: &[usize]) -> Option<()> {
-        let last = |run: &usize| self.walks[*run].last()?.points.last().copied();
+        let last = |run: &usize| self.windows[*run].last()?.points.last().copied();
         let ends: Vec<State> = runs.iter().filter_map(last).collect();
         let captured = self.captures(&ends, self.length)?;
-        for ((run, windows), at) in runs.iter().zip(self.walk(&ends, 1)?).zip(captured) {
+        for ((run, windows), at) in runs.iter().zip(self.long_runs(&ends, 1)?).zip(captured) {
             self.captured[*run] = at.is_some();
             if at.is_none() {
-                self.walks[*run].extend(windows);
+                self.windows[*run].extend(windows);
             }
         }
         Some(())
     }
 
-    fn walk(&self, states: &[State], windows: usize) -> Option<Vec<Vec<Window>>> {
+    fn long_runs(&self, states: &[State], windows: usize) -> Option<Vec<Vec<Window>>> {
         let cut = Cut { windows, length: self.length as usize, side: self.effort.cells };
-        walk(self.strobe, states, cut, self.cancel)
+        long_runs(self.strobe, states, cut, self.cancel)
     }
 
     fn captures(&self, states: &[State], periods: u32) -> Option<Vec<Option<u32>>> {
@@ -180,7 +180,7 @@ impl Runs<'_> {
         let proved = self.effort.proved;
         let small = groups.classes().into_iter().filter(|class| groups.members(class) < proved);
         let points =
-            |class: Vec<usize>| spread(&points(&groups.windows(&self.walks, &class)), proved);
+            |class: Vec<usize>| spread(&points(&groups.windows(&self.windows, &class)), proved);
         small.flat_map(points).collect()
     }
 }

@@ -4,24 +4,24 @@
 //! only are a class: what a set is told by. A group that a run leaves for good, for another group or for a
 //! trap, is a transient.
 
+use super::long_runs::{Senses, Window};
 use super::region::Region;
-use super::walk::{Senses, Window};
 
 /// Windows that turn alike in regions that meet, and where trajectories go from them.
 pub(super) struct Groups {
-    /// The group of every window of every walk.
+    /// The group of every window of every run.
     of: Vec<Vec<usize>>,
     /// The groups that the next windows belong to; `None` is a trap.
     next: Vec<Vec<Option<usize>>>,
 }
 
 impl Groups {
-    pub(super) fn new(walks: &[Vec<Window>], captured: &[bool]) -> Self {
+    pub(super) fn new(runs: &[Vec<Window>], captured: &[bool]) -> Self {
         // Groups that a window joins become one: `parent` leads to it.
         let mut found: Vec<(Senses, Region)> = Vec::new();
         let mut parent: Vec<usize> = Vec::new();
-        let mut of: Vec<Vec<usize>> = Vec::with_capacity(walks.len());
-        for windows in walks {
+        let mut of: Vec<Vec<usize>> = Vec::with_capacity(runs.len());
+        for windows in runs {
             let mut own = Vec::with_capacity(windows.len());
             for window in windows {
                 let (senses, mut region) = (window.senses, window.region.clone());
@@ -99,8 +99,8 @@ impl Groups {
         Some(reached)
     }
 
-    pub(super) fn windows<'a>(&self, walks: &'a [Vec<Window>], class: &[usize]) -> Vec<&'a Window> {
-        let all = walks.iter().flatten().zip(self.of.iter().flatten());
+    pub(super) fn windows<'a>(&self, runs: &'a [Vec<Window>], class: &[usize]) -> Vec<&'a Window> {
+        let all = runs.iter().flatten().zip(self.of.iter().flatten());
         all.filter(|(_, group)| class.contains(group)).map(|(window, _)| window).collect()
     }
 

@@ -1,12 +1,13 @@
-//! Attractors: how they are found, told apart, named and recognised.
+//! Attractors: search, names, recognition.
 //!
-//! - [`find`]: the search, from starts to a catalogue; what it leaves is watched, and told where it belongs
-//! - [`effort`]: how much that spends
-//! - [`kind`]: what a motion looks like
-//! - [`catalogue`]: keys, names, twins
-//! - [`trap`]: regions that nothing leaves
-//! - [`capture`]: trajectories run until a trap holds them
-//! - [`chaos`]: what never closes, from long runs cut into windows ([`walk`]), and where it lives ([`region`])
+//! - [`find`]: the search, from starts to a catalogue; [`effort`]: its budget
+//! - [`kind`], [`catalogue`]: kinds, names and twins of attractors
+//! - [`trap`]: regions that no trajectory leaves; [`capture`]: trajectories run until a trap holds them
+//! - [`rest`]: equilibria, and sets of equilibria under friction
+//! - `uncaptured`: whether uncaptured trajectories are chaotic or unsettled; `membership`: the attractor of each
+//! - [`chaos`]: chaotic attractors, from long runs cut into windows ([`long_runs`]), which `groups` sorts; [`region`]:
+//!   the part of the plane that one visits
+//! - `near_returns`, `short_cycles`: candidates for periodic orbits
 
 pub mod capture;
 pub mod catalogue;
@@ -15,14 +16,14 @@ pub mod effort;
 pub mod find;
 mod groups;
 pub mod kind;
-mod place;
+pub mod long_runs;
+mod membership;
+mod near_returns;
 pub mod region;
 pub mod rest;
-mod returns;
 mod short_cycles;
 pub mod trap;
-pub mod walk;
-mod watch;
+mod uncaptured;
 
 pub use catalogue::Attractor;
 pub use effort::Effort;

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::counted::{Said, said};
 use super::problem::{Columns, MOST_READINGS, Problem, Shaped, Slot};
+use super::quantised::{Likelihood, likelihood};
 use super::window::Window;
 use crate::integrate::State;
-use crate::integrate::course::Course;
-use crate::integrate::sample::sample;
+use crate::integrate::reference::problem::OdeProblem;
+use crate::integrate::reference::sample::sample;
 use crate::integrate::tangent::{Number, Tangent};
 use crate::lanes::dispatch::Register;
 use crate::lanes::pack::Bundle;
@@ -73,7 +73,7 @@ impl Linear {
 #[must_use]
 pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: &Window) -> Linear {
     let directions = columns.motion.len() + 2;
-    let register = problem.path.register();
+    let register = problem.simd.register();
     let stride = directions.next_multiple_of(register.width());
     let samples = window.to - window.from;
     let mut motion = Motion {
@@ -144,32 +144,32 @@ impl Follow<'_> {
         };
         let Shaped { pendulum, gravity, rod_sensor, rate } = self.shaped;
         let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
-        let mut course =
-            Course::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
+        let mut ode =
+            OdeProblem::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
                 .watched()
                 .with_gravity(number(Slot::Gravity, *gravity));
         if let Some(recorded) = &record.recorded {
-            course = course.driven_by(Arc::clone(recorded));
+            ode = ode.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
         // A mode of the rig asks for steps of its own, however slow the rest.
-        let rate = if course.field().sways() { rate.min(QUICKEST) } else { 1.0 };
+        let rate = if ode.field().sways() { rate.min(QUICKEST) } else { 1.0 };
         let rate = rate.max(pendulum.motion().omega);
         let most =
             MOST_STEPS + (MOST_STEPS_A_TIME * rate * (times[times.len() - 1] - times[0])) as usize;
         let begin = |of: usize| along(self.window.start[of], motion.len() + of);
         let run =
-            sample(&course, times[0], [begin(0), begin(1)], times, |flight, _| flight.steps < most);
+            sample(&ode, times[0], [begin(0), begin(1)], times, |driver, _| driver.steps < most);
         into.states.clear();
         into.heard.clear();
         let rows = into.slopes.chunks_exact_mut(2 * into.stride);
         for (k, (state, rows)) in run.states.iter().zip(rows).enumerate() {
             let given = match rod_sensor {
-                None => [run.given(&course, k), state[1]],
+                None => [run.given(&ode, k), state[1]],
                 Some(sensor) => {
                     let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
                     let moving = run.signs[k].map(|signs| (signs, run.past(k)));
-                    let reading = sensor.read(&course, times[k], *state, moving, own);
+                    let reading = sensor.read(&ode, times[k], *state, moving, own);
                     [reading, reading.like(0.0)]
                 }
             };
@@ -217,7 +217,8 @@ impl Follow<'_> {
                     (weight, residual)
                 }
                 Some(counts) => {
-                    let Said { deviance, residual, weight } = said(away, counts.step, weight);
+                    let Likelihood { deviance, residual, weight } =
+                        likelihood(away, counts.step, weight);
                     chi2 += deviance - counts.surplus[sample];
                     (weight, residual)
                 }

@@ -4,14 +4,14 @@
 //! - [`problem`]: records, and which parameters of their pendulums are free
 //! - [`rod_sensor`]: what a gyroscope or an accelerometer on the rod reads of a motion
 //! - [`window`]: a record cut into windows, each with an initial state of its own
-//! - [`counted`]: what readings rounded to counts say
+//! - [`quantised`]: what readings rounded to counts say
 //! - [`linear`]: residuals of a window and their derivatives
 //! - [`block`]: what one window says
 //! - [`normal`]: the equations of all windows, their initial states eliminated
-//! - [`way`]: how parameters go along a step, straight or in ratios
-//! - [`descent`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
-//! - [`alone`]: one window by itself
-//! - [`stages`]: from short windows to long ones
+//! - [`step_scale`]: how parameters go along a step, straight or in ratios
+//! - [`levenberg_marquardt`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
+//! - [`single_window`]: one window by itself
+//! - [`window_growth`]: from short windows to long ones
 //! - [`profile`]: intervals from the profile of the likelihood
 //! - [`replay`]: the pendulum of a record from many starts at once
 //!
@@ -19,22 +19,22 @@
 //! continuity between windows, so that each window stands for itself. Time is counted in `1 / w_ref`
 //! with a fixed `w_ref` near `w0`; `w0` itself is the parameter [`Slot::Gravity`](problem::Slot).
 
-pub mod alone;
 pub mod block;
-pub mod counted;
-pub mod descent;
+pub mod levenberg_marquardt;
 pub mod linear;
 pub mod normal;
 pub mod problem;
 pub mod profile;
+pub mod quantised;
 pub mod record;
 pub mod replay;
 pub mod rod_sensor;
-pub mod stages;
-pub mod way;
+pub mod single_window;
+pub mod step_scale;
 pub mod window;
+pub mod window_growth;
 
 pub use problem::{Free, Problem, Slot};
 pub use record::{Counts, Record};
 pub use rod_sensor::RodSensor;
-pub use stages::{Fit, Settings, fit};
+pub use window_growth::{Fit, Settings, fit};

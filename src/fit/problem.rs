@@ -2,10 +2,10 @@
 
 use super::record::{Record, range};
 use super::rod_sensor::RodSensor;
-use super::way::Way;
+use super::step_scale::StepScale;
 use crate::error::Error;
-use crate::integrate::course::greatest_rate;
-use crate::lanes::Path;
+use crate::integrate::reference::problem::greatest_rate;
+use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 use crate::model::effects::Action;
 
@@ -60,13 +60,13 @@ pub struct Problem {
     /// The free parameters.
     pub free: Vec<Free>,
     /// How each of them goes along a step.
-    pub ways: Vec<Way>,
+    pub scales: Vec<StepScale>,
     /// Between which values each of them means something.
     pub ranges: Vec<[f64; 2]>,
     /// The error allowed to a step of the integrator.
     pub tolerance: f64,
     /// The instruction set that derivatives are computed with.
-    pub path: Path,
+    pub simd: InstructionSet,
 }
 
 /// A record's pendulum with values for the free parameters.
@@ -111,7 +111,7 @@ impl Problem {
     /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
     /// that is not finite, a time that is not after the one before it, a negative weight, a record
     /// with fewer than 3 trusted samples, or a free parameter that its record does not have;
-    /// [`Error::Simd`] as of [`Path::choose`].
+    /// [`Error::Simd`] as of [`InstructionSet::choose`].
     pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
         for record in &records {
             record.check()?;
@@ -139,9 +139,10 @@ impl Problem {
                 }
             }
         }
-        let ways = free.iter().map(|one| Way::of(one, &free, &records)).collect();
+        let scales = free.iter().map(|one| StepScale::of(one, &free, &records)).collect();
         let ranges = free.iter().map(|one| one.range(&records)).collect();
-        let problem = Self { records, free, ways, ranges, tolerance, path: Path::choose()? };
+        let problem =
+            Self { records, free, scales, ranges, tolerance, simd: InstructionSet::choose()? };
         for index in 0..problem.records.len() {
             let count = problem.columns(index).reading.len();
             if count > MOST_READINGS {

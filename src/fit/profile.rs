@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::descent::Point;
+use super::levenberg_marquardt::Point;
 use super::normal::pseudo_inverse;
 use super::problem::Problem;
 use crate::error::Error;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::counted::surplus;
+use super::quantised::surplus;
 use super::rod_sensor::RodSensor;
 use crate::error::Error;
 use crate::model::{Pendulum, Recorded};

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::record::Record;
 use crate::error::Error;
 use crate::integrate::State;
-use crate::integrate::course::{Course, greatest_rate};
-use crate::integrate::sample::sample;
+use crate::integrate::reference::problem::{OdeProblem, greatest_rate};
+use crate::integrate::reference::sample::sample;
 use crate::model::Observation;
 
 /// What the sensor of the angle reads at `times`, rad and not wrapped, of the pendulum of `record` under
@@ -37,17 +37,17 @@ pub fn replay(
     let begin = times.first().copied().unwrap_or(0.0);
     let goes_on = || !cancel.load(Ordering::Relaxed);
     let one = |start: &State| {
-        let mut course = Course::with_rate(pendulum, rate, true, tolerance, |_, value| value);
+        let mut ode = OdeProblem::with_rate(pendulum, rate, true, tolerance, |_, value| value);
         if let Some(recorded) = &record.recorded {
-            course = course.driven_by(Arc::clone(recorded));
+            ode = ode.driven_by(Arc::clone(recorded));
         }
-        let run = sample(&course, begin, *start, times, |_, _| goes_on());
+        let run = sample(&ode, begin, *start, times, |_, _| goes_on());
         if !goes_on() {
             return Err(Error::Interrupted);
         }
         done();
         let reading = |(k, tau): (usize, &f64)| {
-            observation.read(run.given(&course, k), run.states[k][1], pendulum.lab_time + tau)
+            observation.read(run.given(&ode, k), run.states[k][1], pendulum.lab_time + tau)
         };
         Ok(times.iter().enumerate().map(reading).collect())
     };

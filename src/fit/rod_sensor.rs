@@ -13,7 +13,7 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use crate::integrate::course::{Course, Past};
+use crate::integrate::reference::problem::{OdeProblem, Past};
 use crate::integrate::tangent::Number;
 use crate::lanes::Work;
 use crate::lanes::sine::Fine;
@@ -42,7 +42,7 @@ impl RodSensor {
     /// what was kept at the last turn, none where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
     pub fn read<N: Number>(
         &self,
-        course: &Course<N>,
+        ode: &OdeProblem<N>,
         tau: f64,
         state: [N; 2],
         moving: Option<([f64; 2], Past<N>)>,
@@ -50,7 +50,7 @@ impl RodSensor {
     ) -> N {
         let mut reading = own[0];
         let (sensor, into) = (*self, &mut reading);
-        own[0].aside(Reading { sensor, course, tau, state, moving, own, into });
+        own[0].aside(Reading { sensor, ode, tau, state, moving, own, into });
         reading
     }
     /// Whether all of it are numbers, and it shows anything.
@@ -64,7 +64,7 @@ impl RodSensor {
 /// A reading, in a function of its own.
 struct Reading<'a, N> {
     sensor: RodSensor,
-    course: &'a Course<N>,
+    ode: &'a OdeProblem<N>,
     tau: f64,
     state: [N; 2],
     moving: Option<([f64; 2], Past<N>)>,
@@ -99,16 +99,16 @@ impl<N: Number> Reading<'_, N> {
     /// is `|th'| / |th''|` away.
     #[inline(always)]
     fn mean_acceleration(&self, [sense, side]: [f64; 2], past: Past<N>) -> N {
-        let (course, tau, state) = (self.course, self.tau, self.state);
+        let (ode, tau, state) = (self.ode, self.tau, self.state);
         let velocity = state[1];
-        let here = course.acceleration(tau, state, [sense, side], past);
+        let here = ode.acceleration(tau, state, [sense, side], past);
         let away = velocity.scale(sense);
         let reach = here.scale((0.5 * self.sensor.interval).copysign(here.value()));
-        if !course.jumps() || away.value() >= reach.value() {
+        if !ode.jumps() || away.value() >= reach.value() {
             return here;
         }
-        let past = course.turned(state[0], sense, past);
-        let mut there = course.acceleration(tau, state, [-sense, side], past);
+        let past = ode.turned(state[0], sense, past);
+        let mut there = ode.acceleration(tau, state, [-sense, side], past);
         // Before a turn the pull is against the motion; where it would be so after it, too, friction
         // holds the pendulum.
         if here.value() * sense < 0.0 && there.value() * sense >= 0.0 {

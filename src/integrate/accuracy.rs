@@ -1,8 +1,8 @@
 //! How many steps a period a tolerance asks for.
 
-use super::stroboscopic::{State, Strobe};
+use super::kernel::stroboscopic::{State, Strobe};
 use crate::error::Error;
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::model::{Angle, Pendulum};
 
 /// Periods after which step errors are compared.
@@ -65,7 +65,7 @@ pub fn choose(
     pendulum: &Pendulum,
     starts: &[State],
     tol: f64,
-    path: Path,
+    simd: InstructionSet,
 ) -> Result<(Strobe, f64), Error> {
     if !(TOLERANCES[0]..=TOLERANCES[1]).contains(&tol) {
         return Err(Error::Range {
@@ -75,7 +75,7 @@ pub fn choose(
         });
     }
     let measure = |steps: usize| {
-        let strobe = Strobe::new(pendulum, steps, path);
+        let strobe = Strobe::new(pendulum, steps, simd);
         let error = error_reached(&strobe, starts);
         (strobe, error)
     };

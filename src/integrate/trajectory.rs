@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
-use super::course::{Course, FINEST};
-use super::event::{Event, EventKind};
-use super::sample::{Sampled, sample};
-use super::stroboscopic::State;
+use super::kernel::stroboscopic::State;
+use super::reference::event::{Event, EventKind};
+use super::reference::problem::{FINEST, OdeProblem};
+use super::reference::sample::{Sampled, sample};
 use super::tangent::{Number, Tangent};
 use crate::error::Error;
 use crate::memory;
@@ -253,8 +253,8 @@ impl Run {
         cancel: &AtomicBool,
         show: Show<'_>,
     ) -> Self {
-        let course = Course::new(pendulum, true, tolerance, |_, value| value).watched();
-        sample(&course, 0.0, request.start, times, |_, new| {
+        let ode = OdeProblem::new(pendulum, true, tolerance, |_, value| value).watched();
+        sample(&ode, 0.0, request.start, times, |_, new| {
             show(&mut new.iter().copied());
             !cancel.load(Ordering::Relaxed)
         })
@@ -270,17 +270,17 @@ impl Run {
         show: Show<'_>,
     ) -> (Self, Vec<f64>) {
         let constant = |_, value| Tangent::<f64, 1>::constant(value);
-        let course = Course::new(pendulum, true, tolerance, constant).watched();
+        let ode = OdeProblem::new(pendulum, true, tolerance, constant).watched();
         let start = request.start.map(|value| Tangent { value, slope: [FRAC_1_SQRT_2] });
         let (mut lengths, mut scale) = (vec![0.0], 0.0);
-        let run = sample(&course, 0.0, start, times, |flight, new| {
+        let run = sample(&ode, 0.0, start, times, |driver, new| {
             show(&mut new.iter().map(|state| state.map(Number::value)));
             lengths.extend(new.iter().map(|state| scale + length(state).ln()));
             // Held near 1, so that it neither overflows nor vanishes.
-            let now = length(&flight.state);
+            let now = length(&driver.state);
             if now > 0.0 && now.is_finite() {
                 scale += now.ln();
-                flight.scale_derivatives(1.0 / now);
+                driver.scale_derivatives(1.0 / now);
             }
             !cancel.load(Ordering::Relaxed)
         });

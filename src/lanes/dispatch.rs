@@ -8,10 +8,10 @@ use pulp::{Scalar, Simd, WithSimd};
 use super::isa::Isa;
 use crate::error::Error;
 
-/// A path through the kernel. All give the same results within rounding; AVX-512 and AVX2 give the
+/// An instruction set of the kernel. All give the same results within rounding; AVX-512 and AVX2 give the
 /// same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Path {
+pub enum InstructionSet {
     /// AVX-512: 96 lanes in twelve registers.
     Avx512,
     /// AVX2 with FMA: 24 lanes in six registers.
@@ -22,7 +22,7 @@ pub enum Path {
     Portable,
 }
 
-impl Path {
+impl InstructionSet {
     /// Quickest first.
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Sse, Self::Portable];
 
@@ -53,22 +53,22 @@ impl Path {
         }
     }
 
-    /// The path that `PENDMAP_SIMD` names, or else the quickest that this processor has.
+    /// The instruction set that `PENDMAP_SIMD` names, or else the quickest that this processor has.
     ///
     /// # Errors
-    /// [`Error::Simd`] if the variable names no path, or one that this processor lacks.
+    /// [`Error::Simd`] if the variable names no instruction set, or one that this processor lacks.
     pub fn choose() -> Result<Self, Error> {
         match std::env::var("PENDMAP_SIMD") {
             Ok(name) if !name.is_empty() => {
-                let path: Self = name.parse()?;
-                if path.available() { Ok(path) } else { Err(Error::Simd { name }) }
+                let simd: Self = name.parse()?;
+                if simd.available() { Ok(simd) } else { Err(Error::Simd { name }) }
             }
-            _ => Ok(Self::ALL.into_iter().find(|path| path.available()).unwrap_or(Self::Portable)),
+            _ => Ok(Self::ALL.into_iter().find(|simd| simd.available()).unwrap_or(Self::Portable)),
         }
     }
 }
 
-/// One register of a path, as numbers that hold a derivative in each lane.
+/// One register of an instruction set, as numbers that hold a derivative in each lane.
 #[derive(Clone, Copy, Debug)]
 pub enum Register {
     /// Eight numbers.
@@ -81,7 +81,7 @@ pub enum Register {
     Single,
 }
 
-impl Path {
+impl InstructionSet {
     /// Its register, or the single one where the processor lacks it.
     #[must_use]
     pub fn register(self) -> Register {
@@ -118,18 +118,18 @@ impl Register {
     }
 }
 
-impl fmt::Display for Path {
+impl fmt::Display for InstructionSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-impl FromStr for Path {
+impl FromStr for InstructionSet {
     type Err = Error;
     fn from_str(name: &str) -> Result<Self, Error> {
         Self::ALL
             .into_iter()
-            .find(|path| path.name() == name)
+            .find(|simd| simd.name() == name)
             .ok_or_else(|| Error::Simd { name: name.to_owned() })
     }
 }
@@ -177,29 +177,29 @@ entries! {
     portable: pulp::Scalar;
 }
 
-/// Runs `job` on `path`, or on the portable one where the processor lacks it.
-pub fn run<J: Job>(path: Path, job: J) -> J::Output {
+/// Runs `job` on `simd`, or on the portable one where the processor lacks it.
+pub fn run<J: Job>(simd: InstructionSet, job: J) -> J::Output {
     #[cfg(target_arch = "x86_64")]
-    match path {
+    match simd {
         #[cfg(feature = "avx512")]
-        Path::Avx512 => {
+        InstructionSet::Avx512 => {
             if let Some(isa) = pulp::x86::V4::try_new() {
                 return avx512::run(isa, job);
             }
         }
-        Path::Avx2 => {
+        InstructionSet::Avx2 => {
             if let Some(isa) = pulp::x86::V3::try_new() {
                 return avx2::run(isa, job);
             }
         }
         #[cfg(feature = "sse")]
-        Path::Sse => {
+        InstructionSet::Sse => {
             if let Some(isa) = pulp::x86::V2::try_new() {
                 return sse::run(isa, job);
             }
         }
         _ => {}
     }
-    let _ = path;
+    let _ = simd;
     portable::run(Scalar::new(), job)
 }

@@ -31,7 +31,7 @@ pub mod pack;
 pub mod real;
 pub mod sine;
 
-pub use dispatch::{Job, Path};
+pub use dispatch::{InstructionSet, Job};
 pub use isa::Isa;
 pub use real::{Lane, Real, Work};
 

@@ -1,17 +1,17 @@
 //! Basins of attraction: attractors from a coarse set of starts, then every start to capture.
 
+use super::basin_entropy::{Texture, texture};
 use super::bounds::{chaos_periods, max_periods, search_periods};
 use super::control::{Control, pool};
+use super::finite_time::{FiniteTime, finite_time};
 use super::label::{FAILED, Labels, UNDECIDED, label};
-use super::layers::{FiniteTime, finite_time};
 use super::reliability::{Reliability, reliability};
 use super::starts::Starts;
-use super::texture::{Texture, texture};
 use super::uncertainty::{Uncertainty, uncertainty};
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::Pendulum;
 
@@ -59,7 +59,7 @@ impl Default for Options {
 
 /// Why labels tell nothing, where they do not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Plane {
+pub enum Labelling {
     /// Labels tell basins apart.
     Basins,
     /// Without damping there are no attractors.
@@ -78,7 +78,7 @@ pub struct BasinMap {
     /// Turns and exponents over a fixed time, where labels tell nothing.
     pub layers: Option<FiniteTime>,
     /// Which of the cases this is.
-    pub plane: Plane,
+    pub labelling: Labelling,
     /// Periods of the finite-time layers.
     pub layer_periods: u32,
     /// Starts from which attractors were searched first; where one chaotic attractor takes everything, all of them
@@ -101,7 +101,7 @@ pub struct BasinMap {
     /// Periods within which nothing may capture a trajectory that counts as chaotic.
     pub chaos_bound: u32,
     /// The instruction set.
-    pub path: Path,
+    pub simd: InstructionSet,
 }
 
 impl BasinMap {
@@ -154,32 +154,32 @@ pub fn basins(
     control: &Control,
 ) -> Result<BasinMap, Error> {
     pendulum.check_mappable()?;
-    let path = Path::choose()?;
+    let simd = InstructionSet::choose()?;
     if starts.is_empty() {
         return Err(Error::Range { name: "starts", value: 0.0, allowed: "1 or more" });
     }
     memory::reckon("starts", starts.len(), EACH)?;
     let pool = pool(options.threads)?;
     let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
-    let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, path)?;
+    let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, simd)?;
     let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
     let max_periods = options.max_periods.unwrap_or_else(|| max_periods(pendulum)).max(1);
     let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
     let endings = catalogue.endings(&strobe, &seeds, search_periods(pendulum), control.flag());
     control.check()?;
 
-    let plane = if !pendulum.is_dissipative() {
-        Plane::Conservative
+    let labelling = if !pendulum.is_dissipative() {
+        Labelling::Conservative
     } else if catalogue.only_chaos().is_some() && catalogue.holds_all(&strobe, &endings) {
-        Plane::OnlyChaos
+        Labelling::OnlyChaos
     } else {
-        Plane::Basins
+        Labelling::Basins
     };
     let mut map = BasinMap {
         attractors: Vec::new(),
         labels: Labels::empty(),
         layers: None,
-        plane,
+        labelling,
         layer_periods: 0,
         searched: seeds.len(),
         fractions: Vec::new(),
@@ -190,9 +190,9 @@ pub fn basins(
         reached_error,
         bound: max_periods,
         chaos_bound: chaos_periods(pendulum),
-        path,
+        simd,
     };
-    if plane == Plane::Basins {
+    if labelling == Labelling::Basins {
         let (labels, bound) = to_capture(&strobe, &mut catalogue, starts, options, &pool, control)?;
         map.texture = texture(&labels, starts, &pool);
         map.bound = bound;
@@ -222,7 +222,7 @@ pub fn basins(
         let periods =
             options.layer_periods.unwrap_or_else(|| layer_periods(&catalogue, pendulum, starts));
         let layers = finite_time(&strobe, starts, periods as usize, &pool, control)?;
-        map.labels = Labels::unlabelled(&layers, plane == Plane::OnlyChaos, periods);
+        map.labels = Labels::unlabelled(&layers, labelling == Labelling::OnlyChaos, periods);
         map.layers = Some(layers);
         map.layer_periods = periods;
         map.bound = periods;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::control::Control;
-use super::growth::Bundle;
+use super::tangent_growth::Bundle;
 use crate::attractor::chaos::mean_and_error;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};

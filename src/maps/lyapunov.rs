@@ -8,13 +8,13 @@ use super::basins::SEARCH_SAMPLE;
 use super::bounds::{chaos_periods, max_periods, search_periods};
 use super::control::{Control, pool};
 use super::ensemble::{Ensemble, NEAR, ROUND, Run};
-use super::growth::Course;
 use super::starts::{Axis, Starts};
+use super::tangent_growth::TangentTrajectory;
 use crate::attractor::capture::{Fate, outcomes};
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 
 /// Periods that each trajectory is followed for at the most, where nothing is said.
@@ -84,7 +84,7 @@ pub struct Exponent {
     /// transient.
     pub lost: usize,
     /// Logarithm of the growth of the start's own tangent in each period from the first.
-    pub course: Vec<f64>,
+    pub growth: Vec<f64>,
     /// Periods after which the start counted as undecided.
     pub bound: u32,
     /// Periods within which nothing may capture a trajectory that counts as chaotic.
@@ -94,7 +94,7 @@ pub struct Exponent {
     /// The error that was reached, as [`accuracy::error_reached`] defines it.
     pub reached_error: f64,
     /// The instruction set.
-    pub path: Path,
+    pub simd: InstructionSet,
 }
 
 /// The largest exponent of the attractor that `request.start` reaches.
@@ -116,8 +116,8 @@ pub fn lyapunov(
     };
     let start = request.start;
     let mut seeds = plane.sampled_states(SEARCH_SAMPLE, 0);
-    let path = Path::choose()?;
-    let (strobe, reached_error) = accuracy::choose(pendulum, &seeds, request.tol, path)?;
+    let simd = InstructionSet::choose()?;
+    let (strobe, reached_error) = accuracy::choose(pendulum, &seeds, request.tol, simd)?;
     seeds.insert(0, start);
     let pool = pool(request.threads)?;
     let bound = request.max_periods.unwrap_or_else(|| max_periods(pendulum)).max(1);
@@ -127,27 +127,27 @@ pub fn lyapunov(
         transient: None,
         ensemble: None,
         lost: 0,
-        course: Vec::new(),
+        growth: Vec::new(),
         bound,
         chaos_bound: chaos_periods(pendulum),
         steps: strobe.steps(),
         reached_error,
-        path,
+        simd,
     };
     let Request { precision, seed, .. } = *request;
     let run = Run { strobe: &strobe, precision, seed, pool: &pool, control };
-    let mut course = Course::new(start);
+    let mut trajectory = TangentTrajectory::new(start);
     if pendulum.is_dissipative() {
-        run.reach(&seeds, &mut course, request.max_periods, &mut result)?;
+        run.reach(&seeds, &mut trajectory, request.max_periods, &mut result)?;
     } else {
         let most = request.max_periods.unwrap_or(MOST_UNDAMPED);
         let states = run.members(&[start]);
         result.ensemble = Some(run.ensemble(&states, DROPPED as u32, most)?.0);
     }
     let length = result.transient.map_or(COURSE[1], |t| t as usize + COURSE[0]);
-    course.extend(&strobe, length, &pool, control)?;
-    result.course = course.growth;
-    result.course.truncate(length);
+    trajectory.extend(&strobe, length, &pool, control)?;
+    result.growth = trajectory.growth;
+    result.growth.truncate(length);
     Ok(result)
 }
 
@@ -156,7 +156,7 @@ impl Run<'_> {
     fn reach(
         &self,
         seeds: &[State],
-        course: &mut Course,
+        trajectory: &mut TangentTrajectory,
         max_periods: Option<u32>,
         result: &mut Exponent,
     ) -> Result<(), Error> {
@@ -168,11 +168,11 @@ impl Run<'_> {
             self.control.flag(),
         );
         self.control.check()?;
-        let (mut fate, mut periods) = self.follow(course, &catalogue, result.bound)?;
-        let mut home = self.home(course, &catalogue, fate);
+        let (mut fate, mut periods) = self.follow(trajectory, &catalogue, result.bound)?;
+        let mut home = self.home(trajectory, &catalogue, fate);
         if fate == Fate::Open && home.is_none() {
             // Something that the search has not met: it begins anew where the start has come to.
-            let here: Vec<State> = course.states.last().copied().into_iter().collect();
+            let here: Vec<State> = trajectory.states.last().copied().into_iter().collect();
             catalogue.search(
                 self.strobe,
                 &here,
@@ -180,8 +180,8 @@ impl Run<'_> {
                 self.control.flag(),
             );
             self.control.check()?;
-            (fate, periods) = self.follow(course, &catalogue, result.bound)?;
-            home = self.home(course, &catalogue, fate);
+            (fate, periods) = self.follow(trajectory, &catalogue, result.bound)?;
+            home = self.home(trajectory, &catalogue, fate);
         }
         if let (Fate::Open, Some(index)) = (fate, home) {
             let chaos = catalogue.attractors[index].clone();
@@ -199,7 +199,7 @@ impl Run<'_> {
                 return Ok(());
             }
             // A long transient: the start itself will be captured, sooner or later.
-            (fate, periods) = self.follow(course, &catalogue, result.bound.max(MOST))?;
+            (fate, periods) = self.follow(trajectory, &catalogue, result.bound.max(MOST))?;
         }
         match fate {
             Fate::Captured(index) => {
@@ -213,14 +213,14 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Follows the start's own course until a trap takes it, or `bound` periods are over: its fate, and
+    /// Follows the start's own trajectory until a trap takes it, or `bound` periods are over: its fate, and
     /// after how many periods.
     ///
     /// Of a chaotic transient another rounding has another end: the growth that is shown and the
-    /// capture are of one course.
+    /// capture are of one trajectory.
     fn follow(
         &self,
-        course: &mut Course,
+        trajectory: &mut TangentTrajectory,
         catalogue: &Catalogue,
         bound: u32,
     ) -> Result<(Fate, u32), Error> {
@@ -228,8 +228,8 @@ impl Run<'_> {
         let mut looked = 0;
         while looked < bound {
             let to = (looked + STRETCH).min(bound);
-            course.extend(self.strobe, to, self.pool, self.control)?;
-            let states = &course.states[looked..to];
+            trajectory.extend(self.strobe, to, self.pool, self.control)?;
+            let states = &trajectory.states[looked..to];
             let found = outcomes(self.strobe, &catalogue.traps, AT_ONCE, states, flag);
             for (k, end) in found.ok_or(Error::Interrupted)?.iter().enumerate() {
                 if end.fate != Fate::Open {
@@ -241,9 +241,14 @@ impl Run<'_> {
         Ok((Fate::Open, bound as u32))
     }
 
-    /// The chaotic attractor that an open course stays on.
-    fn home(&self, course: &Course, catalogue: &Catalogue, fate: Fate) -> Option<usize> {
-        let last: Vec<State> = course.states.last().copied().into_iter().collect();
+    /// The chaotic attractor that an unsettled trajectory stays on.
+    fn home(
+        &self,
+        trajectory: &TangentTrajectory,
+        catalogue: &Catalogue,
+        fate: Fate,
+    ) -> Option<usize> {
+        let last: Vec<State> = trajectory.states.last().copied().into_iter().collect();
         if fate != Fate::Open {
             return None;
         }

@@ -1,45 +1,41 @@
-//! Pictures of whole planes, on all threads.
+//! Results over whole planes, on all threads.
 //!
-//! - [`advance`]: plain integration of many starts
 //! - [`starts`]: the grid or list of initial conditions
-//! - [`basins`]: basins of attraction
-//! - [`label`]: every start to the attractor that captures it
-//! - [`layers`]: turns and exponents over a fixed time
-//! - [`texture`], [`uncertainty`]: how fine the basins are, with `near`'s cells; [`reliability`]: whether labels can be
-//!   believed
-//! - [`lyapunov`]: the largest exponent of what a start reaches; [`ensemble`], [`growth`]: of many
-//!   trajectories
-//! - [`orbits`]: all closed orbits of one period and winding
-//! - [`resolution`], [`cell`], [`parameter_map`]: which attractors exist over a plane of two parameters
-//! - [`bifurcation`]: along one parameter, all attractors, and one followed up and down
-//! - [`orbits`]: all closed orbits of one period and winding: `vanishing` and `approach` find
-//!   where Newton's method begins
-//! - [`tongues`]: where rest loses and gains stability, with `chebyshev`'s polynomials; `continued`
-//!   where a torque makes it an orbit
-//! - [`bounds`]: how many periods a trajectory is given to settle
+//! - [`basins`]: basins of attraction; [`label`]: the attractor that captures each start
+//! - [`finite_time`]: turns and exponents over a fixed time
+//! - [`basin_entropy`], [`uncertainty`]: fractality of basins, with distances from `boundary_distance`
+//! - [`reliability`]: the part of labels that half the step or mirroring changes
+//! - [`lyapunov`]: the largest exponent of the attractor that a start reaches; [`ensemble`], [`tangent_growth`]:
+//!   exponents of many trajectories
+//! - [`orbits`]: all closed orbits of one period and winding; `multistart`: starting points of Newton's method
+//! - [`parameter_map`]: the attractors over a plane of two parameters; [`cell`], [`resolution`]: one pendulum of
+//!   it, and its step length
+//! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
+//! - [`tongues`]: where rest loses and gains stability, by `chebyshev`; `continuation`: under a torque
+//! - [`advance`]: plain integration of many starts
+//! - [`bounds`]: the number of periods within which a trajectory must settle
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
-mod approach;
+pub mod basin_entropy;
 pub mod basins;
 pub mod bifurcation;
+mod boundary_distance;
 pub mod bounds;
 pub mod cell;
 mod chebyshev;
-mod continued;
+mod continuation;
 pub mod control;
 pub mod ensemble;
-pub mod growth;
+pub mod finite_time;
 pub mod label;
-pub mod layers;
 pub mod lyapunov;
-mod near;
+mod multistart;
 pub mod orbits;
 pub mod parameter_map;
 pub mod reliability;
 pub mod resolution;
 pub mod starts;
-pub mod texture;
+pub mod tangent_growth;
 pub mod tongues;
 pub mod uncertainty;
-mod vanishing;

@@ -1,9 +1,8 @@
-//! All closed orbits of one period and winding in a box of starts, those that repel too.
+//! All closed orbits of one period and winding in a box of starts, stable and unstable.
 //!
-//! Newton's method begins wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
-//! may vanish (`vanishing.rs`), by differences
-//! first (`approach.rs`). Next to an orbit near its birth it is begun again, repelled by
-//! all that is known: branches that are about to meet lie nearer to one another than any cell.
+//! Newton's method starts wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped, may vanish
+//! (`multistart`). Next to an orbit near its birth it starts again, repelled by all known orbits:
+//! branches that are about to meet lie nearer to one another than any cell.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,13 +10,12 @@ use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 use super::advance::advance;
-use super::approach::approach;
 use super::control::{Control, pool};
+use super::multistart::{approach, places};
 use super::starts::{Axis, Starts};
-use super::vanishing;
 use crate::error::Error;
 use crate::integrate::{State, accuracy};
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::{Angle, Pendulum};
 use crate::orbit::PoincareMap;
@@ -196,7 +194,7 @@ fn beginnings(
 ) -> Result<Vec<State>, Error> {
     let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
     let sample = starts.sampled_states(ERROR_SAMPLE, 0);
-    let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, Path::choose()?)?;
+    let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, InstructionSet::choose()?)?;
     // The displacement is the whole way, of which the turns are net.
     let displacements = |from: &[State]| -> Result<Vec<State>, Error> {
         let mut theta: Vec<f64> = from.iter().map(|s| s[0]).collect();
@@ -210,7 +208,7 @@ fn beginnings(
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    let places = vanishing::places([request.theta, request.velocity], &displacements)?;
+    let places = places([request.theta, request.velocity], &displacements)?;
     approach(&places, reach, displacements)
 }
 

@@ -13,7 +13,7 @@ use super::resolution::Resolution;
 use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::State;
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::Pendulum;
 
@@ -150,8 +150,8 @@ pub fn parameter_map(
     (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
     let pool = pool(request.threads)?;
     let probes = Starts::List(request.starts.clone()).sampled_states(PROBES, 0);
-    let path = Path::choose()?;
-    let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, path))?;
+    let simd = InstructionSet::choose()?;
+    let resolution = pool.install(|| Resolution::new(&plane, &probes, request.tol, simd))?;
     let &Request { each, bound, kept, .. } = request;
     let search = Search { starts: request.starts.clone(), each, bound, kept };
     let strobe = |cell: usize| resolution.strobe(&plane.pendulum(cell), plane.place(cell));

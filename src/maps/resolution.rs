@@ -4,7 +4,7 @@ use super::parameter_map::Plane;
 use crate::error::Error;
 use crate::integrate::accuracy::{choose, error_reached};
 use crate::integrate::{State, Strobe};
-use crate::lanes::Path;
+use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 
 /// Cells along each side at which the longest step is found.
@@ -17,7 +17,7 @@ pub struct Resolution {
     rows: Vec<usize>,
     /// Rows of equal second parameter.
     step: Vec<f64>,
-    path: Path,
+    simd: InstructionSet,
     /// The greatest error that was measured, halfway between those cells.
     pub reached_error: f64,
 }
@@ -28,17 +28,22 @@ impl Resolution {
     ///
     /// # Errors
     /// As [`choose`].
-    pub fn new(plane: &Plane, probes: &[State], tol: f64, path: Path) -> Result<Self, Error> {
+    pub fn new(
+        plane: &Plane,
+        probes: &[State],
+        tol: f64,
+        simd: InstructionSet,
+    ) -> Result<Self, Error> {
         let [columns, rows] = plane.size().map(spread);
         let mut step = Vec::new();
         for row in &rows {
             for column in &columns {
                 let pendulum = plane.pendulum(plane.cell(*column, *row));
-                let (strobe, _) = choose(&pendulum, probes, tol, path)?;
+                let (strobe, _) = choose(&pendulum, probes, tol, simd)?;
                 step.push(measure(&pendulum) / strobe.steps() as f64);
             }
         }
-        let mut all = Self { columns, rows, step, path, reached_error: 0.0 };
+        let mut all = Self { columns, rows, step, simd, reached_error: 0.0 };
         let middles = |places: &[usize]| -> Vec<usize> {
             places.windows(2).map(|pair| usize::midpoint(pair[0], pair[1])).collect()
         };
@@ -53,7 +58,7 @@ impl Resolution {
                 let pendulum = plane.pendulum(plane.cell(*column, row));
                 let mut error = error_reached(&all.strobe(&pendulum, at), probes);
                 if error > tol {
-                    let (strobe, reached) = choose(&pendulum, probes, tol, path)?;
+                    let (strobe, reached) = choose(&pendulum, probes, tol, simd)?;
                     let step = measure(&pendulum) / strobe.steps() as f64;
                     all.around(at).for_each(|k| all.step[k] = all.step[k].min(step));
                     error = reached;
@@ -68,7 +73,7 @@ impl Resolution {
     #[must_use]
     pub fn strobe(&self, pendulum: &Pendulum, at: [usize; 2]) -> Strobe {
         let steps = (measure(pendulum) / self.step(at) * (1.0 - 1e-12)).ceil().max(1.0);
-        Strobe::new(pendulum, steps as usize, self.path)
+        Strobe::new(pendulum, steps as usize, self.simd)
     }
 
     /// The shortest of the steps of the cells around that were measured.

@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 use rayon::prelude::*;
 
 use super::chebyshev::{Interpolant, Values};
-use super::continued;
+use super::continuation;
 use super::control::{Control, pool};
 use crate::error::Error;
 use crate::model::Pendulum;
@@ -125,7 +125,7 @@ pub fn tongues(
             let moved = pendulum.torque != 0.0;
             let mut curve = along(&level, balance, *omega, p_max, folds && !moved);
             if moved {
-                curve = continued::curve(pendulum, balance, &curve, p_max);
+                curve = continuation::curve(pendulum, balance, &curve, p_max);
             }
             control.add(1);
             Ok(curve)

@@ -2,8 +2,8 @@
 
 use std::f64::consts::{LN_2, TAU};
 
+use super::boundary_distance::Nearness;
 use super::label::UNDECIDED;
-use super::near::Nearness;
 use super::starts::Axis;
 use crate::error::Error;
 use crate::integrate::State;

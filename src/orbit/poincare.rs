@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::integrate::flow::Flow;
+use crate::integrate::reference::flow::Flow;
 use crate::integrate::tangent::Tangent;
 use crate::integrate::{Moving, Schedule, State, Strobe};
 use crate::lanes::sine::Fine;

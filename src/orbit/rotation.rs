@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix2;
 
 use crate::integrate::State;
-use crate::integrate::flow::{Arrival, Flow};
-use crate::integrate::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
+use crate::integrate::kernel::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
+use crate::integrate::reference::flow::{Arrival, Flow};
 use crate::integrate::tangent::Tangent;
 use crate::lanes::Work;
 use crate::model::pendulum::Route;

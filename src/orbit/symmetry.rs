@@ -3,7 +3,7 @@
 use super::newton::{self, PeriodicOrbit};
 use super::poincare::PoincareMap;
 use crate::integrate::State;
-use crate::integrate::flow::Flow;
+use crate::integrate::reference::flow::Flow;
 use crate::model::pendulum::Symmetry;
 use crate::model::{Angle, Pendulum};
 

@@ -4,14 +4,14 @@ use numpy::{PyArray2, PyReadonlyArray1};
 use pendmap::attractor::Attractor as Found;
 use pendmap::maps::control::pool;
 use pendmap::maps::ensemble::{self, WINDOW};
-use pendmap::maps::growth::Bundle;
 use pendmap::maps::lyapunov::{End, Request, lyapunov as exponent_of};
+use pendmap::maps::tangent_growth::Bundle;
 use pyo3::prelude::*;
 
 use super::convert::{Array, Attractor, array, states};
+use super::long_calls::watched;
 use super::model::Model;
 use super::motion::strobe;
-use super::watch::watched;
 use super::{raise, reckon};
 
 /// Numerical choices as Python hands them over.
@@ -106,12 +106,12 @@ pub fn lyapunov(
         attractor: attractor.map(|a| Py::new(py, a)).transpose()?,
         transient: found.transient,
         lost: found.lost,
-        course: array(py, found.course),
+        course: array(py, found.growth),
         bound: found.bound,
         chaos_bound: found.chaos_bound,
         steps_per_period: found.steps,
         reached_error: found.reached_error,
-        simd: found.path.name(),
+        simd: found.simd.name(),
         window: WINDOW,
         ensemble,
     })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pendmap::error::Error;
-use pendmap::fit::descent::Point;
+use pendmap::fit::levenberg_marquardt::Point;
 use pendmap::fit::normal::linearised;
 use pendmap::fit::profile::intervals;
 use pendmap::fit::replay::replay as replayed;
@@ -17,8 +17,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::convert::{Array, array, states};
+use super::long_calls::pooled;
 use super::model::Model;
-use super::watch::pooled;
 use super::{raise, reckon};
 
 /// Bytes of a reading that is made: its state, itself in a row, and in the array of all.

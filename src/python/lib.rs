@@ -7,16 +7,16 @@ mod convert;
 mod exponents;
 mod fit;
 mod library;
+mod long_calls;
 mod maps;
 mod model;
 mod motion;
 mod orbits;
-mod planes;
+mod parameter_maps;
 mod tongues;
-mod watch;
 
 use pendmap::error::Error;
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::bounds::{LEAST, cell_periods, max_periods};
 use pendmap::memory;
 use pendmap::model::Angle;
@@ -63,13 +63,17 @@ fn bounds(model: Model) -> PyResult<(u32, u32, u32)> {
 /// The instruction set that a call would use now.
 #[pyfunction]
 fn simd() -> PyResult<&'static str> {
-    Ok(Path::choose().map_err(raise)?.name())
+    Ok(InstructionSet::choose().map_err(raise)?.name())
 }
 
 /// The instruction sets that this processor has, quickest first.
 #[pyfunction]
 fn simd_available() -> Vec<&'static str> {
-    Path::ALL.into_iter().filter(|path| path.available()).map(Path::name).collect()
+    InstructionSet::ALL
+        .into_iter()
+        .filter(|simd| simd.available())
+        .map(InstructionSet::name)
+        .collect()
 }
 
 /// Refuses `count` of `what`, with `each` bytes each, where that is more memory than is free.
@@ -99,11 +103,10 @@ mod _core {
         maps::{BasinMap, Texture, basins_grid, basins_list, texture},
         motion::{Trajectory, acceleration, advance, choose_steps, simulate},
         orbits::{Orbit, OrbitSearch, orbits},
-        period,
-        planes::{
+        parameter_maps::{
             Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,
         },
-        reckon, simd, simd_available,
+        period, reckon, simd, simd_available,
         tongues::{CriticalAmplitudes, tongues},
     };
 

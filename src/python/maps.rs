@@ -2,16 +2,16 @@
 
 use numpy::PyReadonlyArray1;
 use pendmap::error::Error;
-use pendmap::maps::basins::{BasinMap as Found, Options, Plane, basins};
+use pendmap::maps::basin_entropy::{Texture as Entropies, of_cells};
+use pendmap::maps::basins::{BasinMap as Found, Labelling, Options, basins};
 use pendmap::maps::control::pool;
 use pendmap::maps::starts::{Axis, Starts};
-use pendmap::maps::texture::{Texture as Entropies, of_cells};
 use pendmap::maps::uncertainty::Uncertainty;
 use pyo3::prelude::*;
 
 use super::convert::{Array, Attractor, array, states};
+use super::long_calls::watched;
 use super::model::Model;
-use super::watch::watched;
 use super::{raise, reckon};
 
 /// `(low, high, count)` as Python hands it over.
@@ -107,13 +107,13 @@ impl BasinMap {
         let Uncertainty { eps, uncertain, tried } = map.uncertainty.clone().unwrap_or_default();
         Ok(Self {
             attractors: attractors.collect::<PyResult<_>>()?,
-            undecided: if map.plane == Plane::Conservative { 1.0 } else { map.share(0) },
+            undecided: if map.labelling == Labelling::Conservative { 1.0 } else { map.share(0) },
             failed: map.share(-1),
             mean_periods: map.mean_periods(),
-            plane: match map.plane {
-                Plane::Basins => "basins",
-                Plane::Conservative => "conservative",
-                Plane::OnlyChaos => "only_chaos",
+            plane: match map.labelling {
+                Labelling::Basins => "basins",
+                Labelling::Conservative => "conservative",
+                Labelling::OnlyChaos => "only_chaos",
             },
             chaos_bound: map.chaos_bound,
             searched_starts: map.searched,
@@ -121,7 +121,7 @@ impl BasinMap {
             bound: map.bound,
             steps_per_period: map.steps,
             reached_error: map.reached_error,
-            simd: map.path.name(),
+            simd: map.simd.name(),
             texture: Py::new(py, Texture::new(&map.texture))?,
             uncertainty_eps: array(py, eps),
             uncertain: array(py, uncertain),

@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pendmap::error::Error;
 use pendmap::integrate::trajectory::{self, Request};
 use pendmap::integrate::{State, Strobe, accuracy};
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::advance::advance as advance_all;
 use pendmap::model::Pendulum;
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -15,9 +15,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use super::convert::{Array, array, states};
+use super::long_calls::{stopped, watched};
 use super::model::Model;
 use super::raise;
-use super::watch::{stopped, watched};
 
 /// Angle in [-pi, pi], velocity and net turns.
 type Advanced<'py> =
@@ -45,7 +45,7 @@ pub fn strobe(pendulum: &Pendulum, steps: usize) -> PyResult<Strobe> {
         let allowed = "1 or more";
         return Err(raise(Error::Range { name: "steps_per_period", value: 0.0, allowed }));
     }
-    Ok(Strobe::new(pendulum, steps, Path::choose().map_err(raise)?))
+    Ok(Strobe::new(pendulum, steps, InstructionSet::choose().map_err(raise)?))
 }
 
 /// Many starts, the same number of forcing periods on.
@@ -83,8 +83,8 @@ pub fn choose_steps(
     let pendulum = model.pendulum()?;
     pendulum.check_mappable().map_err(raise)?;
     let states = states(&theta, &velocity)?;
-    let path = Path::choose().map_err(raise)?;
-    let (strobe, error) = accuracy::choose(&pendulum, &states, tol, path).map_err(raise)?;
+    let simd = InstructionSet::choose().map_err(raise)?;
+    let (strobe, error) = accuracy::choose(&pendulum, &states, tol, simd).map_err(raise)?;
     Ok((strobe.steps(), error))
 }
 

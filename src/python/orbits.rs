@@ -6,9 +6,9 @@ use pendmap::maps::orbits::{Request, orbits as search};
 use pyo3::prelude::*;
 
 use super::convert::Attractor;
+use super::long_calls::watched;
 use super::maps::{AxisTuple, axes};
 use super::model::Model;
-use super::watch::watched;
 
 /// A closed orbit.
 #[pyclass(frozen, get_all, extends = Attractor, module = "pendmap._core")]

@@ -4,8 +4,8 @@ use pendmap::error::Error;
 use pendmap::maps::tongues::{Balance, Critical, tongues as search};
 use pyo3::prelude::*;
 
+use super::long_calls::watched;
 use super::model::Model;
-use super::watch::watched;
 
 /// Critical amplitudes of the drive at one frequency, ascending.
 #[pyclass(frozen, get_all, module = "pendmap._core")]

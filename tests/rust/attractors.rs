@@ -7,7 +7,7 @@ use pendmap::attractor::catalogue::arrange;
 use pendmap::attractor::{Attractor, Kind};
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
-use pendmap::maps::basins::{BasinMap, Plane};
+use pendmap::maps::basins::{BasinMap, Labelling};
 use pendmap::maps::label::NEVER;
 use pendmap::model::{Angle, Pendulum};
 
@@ -32,7 +32,7 @@ fn every_known_attractor_and_no_other_is_found() {
     for (p, _, map) in maps() {
         let known = attractors_at(*p);
         assert_eq!(map.attractors.len(), known.len(), "p = {p}");
-        assert_eq!(map.plane, Plane::Basins);
+        assert_eq!(map.labelling, Labelling::Basins);
         for known in known {
             let found = map
                 .attractors

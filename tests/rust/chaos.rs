@@ -8,11 +8,11 @@ use pendmap::attractor::chaos::sets;
 use pendmap::attractor::{Effort, Kind};
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
-use pendmap::maps::basins::{BasinMap, Plane};
+use pendmap::maps::basins::{BasinMap, Labelling};
 use pendmap::maps::label::NEVER;
 use pendmap::model::Pendulum;
 
-use crate::support::{basins_on_plane, chaos_among_others, driven, paths, plane};
+use crate::support::{basins_on_plane, chaos_among_others, driven, instruction_sets, plane};
 use crate::truths::{model, number, table, truths};
 
 /// The three points of figure 2 and one more with a reference exponent: p, omega and the map.
@@ -40,17 +40,17 @@ fn a_rotation_that_gains_speed_for_ever_is_no_chaos() {
 fn what_leaves_its_region_is_no_set() {
     // Where nothing else would have left it out.
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
-    for path in paths() {
-        let strobe = Strobe::new(&runaway(), 60, path);
+    for simd in instruction_sets() {
+        let strobe = Strobe::new(&runaway(), 60, simd);
         let (effort, cancel) = (Effort::THOROUGH, AtomicBool::new(false));
         let found = sets(&strobe, &Traps::default(), &states, &[None; 6], 200, &effort, &cancel);
-        assert!(found.is_empty(), "{path}");
+        assert!(found.is_empty(), "{simd}");
     }
 }
 
 /// The one chaotic attractor of a plane that has nothing else.
 fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
-    assert_eq!(map.plane, Plane::OnlyChaos);
+    assert_eq!(map.labelling, Labelling::OnlyChaos);
     let [chaos] = map.attractors.as_slice() else { panic!("{} attractors", map.attractors.len()) };
     assert_eq!((chaos.kind, chaos.name.as_str()), (Kind::TumblingChaos, "tumbling chaos"));
     assert_eq!((chaos.n, chaos.w, chaos.period), (None, None, None));
@@ -116,7 +116,7 @@ fn exponent_of_one_trajectory() {
 fn long_transients_are_not_called_chaotic() {
     for p in [1.2, 1.8] {
         let map = basins_on_plane(&driven(0.1, p, 2.0), 60);
-        assert_eq!(map.plane, Plane::Basins, "p = {p}");
+        assert_eq!(map.labelling, Labelling::Basins, "p = {p}");
         for attractor in &map.attractors {
             assert!(!attractor.kind.is_chaotic(), "p = {p}: {}", attractor.name);
             assert!(attractor.exponent < 0.0);

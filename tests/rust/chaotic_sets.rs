@@ -6,13 +6,13 @@ use std::f64::consts::{PI, TAU};
 use pendmap::attractor::{Attractor, Kind};
 use pendmap::integrate::State;
 use pendmap::integrate::Strobe;
-use pendmap::maps::basins::{BasinMap, Plane};
+use pendmap::maps::basins::{BasinMap, Labelling};
 use pendmap::maps::bifurcation::{Request, bifurcation};
 use pendmap::maps::cell::{Cell, Search};
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::Range;
 
-use crate::support::{basins_on_plane, driven, paths, plane, spread};
+use crate::support::{basins_on_plane, driven, instruction_sets, plane, spread};
 
 /// Steps a period of the method of this file.
 const STEPS: usize = 200;
@@ -93,7 +93,7 @@ fn does_what_it_says(own: &Own, attractor: &Attractor) {
 fn rotating_chaos_is_two_attractors_with_half_of_the_starts_each() {
     let own = Own { p: 1.808, omega: 2.0 };
     let map: BasinMap = basins_on_plane(&driven(0.1, own.p, own.omega), 24);
-    assert_eq!(map.plane, Plane::Basins);
+    assert_eq!(map.labelling, Labelling::Basins);
     let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["rotating chaos -", "rotating chaos +"]);
     assert_eq!((map.attractors[0].twin, map.attractors[1].twin), (Some(1), Some(0)));
@@ -134,7 +134,7 @@ fn sets_at_random_points_do_what_their_kind_says() {
 fn searched_from(own: &Own, number: usize) -> Cell {
     let starts = plane(1000).sampled_states(9 * (number + 1), 1);
     let search = Search { starts, each: 9, bound: None, kept: 64 };
-    let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, paths()[0]);
+    let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, instruction_sets()[0]);
     search.cell(number, &strobe, &[], Control::default().flag())
 }
 

@@ -3,14 +3,14 @@
 use std::f64::consts::PI;
 
 use pendmap::integrate::accuracy::{choose, distance};
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::EventKind;
-use pendmap::integrate::flight::{Flight, Piece};
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::driver::{Driver, Piece};
+use pendmap::integrate::reference::event::EventKind;
+use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::{State, Strobe};
 use pendmap::model::{Effect, Kind, Pendulum};
 
-use crate::support::{advanced, driven, path, spread};
+use crate::support::{advanced, driven, simd, spread};
 
 /// A pendulum with that friction besides Coulomb's.
 fn loaded(base: Pendulum, theta_r: f64, k: f64) -> Pendulum {
@@ -93,15 +93,15 @@ fn turns_beyond_corners_are_where_the_exact_solution_has_them() {
         let (turns, corners) = exact_turns(k, velocity, 3);
         assert!(corners >= 2, "{corners}");
         let pendulum = loaded(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), k, k);
-        let course = Course::new(&pendulum, true, 1e-14, |_, value| value);
-        let mut flight = Flight::new(&course, 0.0, [0.0, velocity], 30.0);
-        flight.finish(|_| ());
+        let ode = OdeProblem::new(&pendulum, true, 1e-14, |_, value| value);
+        let mut driver = Driver::new(&ode, 0.0, [0.0, velocity], 30.0);
+        driver.finish(|_| ());
         let found: Vec<f64> =
-            flight.events.iter().filter(|e| e.kind == EventKind::Turn).map(|e| e.theta).collect();
+            driver.events.iter().filter(|e| e.kind == EventKind::Turn).map(|e| e.theta).collect();
         for (found, turn) in found.iter().zip(&turns) {
             assert!((found - turn).abs() < 1e-12, "{k}: {found} for {turn}");
         }
-        assert!(found.len() >= 3, "{:?}", flight.events);
+        assert!(found.len() >= 3, "{:?}", driver.events);
     }
 }
 
@@ -110,10 +110,10 @@ fn the_error_follows_the_tolerance_through_corners() {
     for pendulum in models() {
         for start in [[2.79, 0.49], [0.5, 1.5], [-1.2, 2.2]] {
             let end = |tolerance: f64| {
-                let course = Course::new(&pendulum, true, tolerance, |_, value| value);
-                let mut flight = Flight::new(&course, 0.0, start, 9.0);
-                flight.finish(|_| ());
-                flight.state
+                let ode = OdeProblem::new(&pendulum, true, tolerance, |_, value| value);
+                let mut driver = Driver::new(&ode, 0.0, start, 9.0);
+                driver.finish(|_| ());
+                driver.state
             };
             let exact = end(1e-15);
             for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
@@ -156,7 +156,7 @@ fn derivatives_stay_right_through_corners() {
 /// The distances of lanes from the reference after so many periods, in rising order.
 fn errors(pendulum: &Pendulum, starts: &[State], steps: usize, periods: usize) -> Vec<f64> {
     let flow = Flow::new(pendulum);
-    let ends = advanced(&Strobe::new(pendulum, steps, path()), starts, periods);
+    let ends = advanced(&Strobe::new(pendulum, steps, simd()), starts, periods);
     let duration = periods as f64 * pendulum.period();
     let mut errors: Vec<f64> = starts
         .iter()
@@ -197,7 +197,7 @@ fn steps_for_a_tolerance_are_those_of_other_effects() {
     let starts = spread(400, PI, 3.0);
     let drag = Effect::new(Kind::QuadraticDrag, &[0.15]).expect("in range");
     for pendulum in models() {
-        let steps = |p: &Pendulum| choose(p, &starts, 1e-6, path()).expect("steps").0.steps();
+        let steps = |p: &Pendulum| choose(p, &starts, 1e-6, simd()).expect("steps").0.steps();
         let mut other = pendulum.clone();
         other.effects = vec![drag.clone()];
         let [found, other] = [&pendulum, &other].map(steps);
@@ -212,15 +212,15 @@ fn a_load_that_only_just_touches_zero_is_not_missed() {
     // touches zero: on both sides, ever nearer, lanes must do what the reference does.
     let pendulum = loaded(driven(0.1, 0.6, 2.0), 0.02, 0.2);
     let flow = Flow::new(&pendulum);
-    let strobe = Strobe::new(&pendulum, 60, path());
+    let strobe = Strobe::new(&pendulum, 60, simd());
     let equation = pendulum.equation();
     let corners = |start: State| {
-        let course = Course::new(&pendulum, false, 1e-12, |_, value| value);
-        let mut flight = Flight::new(&course, 0.0, start, pendulum.period());
+        let ode = OdeProblem::new(&pendulum, false, 1e-12, |_, value| value);
+        let mut driver = Driver::new(&ode, 0.0, start, pendulum.period());
         let mut sides = Vec::new();
-        while let Some(piece) = flight.advance() {
-            if matches!(piece, Piece::Leap) {
-                sides.push(flight.leap.signs[1]);
+        while let Some(piece) = driver.advance() {
+            if matches!(piece, Piece::Step) {
+                sides.push(driver.dense.signs[1]);
             }
         }
         sides.windows(2).filter(|w| w[0] * w[1] < 0.0).count()

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use pendmap::error::Error;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::flow::Flow;
-use pendmap::integrate::sample::sample;
+use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::basins;
@@ -15,7 +15,9 @@ use pendmap::model::effects::Mappable;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::effects::{Draws, has};
-use crate::support::{advanced, bits, columns, driven, path, paths, plane, spread, unchecked};
+use crate::support::{
+    advanced, bits, columns, driven, instruction_sets, plane, simd, spread, unchecked,
+};
 
 /// All that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {
@@ -44,8 +46,8 @@ fn mappable() -> Vec<(Kind, Pendulum)> {
 #[test]
 fn one_at_a_time_gives_the_same_bits() {
     for (_, pendulum) in mappable() {
-        for path in paths() {
-            let strobe = Strobe::new(&pendulum, 30, path);
+        for simd in instruction_sets() {
+            let strobe = Strobe::new(&pendulum, 30, simd);
             let states = spread(100, PI, 3.0);
             let run = |singly: bool| {
                 let (mut theta, mut velocity) = columns(&states);
@@ -58,7 +60,7 @@ fn one_at_a_time_gives_the_same_bits() {
                 }
                 [bits(&theta), bits(&velocity), bits(&turns)]
             };
-            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
+            assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
         }
     }
 }
@@ -67,7 +69,7 @@ fn one_at_a_time_gives_the_same_bits() {
 fn errors_in_lanes(pendulum: &Pendulum, steps: usize) -> [f64; 2] {
     let starts = spread(60, PI, 3.0);
     let flow = Flow::new(pendulum);
-    let strobe = Strobe::new(pendulum, steps, path());
+    let strobe = Strobe::new(pendulum, steps, simd());
     let ends = advanced(&strobe, &starts, 3);
     let far = |(start, end): (&State, &State)| {
         distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
@@ -120,7 +122,7 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
     let rougher = driven(0.1, 0.6, 2.0).with_friction(0.15).expect("in range");
     let drifting = has(plain, effect(Kind::CoulombDrift, 4e-4));
     let states = spread(50, PI, 3.0);
-    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, path()), &states, 3));
+    let [a, b] = [&rougher, &drifting].map(|p| advanced(&Strobe::new(p, 150, simd()), &states, 3));
     for (a, b) in a.iter().zip(&b) {
         assert!(distance(*a, *b) < 1e-10, "{a:?} {b:?}");
     }
@@ -137,8 +139,8 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
         let mut late = early.clone();
         late.lab_time += 5.0;
         let end = |pendulum: &Pendulum, from: State, until: f64| {
-            let course = Course::new(pendulum, true, 1e-13, |_, value| value);
-            sample(&course, 0.0, from, &[until], |_, _| true).states[0]
+            let ode = OdeProblem::new(pendulum, true, 1e-13, |_, value| value);
+            sample(&ode, 0.0, from, &[until], |_, _| true).states[0]
         };
         let whole = end(&early, [2.0, 0.0], 9.0);
         let parts = end(&late, end(&early, [2.0, 0.0], 5.0), 4.0);
@@ -160,7 +162,7 @@ fn maps_refuse_what_does_not_repeat_every_turn() {
     ] {
         let pendulum = has(driven(0.1, 0.6, 2.0), effect.clone());
         let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
-        let strobe = Strobe::new(&pendulum, 20, path());
+        let strobe = Strobe::new(&pendulum, 20, simd());
         let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());
         for result in [map, moved] {
             match result {

@@ -1,8 +1,8 @@
-//! Exponential and logarithm on every path, against the C library.
+//! Exponential and logarithm on every instruction set, against the C library.
 
-use pendmap::lanes::{Lane, Path};
+use pendmap::lanes::{InstructionSet, Lane};
 
-use crate::support::{Function, each, paths};
+use crate::support::{Function, each, instruction_sets};
 
 struct Exponential;
 struct Logarithm;
@@ -44,21 +44,21 @@ fn exponents() -> Vec<f64> {
 #[test]
 fn the_exponential_is_good_to_the_last_place() {
     let numbers = exponents();
-    for path in paths() {
-        let found = worst(&numbers, &each::<Exponential>(path, &numbers), f64::exp);
-        assert!(found.0 < 2.0, "{path}: {found:?}");
+    for simd in instruction_sets() {
+        let found = worst(&numbers, &each::<Exponential>(simd, &numbers), f64::exp);
+        assert!(found.0 < 2.0, "{simd}: {found:?}");
     }
 }
 
 #[test]
 fn the_exponential_stays_among_normal_numbers() {
     let far = [-1e300, f64::NEG_INFINITY, -750.0, 750.0, 1e300, f64::INFINITY];
-    for path in paths() {
-        let found = each::<Exponential>(path, &far);
-        assert!(found.iter().all(|y| y.is_normal() && *y > 0.0), "{path}: {found:?}");
+    for simd in instruction_sets() {
+        let found = each::<Exponential>(simd, &far);
+        assert!(found.iter().all(|y| y.is_normal() && *y > 0.0), "{simd}: {found:?}");
         assert!(found[..3].iter().all(|y| *y < 1e-307) && found[3..].iter().all(|y| *y > 1e307));
     }
-    let one = each::<Exponential>(Path::Portable, &[0.0, -0.0]);
+    let one = each::<Exponential>(InstructionSet::Portable, &[0.0, -0.0]);
     assert!(one.iter().all(|y| (y - 1.0).abs() == 0.0), "{one:?}");
 }
 
@@ -70,20 +70,20 @@ fn the_logarithm_is_good_to_the_last_places() {
     numbers.extend((0..20_000).map(|i| 0.5 + 1e-4 * f64::from(i)));
     numbers.extend((1..16).flat_map(|k| [1.0 + 10_f64.powi(-k), 1.0 - 10_f64.powi(-k)]));
     numbers.retain(|x| x.ln() != 0.0);
-    for path in paths() {
-        let found = worst(&numbers, &each::<Logarithm>(path, &numbers), f64::ln);
-        assert!(found.0 < 4.0, "{path}: {found:?}");
+    for simd in instruction_sets() {
+        let found = worst(&numbers, &each::<Logarithm>(simd, &numbers), f64::ln);
+        assert!(found.0 < 4.0, "{simd}: {found:?}");
     }
-    assert!(each::<Logarithm>(Path::Portable, &[1.0])[0].abs() == 0.0);
+    assert!(each::<Logarithm>(InstructionSet::Portable, &[1.0])[0].abs() == 0.0);
 }
 
 #[test]
 fn each_undoes_the_other() {
     let numbers: Vec<f64> = (-7000..7000).map(|i| 0.1 * f64::from(i)).collect();
-    for path in paths() {
-        let there = each::<Exponential>(path, &numbers);
-        for (x, back) in numbers.iter().zip(each::<Logarithm>(path, &there)) {
-            assert!((back - x).abs() < 4e-16 * (1.0 + x.abs()), "{path}: {x} {back}");
+    for simd in instruction_sets() {
+        let there = each::<Exponential>(simd, &numbers);
+        for (x, back) in numbers.iter().zip(each::<Logarithm>(simd, &there)) {
+            assert!((back - x).abs() < 4e-16 * (1.0 + x.abs()), "{simd}: {x} {back}");
         }
     }
 }

@@ -8,12 +8,12 @@ use pendmap::attractor::Kind;
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::ensemble::TRAJECTORIES;
-use pendmap::maps::growth::Bundle;
 use pendmap::maps::lyapunov::{End, Exponent, Request, lyapunov};
+use pendmap::maps::tangent_growth::Bundle;
 use pendmap::model::Pendulum;
 use pendmap::orbit::PoincareMap;
 
-use crate::support::{driven, paths, spread, undriven};
+use crate::support::{driven, instruction_sets, spread, undriven};
 use crate::truths::{attractors_at, number, table, truths};
 
 fn request(start: State) -> Request {
@@ -91,7 +91,7 @@ fn a_chaotic_transient_has_the_exponent_of_what_captures_it() {
         assert!((own.exponent + 0.05).abs() < 1e-9, "{}", own.exponent);
         let transient = found.transient.expect("a transient");
         if transient > 100 {
-            grown += found.course.iter().take(transient as usize).sum::<f64>();
+            grown += found.growth.iter().take(transient as usize).sum::<f64>();
             lasted += f64::from(transient);
         }
         longest = longest.max(transient);
@@ -157,8 +157,8 @@ fn tangents_grow_through_turns_and_sticks_as_exact_derivatives_say() {
         let map = PoincareMap::new(&pendulum);
         let starts = spread(120, PI, 3.0);
         let exact: Vec<_> = starts.iter().map(|start| exact_growth(&map, *start, 4)).collect();
-        for path in paths() {
-            let strobe = Strobe::new(&pendulum, steps, path);
+        for simd in instruction_sets() {
+            let strobe = Strobe::new(&pendulum, steps, simd);
             let mut bundle = Bundle::new(&starts);
             let rows = bundle.grow(&strobe, 4, 1, &pool, &Control::default()).expect("growth");
             let mut errors = Vec::new();
@@ -173,12 +173,12 @@ fn tangents_grow_through_turns_and_sticks_as_exact_derivatives_say() {
             // Shadows err by their distance times the bend of the map; where a shadow turns or stops
             // and the trajectory does not, by as much as they like, which is as rare as they are near.
             let at = |share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
-            assert!(at(0.9) < 1e-4, "{path}, theta_r = {theta_r}: {:e}", at(0.9));
-            assert!(at(0.98) < 2e-2, "{path}, theta_r = {theta_r}: {:e}", at(0.98));
+            assert!(at(0.9) < 1e-4, "{simd}, theta_r = {theta_r}: {:e}", at(0.9));
+            assert!(at(0.98) < 2e-2, "{simd}, theta_r = {theta_r}: {:e}", at(0.98));
         }
     }
     assert!(
-        compared > 1000 * paths().len() && stopped > 100 * paths().len(),
+        compared > 1000 * instruction_sets().len() && stopped > 100 * instruction_sets().len(),
         "{compared} {stopped}"
     );
 }

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector};
-use pendmap::fit::descent::{Limit, Point, descend};
+use pendmap::fit::levenberg_marquardt::{Limit, Point, descend};
 use pendmap::fit::normal::Normal;
 use pendmap::fit::profile::intervals;
 use pendmap::fit::window::{Window, cut};

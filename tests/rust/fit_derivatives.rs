@@ -6,15 +6,15 @@ use pendmap::fit::linear::Linear;
 use pendmap::fit::window::Window;
 use pendmap::fit::{Problem, Record, RodSensor, Slot};
 use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::EventKind;
-use pendmap::integrate::sample::sample;
-use pendmap::lanes::Path;
+use pendmap::integrate::reference::event::EventKind;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
+use pendmap::lanes::InstructionSet;
 use pendmap::model::recorded::{Quantity, Samples};
 use pendmap::model::{Kind, Pendulum, Recorded};
 
 use crate::fit_records::{TOLERANCE, every, everything, free, line, record, with};
-use crate::support::{driven, paths, undriven};
+use crate::support::{driven, instruction_sets, undriven};
 
 /// The largest difference of the rows from finite differences, over the size of the column or 1, on any
 /// instruction set of this processor.
@@ -30,8 +30,8 @@ fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
         Problem::new(vec![record], free(&slots, 1, &values), TOLERANCE).expect("a problem");
     let window = Window { record: 0, from: 0, to: count, start };
     let mut worst = 0_f64;
-    for path in paths() {
-        problem.path = path;
+    for simd in instruction_sets() {
+        problem.simd = simd;
         worst = worst.max(worst_of(&problem, &values, window));
     }
     worst
@@ -81,26 +81,27 @@ fn instruction_sets_agree_and_passes_have_the_same_motion() {
     assert!(slots.len() + 2 > 16);
     let record = record(pendulum, None, [2.0, 0.1], 40.0);
     let window = Window { record: 0, from: 0, to: record.times.len(), start: [2.0, 0.1] };
-    let linear = |count: usize, path: Path| {
+    let linear = |count: usize, simd: InstructionSet| {
         let free = free(&slots[..count], 1, &values[..count]);
         let mut problem = Problem::new(vec![record.clone()], free, TOLERANCE).expect("a problem");
-        problem.path = path;
+        problem.simd = simd;
         line(&problem, &values[..count], &window)
     };
-    let all = linear(slots.len(), Path::Portable);
-    for path in paths() {
-        let [few, many] = [4, slots.len()].map(|count| linear(count, path));
-        assert_eq!(few.states, many.states, "{path}");
+    let all = linear(slots.len(), InstructionSet::Portable);
+    for simd in instruction_sets() {
+        let [few, many] = [4, slots.len()].map(|count| linear(count, simd));
+        assert_eq!(few.states, many.states, "{simd}");
         for column in 0..all.width {
             let of = |linear: &Linear, k: usize| linear.row(k)[column];
             let samples = 0..all.states.len();
             let size = samples.clone().map(|k| of(&all, k).abs()).fold(1.0, f64::max);
             let apart = samples.map(|k| (of(&all, k) - of(&many, k)).abs()).fold(0.0, f64::max);
-            assert!(apart < 1e-8 * size, "{path}, column {column}: {apart:e} of {size:e}");
+            assert!(apart < 1e-8 * size, "{simd}, column {column}: {apart:e} of {size:e}");
         }
     }
-    if Path::Avx512.available() {
-        let [wide, narrow] = [Path::Avx512, Path::Avx2].map(|path| linear(4, path));
+    if InstructionSet::Avx512.available() {
+        let [wide, narrow] =
+            [InstructionSet::Avx512, InstructionSet::Avx2].map(|simd| linear(4, simd));
         assert_eq!((wide.states, wide.rows), (narrow.states, narrow.rows));
     }
 }
@@ -159,8 +160,8 @@ fn derivatives_hold_where_a_contact_yields() {
     // Held fast now and then, and seen by an accelerometer.
     let rubbing = with(driven(0.05, 0.9, 0.87).with_friction(0.1).expect("in range"), &[dahl]);
     let mut record = record(rubbing.clone(), None, start, 30.0);
-    let course = Course::new(&rubbing, true, TOLERANCE, |_, value| value);
-    let events = sample(&course, 0.0, start, &[30.0], |_, _| true).events;
+    let ode = OdeProblem::new(&rubbing, true, TOLERANCE, |_, value| value);
+    let events = sample(&ode, 0.0, start, &[30.0], |_, _| true).events;
     assert!(events.iter().any(|event| event.kind == EventKind::Release), "{events:?}");
     let error = worst(record.clone(), None, start);
     assert!(error < 1e-6, "{error:e}");
@@ -179,8 +180,8 @@ fn derivatives_hold_where_a_contact_yields() {
 #[test]
 fn derivatives_hold_where_the_pivot_gives_way() {
     let happens = |pendulum: &Pendulum, start: State, until: f64, kind: EventKind| {
-        let course = Course::new(pendulum, true, TOLERANCE, |_, value| value);
-        let events = sample(&course, 0.0, start, &[until], |_, _| true).events;
+        let ode = OdeProblem::new(pendulum, true, TOLERANCE, |_, value| value);
+        let events = sample(&ode, 0.0, start, &[until], |_, _| true).events;
         events.iter().filter(|event| event.kind == kind).count()
     };
     let check = |pendulum: Pendulum, start: State, until: f64| {
@@ -307,8 +308,8 @@ fn derivatives_hold_where_friction_is_negative() {
     let start = [1.5, 0.0];
     let record = record(pendulum.clone(), None, [1.5, -0.2], 30.0);
     let turns = {
-        let course = Course::new(&pendulum, true, TOLERANCE, |_, value| value);
-        sample(&course, 0.0, start, &[30.0], |_, _| true).events
+        let ode = OdeProblem::new(&pendulum, true, TOLERANCE, |_, value| value);
+        sample(&ode, 0.0, start, &[30.0], |_, _| true).events
     };
     assert!(turns.len() > 8 && turns.iter().all(|event| event.kind == EventKind::Turn));
     let error = worst(record, None, [1.5, -0.2]);
@@ -332,8 +333,8 @@ fn gravity_is_the_square_of_the_frequency() {
     slow.effects[0].parameters[0] *= gravity;
     let times = every(0.5, 30.0);
     let run = |pendulum: &Pendulum, gravity: f64, start: State, times: &[f64]| {
-        let course = Course::new(pendulum, true, 1e-14, |_, value| value).with_gravity(gravity);
-        sample(&course, 0.0, start, times, |_, _| true)
+        let ode = OdeProblem::new(pendulum, true, 1e-14, |_, value| value).with_gravity(gravity);
+        sample(&ode, 0.0, start, times, |_, _| true)
     };
     let own = run(&pendulum, 1.0, [-0.43, 1.03], &times);
     assert!(own.events.iter().any(|event| event.kind == EventKind::Release));

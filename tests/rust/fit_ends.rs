@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use pendmap::fit::descent::{Limit, Outcome, Point, descend};
+use pendmap::fit::levenberg_marquardt::{Limit, Outcome, Point, descend};
 use pendmap::fit::window::Window;
 use pendmap::fit::{Problem, Record, Slot};
 use pendmap::model::{Kind, Pendulum};

@@ -6,8 +6,8 @@ use pendmap::fit::linear::{Linear, linearise};
 use pendmap::fit::window::Window;
 use pendmap::fit::{Free, Problem, Record, Slot};
 use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::sample::sample;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
 use pendmap::model::{Effect, Kind, Observation, Pendulum, Recorded};
 
 /// The error allowed to a step.
@@ -33,14 +33,14 @@ pub fn record(
     until: f64,
 ) -> Record {
     let times = every(0.06, until);
-    let mut course = Course::new(&pendulum, true, 1e-14, |_, value| value);
+    let mut ode = OdeProblem::new(&pendulum, true, 1e-14, |_, value| value);
     if let Some(recorded) = &recorded {
-        course = course.driven_by(Arc::clone(recorded));
+        ode = ode.driven_by(Arc::clone(recorded));
     }
-    let run = sample(&course, 0.0, start, &times, |_, _| true);
+    let run = sample(&ode, 0.0, start, &times, |_, _| true);
     let sensor = Observation::lift(&pendulum, |_, value| value);
     let read = |(k, tau): (usize, &f64)| {
-        sensor.read(run.given(&course, k), run.states[k][1], pendulum.lab_time + tau)
+        sensor.read(run.given(&ode, k), run.states[k][1], pendulum.lab_time + tau)
     };
     let readings = times.iter().enumerate().map(read).collect();
     let weights = vec![1.0; times.len()];

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::flow::Flow;
 use pendmap::maps::advance::advance;
 use pendmap::maps::control::Control;
 use pendmap::model::effects::{Action, Mappable};
@@ -14,9 +14,10 @@ use pendmap::model::{Effect, Formula, Kind, Pendulum};
 use proptest::prelude::*;
 
 use crate::effects::{Draws, derivatives, evaluated, has};
-use crate::rewritten::{formula, rewritten, term};
+use crate::effects_as_formulas::{formula, rewritten, term};
 use crate::support::{
-    advanced, basins_on_plane, bits, cell_names, columns, driven, path, paths, spread, undriven,
+    advanced, basins_on_plane, bits, cell_names, columns, driven, instruction_sets, simd, spread,
+    undriven,
 };
 
 /// The formula with values for its parameters.
@@ -95,7 +96,7 @@ fn a_formula_s_trajectories_are_the_library_s() {
             if own.check_mappable().is_ok() && own.route() == library.route() {
                 let starts = spread(200, PI, 3.0);
                 let [a, b] =
-                    [&library, &own].map(|p| advanced(&Strobe::new(p, 60, path()), &starts, 3));
+                    [&library, &own].map(|p| advanced(&Strobe::new(p, 60, simd()), &starts, 3));
                 for ((a, b), start) in a.iter().zip(&b).zip(&starts) {
                     let apart = distance(*a, *b);
                     // Without fused operations the two round differently, at corners too.
@@ -180,8 +181,8 @@ fn one_at_a_time_gives_a_formula_s_bits() {
         for theta_r in [0.0, 0.05] {
             let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
             let pendulum = has(base, of(term, &[0.1, 0.4]));
-            for path in paths() {
-                let strobe = Strobe::new(&pendulum, 30, path);
+            for simd in instruction_sets() {
+                let strobe = Strobe::new(&pendulum, 30, simd);
                 let states = spread(100, PI, 3.0);
                 let run = |singly: bool| {
                     let (mut theta, mut velocity) = columns(&states);
@@ -194,7 +195,7 @@ fn one_at_a_time_gives_a_formula_s_bits() {
                     }
                     [bits(&theta), bits(&velocity), bits(&turns)]
                 };
-                assert_eq!(run(false), run(true), "{path}, {}", term.0);
+                assert_eq!(run(false), run(true), "{simd}, {}", term.0);
             }
         }
     }
@@ -206,7 +207,7 @@ fn lanes_follow_formulas_as_the_reference_does() {
         let pendulum = has(driven(0.1, 0.6, 2.0), of(term, &[0.1, 0.4]));
         let starts = spread(60, PI, 3.0);
         let flow = Flow::new(&pendulum);
-        let ends = advanced(&Strobe::new(&pendulum, 200, path()), &starts, 3);
+        let ends = advanced(&Strobe::new(&pendulum, 200, simd()), &starts, 3);
         let far = starts.iter().zip(&ends).map(|(start, end)| {
             distance(*end, flow.carry(*start, 0.0, 3.0 * pendulum.period()).state)
         });
@@ -264,7 +265,7 @@ fn maps_refuse_formulas_that_do_not_repeat() {
     ] {
         let own = effect(&formula("mine", term, &[("k", power)]), &[0.1]);
         assert_eq!(own.kind.definition().mappable, Mappable::No, "{term}");
-        let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, path());
+        let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, simd());
         let error = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default());
         let line = error.map(|_| ()).expect_err(term).to_string();
         let begin = "mine can be in one trajectory, not in maps: ";

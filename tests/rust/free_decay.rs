@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::{Event, EventKind};
-use pendmap::integrate::flight::Flight;
+use pendmap::integrate::reference::driver::Driver;
+use pendmap::integrate::reference::event::{Event, EventKind};
+use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::model::Pendulum;
 use serde_json::Value;
 
@@ -14,11 +14,11 @@ use crate::truths::{list, number, numbers, truths};
 fn decay(gamma: f64, theta_r: f64, theta: f64) -> Vec<Event> {
     let pendulum = Pendulum::new(gamma, 0.0, 1.0, 0.0, 0.0).expect("in range");
     let pendulum = pendulum.with_friction(theta_r).expect("in range");
-    let course = Course::new(&pendulum, true, 1e-15, |_, value| value);
-    let mut flight = Flight::new(&course, 0.0, [theta, 0.0], 1e4);
-    flight.finish(|_| ());
-    assert!(flight.is_stuck_for_ever());
-    flight.events
+    let ode = OdeProblem::new(&pendulum, true, 1e-15, |_, value| value);
+    let mut driver = Driver::new(&ode, 0.0, [theta, 0.0], 1e4);
+    driver.finish(|_| ());
+    assert!(driver.is_stuck_for_ever());
+    driver.events
 }
 
 /// `gamma` and `theta_r` of an entry in SI.

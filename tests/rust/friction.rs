@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
@@ -12,7 +12,8 @@ use pendmap::maps::control::Control;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::support::{
-    advanced, basins_on_plane, bits, columns, driven, path, paths, plane, spread, unchecked,
+    advanced, basins_on_plane, bits, columns, driven, instruction_sets, plane, simd, spread,
+    unchecked,
 };
 use crate::truths::{list, number, truths};
 
@@ -22,17 +23,17 @@ fn rubbing(gamma: f64, p: f64, omega: f64, theta_r: f64) -> Pendulum {
 
 #[test]
 fn sticks_and_slips_under_drive_end_where_they_should() {
-    for path in paths() {
+    for simd in instruction_sets() {
         for truth in list(&truths()["stick_slip"]) {
             let get = |key: &str| number(&truth[key]);
             let pendulum = rubbing(get("gamma"), get("p"), get("omega"), get("theta_r"));
-            let strobe = Strobe::new(&pendulum, 200, path);
+            let strobe = Strobe::new(&pendulum, 200, simd);
             let (mut theta, mut velocity, mut turns) = ([get("theta0")], [get("v0")], [0.0]);
             let periods = get("periods") as usize;
             strobe.advance(&mut theta, &mut velocity, &mut turns, periods).expect("lengths");
             let found = [theta[0] + TAU * turns[0], velocity[0]];
             let error = distance(found, [get("theta"), get("v")]);
-            assert!(error < 1e-8, "{path}: {error:e} at {truth}");
+            assert!(error < 1e-8, "{simd}: {error:e} at {truth}");
         }
     }
 }
@@ -51,7 +52,7 @@ fn lanes_agree_with_the_reference_integrator() {
     for (gamma, p, omega, theta_r, steps) in cases {
         let pendulum = rubbing(gamma, p, omega, theta_r);
         let (starts, ends) = references(&pendulum, 1000);
-        let strobe = Strobe::new(&pendulum, steps, path());
+        let strobe = Strobe::new(&pendulum, steps, simd());
         let mut errors: Vec<f64> = advanced(&strobe, &starts, 5)
             .iter()
             .zip(&ends)
@@ -76,9 +77,9 @@ fn one_at_a_time_gives_the_same_bits() {
         base.clone().with_effect(drag).expect("once"),
         base.with_effect(ripple).expect("once"),
     ];
-    for path in paths() {
+    for simd in instruction_sets() {
         for pendulum in &models {
-            let strobe = Strobe::new(pendulum, 40, path);
+            let strobe = Strobe::new(pendulum, 40, simd);
             let states = spread(200, PI, 3.0);
             let run = |singly: bool| {
                 let (mut theta, mut velocity) = columns(&states);
@@ -91,7 +92,7 @@ fn one_at_a_time_gives_the_same_bits() {
                 }
                 [bits(&theta), bits(&velocity), bits(&turns)]
             };
-            assert_eq!(run(false), run(true), "{path}, {pendulum:?}");
+            assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
         }
     }
 }
@@ -115,7 +116,7 @@ fn every_route_agrees_with_the_reference_integrator() {
         with(&rough, &[drag, ripple]),
     ] {
         let (starts, ends) = references(&pendulum, 200);
-        let strobe = Strobe::new(&pendulum, 100, path());
+        let strobe = Strobe::new(&pendulum, 100, simd());
         for ((found, truth), start) in advanced(&strobe, &starts, 5).iter().zip(&ends).zip(&starts)
         {
             let error = distance(*found, *truth);
@@ -194,7 +195,7 @@ fn the_angle_at_which_it_stops_converges_with_the_order_of_the_method() {
     let truth = Flow::new(&pendulum).carry(start, 0.0, 20.0 * TAU);
     assert!(truth.stuck_for_ever);
     let error = |steps: usize| {
-        let end = advanced(&Strobe::new(&pendulum, steps, path()), &[start], 20)[0];
+        let end = advanced(&Strobe::new(&pendulum, steps, simd()), &[start], 20)[0];
         assert!(end[1] == 0.0, "{end:?}");
         (end[0] - truth.state[0]).abs()
     };
@@ -228,7 +229,7 @@ fn a_velocity_that_only_just_touches_zero_is_not_missed() {
     // grazes it: on both sides, ever nearer, lanes must do what the reference does.
     let pendulum = rubbing(0.02, 1.0, 2.0, 0.05);
     let flow = Flow::new(&pendulum);
-    let strobe = Strobe::new(&pendulum, 60, path());
+    let strobe = Strobe::new(&pendulum, 60, simd());
     let mut grazings = 0;
     for theta in [-2.8, -2.2, -1.5, -0.6, 0.4, 1.3, 2.4] {
         let at = |k: usize| [theta, -2.9 + 0.1 * k as f64];

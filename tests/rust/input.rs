@@ -6,7 +6,7 @@ use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::trajectory::{Request, simulate};
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::Control;
@@ -14,7 +14,7 @@ use pendmap::maps::starts::{Axis, Starts};
 use pendmap::memory;
 use pendmap::model::{HarmonicDrive, Pendulum};
 
-use crate::support::{driven, path, plane, spread};
+use crate::support::{driven, plane, simd, spread};
 
 /// The message of a refusal; a success is the failure of the test.
 fn refusal<T>(result: Result<T, Error>) -> String {
@@ -84,7 +84,7 @@ fn trajectories() {
 
 #[test]
 fn arrays_of_different_lengths() {
-    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, simd());
     let lengths = |given, names| Some(Error::Lengths { given, names });
     let go = |a: usize, b: usize, c: usize| {
         let (mut a, mut b, mut c) = (vec![0.0; a], vec![0.0; b], vec![0.0; c]);
@@ -118,14 +118,14 @@ fn arrays_of_different_lengths() {
 #[test]
 fn tolerances() {
     let starts = spread(100, 3.0, 3.0);
-    let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, path()));
+    let range = |tol: f64| refusal(choose(&driven(0.1, 1.0, 2.0), &starts, tol, simd()));
     assert_eq!(range(0.5), "tol must be a number from 1e-13 to 1e-2, got 0.5");
     assert_eq!(range(0.0), "tol must be a number from 1e-13 to 1e-2, got 0");
     assert_eq!(range(-1e-6), "tol must be a number from 1e-13 to 1e-2, got -1e-6");
     assert_eq!(range(1e300), "tol must be a number from 1e-13 to 1e-2, got 1e300");
     assert_eq!(range(f64::NAN), "tol must be a number from 1e-13 to 1e-2, got NaN");
     // Chaos makes more of rounding errors than 1e-13 within five periods.
-    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, path()).expect_err("refused");
+    let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, simd()).expect_err("refused");
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
     assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
     let error = Error::Tolerance { tol: 1e-13, reached: 2.34e-11 }.to_string();
@@ -135,17 +135,17 @@ fn tolerances() {
 
 #[test]
 fn instruction_sets() {
-    for path in Path::ALL {
-        assert_eq!(path.name().parse::<Path>(), Ok(path));
-        assert_eq!(path.to_string(), path.name());
+    for simd in InstructionSet::ALL {
+        assert_eq!(simd.name().parse::<InstructionSet>(), Ok(simd));
+        assert_eq!(simd.to_string(), simd.name());
     }
-    let error = "avx1024".parse::<Path>().expect_err("refused");
+    let error = "avx1024".parse::<InstructionSet>().expect_err("refused");
     assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
     let expected = "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
                     them, got 'avx1024'";
     assert_eq!(error.to_string(), expected);
-    assert!("AVX2".parse::<Path>().is_err() && "".parse::<Path>().is_err());
-    assert!(Path::Portable.available());
+    assert!("AVX2".parse::<InstructionSet>().is_err() && "".parse::<InstructionSet>().is_err());
+    assert!(InstructionSet::Portable.available());
 }
 
 #[test]

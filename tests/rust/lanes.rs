@@ -4,10 +4,12 @@ use std::f64::consts::PI;
 
 use pendmap::integrate::accuracy::{choose, distance, error_reached};
 use pendmap::integrate::{State, Strobe};
-use pendmap::lanes::{Isa, Job, Lane, Path, dispatch};
+use pendmap::lanes::{InstructionSet, Isa, Job, Lane, dispatch};
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, bits, columns, driven, fine_strobe, path, paths, spread};
+use crate::support::{
+    advanced, bits, columns, driven, fine_strobe, instruction_sets, simd, spread,
+};
 
 /// Angles, velocities and turns, as bits.
 fn result(strobe: &Strobe, states: &[State], periods: usize, singly: bool) -> [Vec<u64>; 3] {
@@ -42,17 +44,17 @@ impl Job for Width {
 
 #[test]
 fn lanes_equal_single_trajectories_bit_for_bit() {
-    for path in paths() {
-        let width = dispatch::run(path, Width);
+    for simd in instruction_sets() {
+        let width = dispatch::run(simd, Width);
         for pendulum in cases() {
             // One step length on each side of the change between the sines.
             for steps in [12, 60] {
-                let strobe = Strobe::new(&pendulum, steps, path);
+                let strobe = Strobe::new(&pendulum, steps, simd);
                 for count in [1, width - 1, width, width + 1, 2 * width + width / 2 + 1] {
                     let states = spread(count, 6.0, 4.0);
                     let lanes = result(&strobe, &states, 6, false);
                     let single = result(&strobe, &states, 6, true);
-                    assert_eq!(lanes, single, "{path}, {pendulum:?}, {steps} steps, {count}");
+                    assert_eq!(lanes, single, "{simd}, {pendulum:?}, {steps} steps, {count}");
                 }
             }
         }
@@ -62,23 +64,23 @@ fn lanes_equal_single_trajectories_bit_for_bit() {
 #[test]
 fn a_lane_does_not_see_its_neighbours() {
     // The same trajectory comes out of every place in a bundle, beside failures too.
-    for path in paths() {
-        let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 20, path);
+    for simd in instruction_sets() {
+        let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 20, simd);
         let alone = advanced(&strobe, &[[1.0, 0.5]], 4)[0];
-        for place in 0..dispatch::run(path, Width) {
+        for place in 0..dispatch::run(simd, Width) {
             let mut states = vec![[f64::NAN, 1e300]; place];
             states.push([1.0, 0.5]);
             states.push([f64::INFINITY, 0.0]);
             let found = advanced(&strobe, &states, 4)[place];
-            assert_eq!(bits(&found), bits(&alone), "place {place} on {path}");
+            assert_eq!(bits(&found), bits(&alone), "place {place} on {simd}");
         }
     }
 }
 
 #[test]
 fn avx512_and_avx2_give_the_same_bits() {
-    let both = [Path::Avx512, Path::Avx2];
-    if !both.iter().all(|path| path.available()) {
+    let both = [InstructionSet::Avx512, InstructionSet::Avx2];
+    if !both.iter().all(|simd| simd.available()) {
         eprintln!("skipped: this processor lacks one of them");
         return;
     }
@@ -86,7 +88,7 @@ fn avx512_and_avx2_give_the_same_bits() {
     for pendulum in cases() {
         for steps in [12, 60] {
             let [a, b] =
-                both.map(|path| result(&Strobe::new(&pendulum, steps, path), &states, 20, false));
+                both.map(|simd| result(&Strobe::new(&pendulum, steps, simd), &states, 20, false));
             assert_eq!(a, b, "{pendulum:?}, {steps} steps");
         }
     }
@@ -97,17 +99,17 @@ fn paths_agree_within_rounding() {
     let states = spread(500, PI, 3.0);
     for pendulum in cases() {
         for steps in [24, 60] {
-            let strobe = Strobe::new(&pendulum, steps, Path::Portable);
+            let strobe = Strobe::new(&pendulum, steps, InstructionSet::Portable);
             let reference = advanced(&strobe, &states, 3);
             // What a shift by a few units in the last place becomes is what rounding may cost.
             let shifted: Vec<State> = states.iter().map(|s| [s[0] + 1e-10, s[1] + 1e-10]).collect();
             let shifted = advanced(&strobe, &shifted, 3);
-            for path in paths() {
-                let ends = advanced(&Strobe::new(&pendulum, steps, path), &states, 3);
+            for simd in instruction_sets() {
+                let ends = advanced(&Strobe::new(&pendulum, steps, simd), &states, 3);
                 for ((a, b), c) in ends.iter().zip(&reference).zip(&shifted) {
                     let stretch = 1.0 + distance(*b, *c) / 1e-10;
                     let error = distance(*a, *b) / stretch;
-                    assert!(error < 5e-13, "{path}, {pendulum:?}, {steps} steps: {error:e}");
+                    assert!(error < 5e-13, "{simd}, {pendulum:?}, {steps} steps: {error:e}");
                 }
             }
         }
@@ -136,9 +138,9 @@ fn the_error_reached_is_the_error_and_the_coarse_sine_its_smaller_part() {
     let states = spread(400, PI, 3.0);
     for pendulum in cases {
         for tol in [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] {
-            let (strobe, reached) = choose(&pendulum, &states, tol, path()).expect("steps");
-            let fine = fine_strobe(&pendulum, strobe.steps(), strobe.path);
-            let exact = fine_strobe(&pendulum, 8 * strobe.steps(), strobe.path);
+            let (strobe, reached) = choose(&pendulum, &states, tol, simd()).expect("steps");
+            let fine = fine_strobe(&pendulum, strobe.steps(), strobe.simd);
+            let exact = fine_strobe(&pendulum, 8 * strobe.steps(), strobe.simd);
             let error = typical_distance(&strobe, &exact, &states);
             let case = format!("{pendulum:?}, tol {tol:e}, {} steps", strobe.steps());
             assert!(reached <= tol, "{case}: reached {reached:e}");
@@ -158,8 +160,8 @@ fn the_steps_chosen_are_hardly_more_than_needed() {
     let states = spread(400, PI, 3.0);
     for pendulum in [driven(0.1, 1.0, 2.0), driven(0.1, 0.5, 2.0)] {
         for tol in [1e-4, 1e-6, 1e-9] {
-            let (strobe, _) = choose(&pendulum, &states, tol, path()).expect("steps");
-            let fewer = Strobe::new(&pendulum, strobe.steps() * 9 / 10, strobe.path);
+            let (strobe, _) = choose(&pendulum, &states, tol, simd()).expect("steps");
+            let fewer = Strobe::new(&pendulum, strobe.steps() * 9 / 10, strobe.simd);
             assert!(error_reached(&fewer, &states) > tol, "{pendulum:?}, {tol:e}");
         }
     }

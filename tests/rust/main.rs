@@ -1,17 +1,17 @@
 //! The crate against what is known without it: exact solutions, symmetries, conserved quantities,
 //! and the reference values of `tests/truths.json`.
 //!
-//! - [`exact`], [`order`]: solutions in closed form, energy, order of convergence
-//! - [`stick_slip`], [`free_decay`], [`edges`]: friction, event by event, and where rounding could decide
+//! - [`exact`], [`convergence_order`]: solutions in closed form, energy, order of convergence
+//! - [`stick_slip`], [`free_decay`], [`edge_cases`]: friction, event by event, and where rounding could decide
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, each effect in every respect
-//! - [`formulas`]: effects that users write; [`rewritten`]: the library's as such
-//! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_counts`]: parameters from records; [`replay`]: ensembles
+//! - [`formulas`]: effects that users write; [`effects_as_formulas`]: the library's as such
+//! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_quantised`]: parameters from records; [`replay`]: ensembles
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
 //!   they change
-//! - [`traps`], [`attractors`], [`chaos`], [`special`]: where motions end
-//! - [`maps`], [`layers`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
+//! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: where motions end
+//! - [`maps`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`exponents`]: how fast neighbouring motions part, through friction too
 //! - [`tongues`]: where rest is stable
 //! - [`properties`]: what holds for every pendulum
@@ -21,37 +21,37 @@ mod attractors;
 mod bifurcations;
 mod chaos;
 mod chaotic_sets;
+mod convergence_order;
 mod corners;
-mod edges;
+mod edge_cases;
 mod effects;
+mod effects_as_formulas;
 mod effects_in_lanes;
 mod elementary;
 mod exact;
 mod exponents;
+mod finite_time;
 mod fit;
-mod fit_counts;
 mod fit_derivatives;
 mod fit_ends;
+mod fit_quantised;
 mod fit_records;
-mod fit_way;
+mod fit_step_scale;
 mod formulas;
 mod free_decay;
 mod friction;
 mod input;
 mod lanes;
-mod layers;
 mod maps;
 mod orbit_search;
 mod orbits;
-mod order;
+mod parameter_maps;
 mod properties;
 mod recorded;
-mod regimes;
 mod replay;
-mod rewritten;
 mod sensitivity;
 mod sine;
-mod special;
+mod special_cases;
 mod stick_slip;
 mod support;
 mod tangent;

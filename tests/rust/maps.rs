@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::trajectory::{Request, simulate};
-use pendmap::lanes::Path;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::maps::label::{FAILED, Labels, NEVER, UNDECIDED};
@@ -13,8 +13,8 @@ use pendmap::maps::starts::{Axis, Starts};
 use pendmap::orbit::PoincareMap;
 
 use crate::support::{
-    assert_same, basins_on_plane, cell_names, driven, labelled, path, paths, plane, relabelled,
-    spread, unchecked,
+    assert_same, basins_on_plane, cell_names, driven, instruction_sets, labelled, plane,
+    relabelled, simd, spread, unchecked,
 };
 
 #[test]
@@ -22,7 +22,7 @@ fn a_list_of_starts_is_the_same_cells() {
     let starts = plane(30);
     let list = Starts::List((0..starts.len()).map(|i| starts.get(i)).collect());
     for p in [0.6, 1.0] {
-        let (strobe, catalogue, labels) = labelled(&driven(0.1, p, 2.0), &starts, path());
+        let (strobe, catalogue, labels) = labelled(&driven(0.1, p, 2.0), &starts, simd());
         assert_same(&labels, &relabelled(&strobe, &catalogue, &list, None, 1), "list");
         // And so is a part of them, in any order.
         let picks: Vec<usize> = (0..900).rev().step_by(7).collect();
@@ -93,7 +93,7 @@ fn parts_of_a_map_agree() {
 fn settling_times_and_turns_are_those_of_the_trajectory() {
     let pendulum = driven(0.1, 0.6, 2.0);
     let starts = plane(40);
-    let (_, catalogue, labels) = labelled(&pendulum, &starts, path());
+    let (_, catalogue, labels) = labelled(&pendulum, &starts, simd());
     for i in starts.sample(60, 3) {
         let periods = f64::from(labels.settle[i]);
         let until = periods * pendulum.period();
@@ -118,9 +118,9 @@ fn settling_times_and_turns_are_those_of_the_trajectory() {
 fn every_path_gives_the_same_fractions() {
     for (p, allowed) in [(0.6, 0.0), (1.0, 0.015)] {
         let (pendulum, starts) = (driven(0.1, p, 2.0), plane(60));
-        let (_, reference, expected) = labelled(&pendulum, &starts, Path::Portable);
-        for path in paths() {
-            let (_, catalogue, labels) = labelled(&pendulum, &starts, path);
+        let (_, reference, expected) = labelled(&pendulum, &starts, InstructionSet::Portable);
+        for simd in instruction_sets() {
+            let (_, catalogue, labels) = labelled(&pendulum, &starts, simd);
             assert_eq!(catalogue.attractors.len(), reference.attractors.len());
             for (i, attractor) in catalogue.attractors.iter().enumerate() {
                 assert_eq!(attractor.name, reference.attractors[i].name);
@@ -129,7 +129,7 @@ fn every_path_gives_the_same_fractions() {
                     own as f64 / 3600.0
                 };
                 let moved = (share(&labels) - share(&expected)).abs();
-                assert!(moved <= allowed, "{} at p = {p} on {path}: {moved}", attractor.name);
+                assert!(moved <= allowed, "{} at p = {p} on {simd}: {moved}", attractor.name);
             }
         }
     }
@@ -137,12 +137,12 @@ fn every_path_gives_the_same_fractions() {
 
 #[test]
 fn avx512_and_avx2_give_the_same_map() {
-    let both = [Path::Avx512, Path::Avx2];
-    if !both.iter().all(|path| path.available()) {
+    let both = [InstructionSet::Avx512, InstructionSet::Avx2];
+    if !both.iter().all(|simd| simd.available()) {
         eprintln!("skipped: this processor lacks one of them");
         return;
     }
-    let [a, b] = both.map(|path| labelled(&driven(0.1, 1.34, 2.0), &plane(50), path));
+    let [a, b] = both.map(|simd| labelled(&driven(0.1, 1.34, 2.0), &plane(50), simd));
     assert_same(&a.2, &b.2, "two widths");
     assert_eq!(a.0.steps(), b.0.steps());
 }

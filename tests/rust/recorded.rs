@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::EventKind;
-use pendmap::integrate::flight::Flight;
-use pendmap::integrate::sample::sample;
-use pendmap::integrate::sensitivity::sensitivities;
+use pendmap::integrate::reference::driver::Driver;
+use pendmap::integrate::reference::event::EventKind;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
+use pendmap::integrate::reference::sensitivity::sensitivities;
 use pendmap::model::Pendulum;
 use pendmap::model::recorded::{Quantity, Recorded, Samples};
 
@@ -58,8 +58,8 @@ fn a_recorded_harmonic_motion_drives_as_the_harmonic_drive() {
     let until = 20.0;
     let pendulum = driven(0.1, p, omega).with_friction(0.05).expect("in range");
     let still = Pendulum { drive: undriven(0.1, 0.0).drive, ..pendulum.clone() };
-    let course = Course::new(&pendulum, true, 1e-13, |_, value| value);
-    let mut direct = Flight::new(&course, 0.0, [1.0, 0.0], until);
+    let ode = OdeProblem::new(&pendulum, true, 1e-13, |_, value| value);
+    let mut direct = Driver::new(&ode, 0.0, [1.0, 0.0], until);
     direct.finish(|_| ());
     let times = times(-0.5, until + 0.5, 1500);
     let cases = [
@@ -70,14 +70,14 @@ fn a_recorded_harmonic_motion_drives_as_the_harmonic_drive() {
     for (quantity, sampled, allowed) in cases {
         let samples = Samples { quantity, values: &sampled };
         let recorded = Recorded::new(&times, Some(samples), None).expect("samples");
-        let course =
-            Course::new(&still, true, 1e-13, |_, value| value).driven_by(Arc::new(recorded));
-        let mut flight = Flight::new(&course, 0.0, [1.0, 0.0], until);
-        flight.finish(|_| ());
-        let error = distance(flight.state, direct.state);
+        let ode =
+            OdeProblem::new(&still, true, 1e-13, |_, value| value).driven_by(Arc::new(recorded));
+        let mut driver = Driver::new(&ode, 0.0, [1.0, 0.0], until);
+        driver.finish(|_| ());
+        let error = distance(driver.state, direct.state);
         assert!(error < allowed, "{quantity:?}: {error:e}");
-        assert_eq!(flight.events.len(), direct.events.len());
-        for (a, b) in flight.events.iter().zip(&direct.events) {
+        assert_eq!(driver.events.len(), direct.events.len());
+        for (a, b) in driver.events.iter().zip(&direct.events) {
             assert_eq!(a.kind, b.kind);
             assert!((a.tau - b.tau).abs() < 100.0 * allowed, "{a:?} {b:?}");
         }
@@ -95,9 +95,9 @@ fn a_pivot_pushed_to_one_side_leaves_the_pendulum_behind() {
     let side = values(&times, |t| 0.5 * 0.4 * t * t);
     let samples = Samples { quantity: Quantity::Position, values: &side };
     let recorded = Arc::new(Recorded::new(&times, None, Some(samples)).expect("samples"));
-    let course =
-        Course::new(&undriven(0.4, 0.0), true, 1e-12, |_, value| value).driven_by(recorded);
-    let end = sample(&course, 0.0, [0.3, 0.0], &[190.0], |_, _| true).states[0];
+    let ode =
+        OdeProblem::new(&undriven(0.4, 0.0), true, 1e-12, |_, value| value).driven_by(recorded);
+    let end = sample(&ode, 0.0, [0.3, 0.0], &[190.0], |_, _| true).states[0];
     assert!(distance(end, [-0.4_f64.atan(), 0.0]) < 1e-8, "{end:?}");
 }
 
@@ -109,15 +109,15 @@ fn a_recorded_push_frees_a_stuck_pendulum_when_it_is_strong_enough() {
     let samples = Samples { quantity: Quantity::Acceleration, values: &side };
     let recorded = Arc::new(Recorded::new(&times, None, Some(samples)).expect("samples"));
     let pendulum = undriven(0.1, 0.0).with_friction(0.3).expect("in range");
-    let course = Course::new(&pendulum, true, 1e-12, |_, value| value).driven_by(recorded);
-    let mut flight = Flight::new(&course, 0.0, [0.0, 0.0], 40.0);
-    flight.finish(|_| ());
-    let kinds: Vec<EventKind> = flight.events.iter().map(|event| event.kind).collect();
+    let ode = OdeProblem::new(&pendulum, true, 1e-12, |_, value| value).driven_by(recorded);
+    let mut driver = Driver::new(&ode, 0.0, [0.0, 0.0], 40.0);
+    driver.finish(|_| ());
+    let kinds: Vec<EventKind> = driver.events.iter().map(|event| event.kind).collect();
     assert_eq!(kinds[..2], [EventKind::Stick, EventKind::Release]);
-    assert!((flight.events[1].tau - 30.0).abs() < 1e-10, "{:?}", flight.events);
-    assert!(flight.state[0] < 0.0, "it stays behind the pivot");
+    assert!((driver.events[1].tau - 30.0).abs() < 1e-10, "{:?}", driver.events);
+    assert!(driver.state[0] < 0.0, "it stays behind the pivot");
     // What comes after the end is not looked at, so nothing is said of ever.
-    let mut short = Flight::new(&course, 0.0, [0.0, 0.0], 20.0);
+    let mut short = Driver::new(&ode, 0.0, [0.0, 0.0], 20.0);
     short.finish(|_| ());
     assert!(short.is_stuck() && !short.is_stuck_for_ever());
 }

@@ -1,10 +1,10 @@
 //! Derivatives through turns, sticks and releases against finite differences.
 
 use pendmap::integrate::State;
-use pendmap::integrate::course::Course;
-use pendmap::integrate::event::EventKind;
-use pendmap::integrate::sample::sample;
-use pendmap::integrate::sensitivity::sensitivities;
+use pendmap::integrate::reference::event::EventKind;
+use pendmap::integrate::reference::problem::OdeProblem;
+use pendmap::integrate::reference::sample::sample;
+use pendmap::integrate::reference::sensitivity::sensitivities;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::support::driven;
@@ -39,8 +39,8 @@ fn changed(pendulum: &Pendulum, start: State, index: usize, h: f64) -> (Pendulum
 }
 
 fn states(pendulum: &Pendulum, start: State, times: &[f64]) -> Vec<State> {
-    let course = Course::new(pendulum, true, TOLERANCE, |_, value| value);
-    sample(&course, 0.0, start, times, |_, _| true).states
+    let ode = OdeProblem::new(pendulum, true, TOLERANCE, |_, value| value);
+    sample(&ode, 0.0, start, times, |_, _| true).states
 }
 
 /// The largest difference from finite differences, over the size of each derivative or 1.

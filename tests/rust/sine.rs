@@ -1,12 +1,12 @@
-//! Sine, cosine and reduction of angles in half turns, on every path, against the C library.
+//! Sine, cosine and reduction of angles in half turns, on every instruction set, against the C library.
 
 use std::f64::consts::PI;
 use std::marker::PhantomData;
 
 use pendmap::lanes::sine::{Coarse, Degree, Fine, wrap};
-use pendmap::lanes::{Lane, Path};
+use pendmap::lanes::{InstructionSet, Lane};
 
-use crate::support::{Function, each, paths};
+use crate::support::{Function, each, instruction_sets};
 
 struct Sine<D>(PhantomData<D>);
 struct Cosine<D>(PhantomData<D>);
@@ -89,15 +89,15 @@ fn check_accuracy<D: Degree>(name: &str, rounding: f64) {
     // 16 half turns are 50 rad.
     for limit in [1, 16] {
         let angles = half_turns(limit);
-        for path in paths() {
-            let (s, c) = (each::<Sine<D>>(path, &angles), each::<Cosine<D>>(path, &angles));
+        for simd in instruction_sets() {
+            let (s, c) = (each::<Sine<D>>(simd, &angles), each::<Cosine<D>>(simd, &angles));
             let sine = worst(&angles, &s, exact_sine);
             let cosine = worst(&angles, &c, exact_cosine);
             let allowed = D::ERROR + rounding;
-            assert!(sine.0 < allowed, "{name} sine on {path}: {sine:?} over {allowed:e}");
+            assert!(sine.0 < allowed, "{name} sine on {simd}: {sine:?} over {allowed:e}");
             // x - 1/2 is rounded once, to half a unit in the last place of x.
             let allowed = allowed + PI * f64::from(limit) * 0.5 * f64::EPSILON;
-            assert!(cosine.0 < allowed, "{name} cosine on {path}: {cosine:?} over {allowed:e}");
+            assert!(cosine.0 < allowed, "{name} cosine on {simd}: {cosine:?} over {allowed:e}");
         }
     }
 }
@@ -112,7 +112,8 @@ fn coarse_sine_and_cosine_keep_their_bound() {
     check_accuracy::<Coarse>("coarse", 4e-16);
     // The bound is the polynomial's own and not a generous one.
     let angles = half_turns(1);
-    let found = worst(&angles, &each::<Sine<Coarse>>(Path::Portable, &angles), exact_sine);
+    let found =
+        worst(&angles, &each::<Sine<Coarse>>(InstructionSet::Portable, &angles), exact_sine);
     assert!(found.0 > 0.9 * Coarse::ERROR, "{found:?}");
 }
 
@@ -120,9 +121,9 @@ fn coarse_sine_and_cosine_keep_their_bound() {
 fn far_angles_are_as_good_as_near_ones() {
     // A pendulum that has gone round a hundred thousand times.
     let angles: Vec<f64> = (0..50_000).map(|i| 2e5 + f64::from(i) * 0.123_456_7).collect();
-    for path in paths() {
-        let found = worst(&angles, &each::<Sine<Fine>>(path, &angles), exact_sine);
-        assert!(found.0 < Fine::ERROR + 3e-16, "{path}: {found:?}");
+    for simd in instruction_sets() {
+        let found = worst(&angles, &each::<Sine<Fine>>(simd, &angles), exact_sine);
+        assert!(found.0 < Fine::ERROR + 3e-16, "{simd}: {found:?}");
     }
 }
 
@@ -130,9 +131,9 @@ fn far_angles_are_as_good_as_near_ones() {
 fn small_angles_keep_their_relative_accuracy() {
     // The first coefficient is pi: a pendulum near rest is as precise as one far from it.
     let small: Vec<f64> = (30..3000).map(|i| 10_f64.powf(-0.1 * f64::from(i))).collect();
-    for path in paths() {
-        for (x, y) in small.iter().zip(each::<Sine<Fine>>(path, &small)) {
-            assert!((y / exact_sine(*x) - 1.0).abs() < 4e-16, "{path}: sin(pi {x:e}) = {y:e}");
+    for simd in instruction_sets() {
+        for (x, y) in small.iter().zip(each::<Sine<Fine>>(simd, &small)) {
+            assert!((y / exact_sine(*x) - 1.0).abs() < 4e-16, "{simd}: sin(pi {x:e}) = {y:e}");
         }
     }
 }
@@ -140,9 +141,9 @@ fn small_angles_keep_their_relative_accuracy() {
 #[test]
 fn the_equilibria_are_exact() {
     let whole: Vec<f64> = (-40..=40).map(f64::from).collect();
-    for path in paths() {
-        assert!(each::<Sine<Fine>>(path, &whole).iter().all(|y| *y == 0.0), "{path}");
-        assert!(each::<Sine<Coarse>>(path, &whole).iter().all(|y| *y == 0.0), "{path}");
+    for simd in instruction_sets() {
+        assert!(each::<Sine<Fine>>(simd, &whole).iter().all(|y| *y == 0.0), "{simd}");
+        assert!(each::<Sine<Coarse>>(simd, &whole).iter().all(|y| *y == 0.0), "{simd}");
     }
 }
 
@@ -156,16 +157,16 @@ fn opposite(a: f64, b: f64) -> bool {
 fn sine_and_reduction_are_odd_bit_for_bit() {
     let right = half_turns(16);
     let left: Vec<f64> = right.iter().map(|x| -x).collect();
-    for path in paths() {
+    for simd in instruction_sets() {
         let pairs = [
-            ("fine sine", each::<Sine<Fine>>(path, &right), each::<Sine<Fine>>(path, &left)),
-            ("coarse sine", each::<Sine<Coarse>>(path, &right), each::<Sine<Coarse>>(path, &left)),
-            ("angle", each::<Wrapped>(path, &right), each::<Wrapped>(path, &left)),
-            ("turns", each::<Turns>(path, &right), each::<Turns>(path, &left)),
+            ("fine sine", each::<Sine<Fine>>(simd, &right), each::<Sine<Fine>>(simd, &left)),
+            ("coarse sine", each::<Sine<Coarse>>(simd, &right), each::<Sine<Coarse>>(simd, &left)),
+            ("angle", each::<Wrapped>(simd, &right), each::<Wrapped>(simd, &left)),
+            ("turns", each::<Turns>(simd, &right), each::<Turns>(simd, &left)),
         ];
         for (what, a, b) in pairs {
             for ((x, a), b) in right.iter().zip(a).zip(b) {
-                assert!(opposite(a, b), "{what} of {x:?} and its opposite on {path}: {a:?}, {b:?}");
+                assert!(opposite(a, b), "{what} of {x:?} and its opposite on {simd}: {a:?}, {b:?}");
             }
         }
     }
@@ -175,12 +176,12 @@ fn sine_and_reduction_are_odd_bit_for_bit() {
 fn wrapping_takes_whole_turns_off_and_loses_nothing() {
     let mut angles = half_turns(16);
     angles.extend((0..20_000).map(|i| f64::from(i) * 1.234_567 - 1e4));
-    for path in paths() {
-        let (wrapped, turns) = (each::<Wrapped>(path, &angles), each::<Turns>(path, &angles));
+    for simd in instruction_sets() {
+        let (wrapped, turns) = (each::<Wrapped>(simd, &angles), each::<Turns>(simd, &angles));
         for ((x, r), k) in angles.iter().zip(&wrapped).zip(&turns) {
-            assert!(k.fract() == 0.0 && r.abs() <= 1.0, "{x} is {k} turns and {r} on {path}");
-            assert!((x - r).to_bits() == (2.0 * k).to_bits() || *k == 0.0, "{x} on {path}");
-            assert!(*k != 0.0 || r.to_bits() == x.to_bits() || *x == 0.0, "{x} on {path}");
+            assert!(k.fract() == 0.0 && r.abs() <= 1.0, "{x} is {k} turns and {r} on {simd}");
+            assert!((x - r).to_bits() == (2.0 * k).to_bits() || *k == 0.0, "{x} on {simd}");
+            assert!(*k != 0.0 || r.to_bits() == x.to_bits() || *x == 0.0, "{x} on {simd}");
         }
     }
 }

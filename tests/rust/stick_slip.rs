@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use pendmap::integrate::course::Course;
-use pendmap::integrate::flight::Flight;
-use pendmap::integrate::flow::Flow;
+use pendmap::integrate::reference::driver::Driver;
+use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::reference::problem::OdeProblem;
 use serde_json::Value;
 
 use crate::truths::{list, model, number, truths};
@@ -21,18 +21,18 @@ fn known() -> impl Iterator<Item = (&'static Value, pendmap::model::Pendulum, [f
 fn turns_sticks_and_releases_are_where_they_are() {
     for (entry, pendulum, start) in known() {
         let until = number(&entry["periods"]) * pendulum.period();
-        let course = Course::new(&pendulum, true, 1e-13, |_, value| value);
-        let mut flight = Flight::new(&course, 0.0, start, until);
-        flight.finish(|_| ());
+        let ode = OdeProblem::new(&pendulum, true, 1e-13, |_, value| value);
+        let mut driver = Driver::new(&ode, 0.0, start, until);
+        driver.finish(|_| ());
         let expected = list(&entry["events"]);
-        assert_eq!(flight.events.len(), expected.len(), "{entry}");
-        for (event, expected) in flight.events.iter().zip(expected) {
+        assert_eq!(driver.events.len(), expected.len(), "{entry}");
+        for (event, expected) in driver.events.iter().zip(expected) {
             assert_eq!(event.kind.words(), expected["what"].as_str().expect("a word"), "{event:?}");
             assert!((event.tau - number(&expected["tau"])).abs() < 1e-10, "{event:?} {expected}");
             assert!((event.theta - number(&expected["theta"])).abs() < 1e-10, "{event:?}");
         }
         let end = [number(&entry["theta"]), number(&entry["v"])];
-        let error = (flight.state[0] - end[0]).hypot(flight.state[1] - end[1]);
+        let error = (driver.state[0] - end[0]).hypot(driver.state[1] - end[1]);
         assert!(error < 1e-11, "{start:?}: {error:e}");
     }
 }

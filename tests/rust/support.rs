@@ -1,4 +1,4 @@
-//! What several modules need: paths, pendulums, starts that cover a plane, whole maps.
+//! What several modules need: instruction sets, pendulums, starts that cover a plane, whole maps.
 
 use std::f64::consts::PI;
 use std::marker::PhantomData;
@@ -9,21 +9,21 @@ use pendmap::attractor::{Catalogue, Effort};
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::{Moving, Schedule, State, Strobe};
 use pendmap::lanes::sine::Fine;
-use pendmap::lanes::{Isa, Job, Lane, Path, dispatch};
+use pendmap::lanes::{InstructionSet, Isa, Job, Lane, dispatch};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::label::{Labels, label};
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
-/// The paths that this processor has, quickest first.
-pub fn paths() -> Vec<Path> {
-    Path::ALL.into_iter().filter(|path| path.available()).collect()
+/// The instruction sets that this processor has, quickest first.
+pub fn instruction_sets() -> Vec<InstructionSet> {
+    InstructionSet::ALL.into_iter().filter(|simd| simd.available()).collect()
 }
 
-/// The path that a map takes: the quickest, or the one that `PENDMAP_SIMD` names.
-pub fn path() -> Path {
-    Path::choose().expect("PENDMAP_SIMD names a path of this processor")
+/// The instruction set of a map: the quickest, or the one that `PENDMAP_SIMD` names.
+pub fn simd() -> InstructionSet {
+    InstructionSet::choose().expect("PENDMAP_SIMD names a simd of this processor")
 }
 
 /// A driven pendulum without torque.
@@ -37,8 +37,8 @@ pub fn undriven(gamma: f64, torque: f64) -> Pendulum {
 }
 
 /// The map of `pendulum` with the fine sine whatever the step.
-pub fn fine_strobe(pendulum: &Pendulum, steps: usize, path: Path) -> Strobe {
-    Strobe { fine: true, ..Strobe::new(pendulum, steps, path) }
+pub fn fine_strobe(pendulum: &Pendulum, steps: usize, simd: InstructionSet) -> Strobe {
+    Strobe { fine: true, ..Strobe::new(pendulum, steps, simd) }
 }
 
 /// `count` states that cover `[-theta, theta] x [-velocity, velocity]` evenly (an additive
@@ -71,18 +71,22 @@ pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
     basins(pendulum, &plane(count), &unchecked(), &Control::default()).expect("a map")
 }
 
-/// The steps and attractors of a plane on a chosen path.
-pub fn searched(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue) {
+/// The steps and attractors of a plane on a chosen instruction set.
+pub fn searched(pendulum: &Pendulum, starts: &Starts, simd: InstructionSet) -> (Strobe, Catalogue) {
     let sample = starts.sampled_states(400, 0);
-    let (strobe, _) = choose(pendulum, &sample, 1e-6, path).expect("steps");
+    let (strobe, _) = choose(pendulum, &sample, 1e-6, simd).expect("steps");
     let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
     catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false));
     (strobe, catalogue)
 }
 
-/// The steps, attractors and labels of a plane on a chosen path.
-pub fn labelled(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Catalogue, Labels) {
-    let (strobe, catalogue) = searched(pendulum, starts, path);
+/// The steps, attractors and labels of a plane on a chosen instruction set.
+pub fn labelled(
+    pendulum: &Pendulum,
+    starts: &Starts,
+    simd: InstructionSet,
+) -> (Strobe, Catalogue, Labels) {
+    let (strobe, catalogue) = searched(pendulum, starts, simd);
     let labels = relabelled(&strobe, &catalogue, starts, None, 1);
     (strobe, catalogue, labels)
 }
@@ -90,7 +94,7 @@ pub fn labelled(pendulum: &Pendulum, starts: &Starts, path: Path) -> (Strobe, Ca
 /// Chaos beside other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
 pub fn chaos_among_others() -> &'static (Strobe, Catalogue, Labels) {
     static FOUND: OnceLock<(Strobe, Catalogue, Labels)> = OnceLock::new();
-    FOUND.get_or_init(|| labelled(&driven(0.1, 1.52, 1.1), &plane(24), path()))
+    FOUND.get_or_init(|| labelled(&driven(0.1, 1.52, 1.1), &plane(24), simd()))
 }
 
 /// The labels of all starts, or of `picks`.
@@ -177,9 +181,9 @@ impl<F: Function> Job for Each<'_, F> {
     }
 }
 
-/// `F` of many numbers on `path`; lanes and single numbers must agree bit for bit.
-pub fn each<F: Function>(path: Path, numbers: &[f64]) -> Vec<f64> {
-    let [lanes, singles] = dispatch::run(path, Each::<F>(numbers, PhantomData));
-    assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {path}");
+/// `F` of many numbers on `simd`; lanes and single numbers must agree bit for bit.
+pub fn each<F: Function>(simd: InstructionSet, numbers: &[f64]) -> Vec<f64> {
+    let [lanes, singles] = dispatch::run(simd, Each::<F>(numbers, PhantomData));
+    assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {simd}");
     lanes
 }

@@ -7,7 +7,7 @@ use pendmap::integrate::{State, Strobe};
 use pendmap::model::Pendulum;
 use pendmap::orbit::PoincareMap;
 
-use crate::support::{bits, columns, driven, paths, spread};
+use crate::support::{bits, columns, driven, instruction_sets, spread};
 
 fn cases() -> [Pendulum; 4] {
     [
@@ -91,8 +91,8 @@ fn stretch_is_the_growth_of_a_tangent() {
                 (image.state, tangent.norm().ln(), [unit[0], unit[1]], image.turns)
             })
             .collect();
-        for path in paths() {
-            let strobe = Strobe::new(&pendulum, 200, path);
+        for simd in instruction_sets() {
+            let strobe = Strobe::new(&pendulum, 200, simd);
             let (mut theta, mut velocity) = columns(&states);
             let count = states.len();
             let mut turns = vec![0.0; count];
@@ -113,10 +113,10 @@ fn stretch_is_the_growth_of_a_tangent() {
             for (i, (state, log, unit, whole)) in expected.iter().enumerate() {
                 let error = (wrapped(theta[i] - state[0])).hypot(velocity[i] - state[1]);
                 let tilt = (tangents.0[i] - unit[0]).hypot(tangents.1[i] - unit[1]);
-                assert!(error < 1e-9, "state {i} on {path}: {error:e}");
+                assert!(error < 1e-9, "state {i} on {simd}: {error:e}");
                 assert!((growth[i] - log).abs() < 1e-9, "growth {i}: {} {log}", growth[i]);
-                assert!(tilt < 1e-8, "direction {i} on {path}: {tilt:e}");
-                assert!((turns[i] - *whole as f64).abs() < 1e-12, "turns {i} on {path}");
+                assert!(tilt < 1e-8, "direction {i} on {simd}: {tilt:e}");
+                assert!((turns[i] - *whole as f64).abs() < 1e-12, "turns {i} on {simd}");
             }
         }
     }
@@ -124,8 +124,8 @@ fn stretch_is_the_growth_of_a_tangent() {
 
 #[test]
 fn a_tangent_beside_a_state_does_not_change_it() {
-    for path in paths() {
-        let strobe = Strobe { fine: true, ..Strobe::new(&driven(0.1, 1.2, 2.0), 24, path) };
+    for simd in instruction_sets() {
+        let strobe = Strobe { fine: true, ..Strobe::new(&driven(0.1, 1.2, 2.0), 24, simd) };
         let states = spread(70, PI, 2.5);
         let (mut theta, mut velocity) = columns(&states);
         let mut turns = vec![0.0; states.len()];
@@ -143,7 +143,7 @@ fn a_tangent_beside_a_state_does_not_change_it() {
                 1,
             )
             .expect("equal lengths");
-        assert_eq!(bits(&theta), bits(&a), "{path}");
-        assert_eq!(bits(&velocity), bits(&b), "{path}");
+        assert_eq!(bits(&theta), bits(&a), "{simd}");
+        assert_eq!(bits(&velocity), bits(&b), "{simd}");
     }
 }

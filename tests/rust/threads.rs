@@ -7,12 +7,12 @@ use pendmap::integrate::Strobe;
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::{Control, pool};
-use pendmap::maps::layers::finite_time;
+use pendmap::maps::finite_time::finite_time;
 use pendmap::model::Pendulum;
 
 use crate::support::{
-    assert_same, bits, cell_names, chaos_among_others, columns, driven, path, plane, relabelled,
-    searched, spread, unchecked,
+    assert_same, bits, cell_names, chaos_among_others, columns, driven, plane, relabelled,
+    searched, simd, spread, unchecked,
 };
 
 #[test]
@@ -35,7 +35,7 @@ fn threads_do_not_show_in_a_map() {
 #[test]
 fn threads_do_not_show_in_labels() {
     let (starts, slow) = (plane(24), driven(0.1, 1.8, 2.0));
-    let (strobe, catalogue) = searched(&slow, &starts, path());
+    let (strobe, catalogue) = searched(&slow, &starts, simd());
     let [a, b] = [1, 2].map(|threads| relabelled(&strobe, &catalogue, &starts, None, threads));
     assert_same(&a, &b, "slow");
     let (strobe, catalogue, labels) = chaos_among_others();
@@ -44,7 +44,7 @@ fn threads_do_not_show_in_labels() {
 
 #[test]
 fn threads_do_not_show_in_layers() {
-    let strobe = Strobe::new(&driven(0.1, 1.7, 0.87), 40, path());
+    let strobe = Strobe::new(&driven(0.1, 1.7, 0.87), 40, simd());
     let [a, b] = [1, 2].map(|threads| {
         let pool = pool(threads).expect("a pool");
         let layers = finite_time(&strobe, &plane(100), 5, &pool, &Control::default());
@@ -56,7 +56,7 @@ fn threads_do_not_show_in_layers() {
 
 #[test]
 fn threads_do_not_show_in_plain_integration() {
-    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, path());
+    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, simd());
     let states = spread(3000, 3.1, 3.0);
     let [a, b] = [1, 2].map(|threads| {
         let (mut theta, mut velocity) = columns(&states);
@@ -76,7 +76,7 @@ fn a_cancelled_map_stops() {
     }
     let control = Control::default();
     control.cancel();
-    let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, path());
+    let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, simd());
     let layers = finite_time(&strobe, &plane(40), 10, &pool(1).expect("a pool"), &control);
     assert_eq!(layers.err(), Some(Error::Interrupted));
     let mut theta = vec![0.0; 10];

@@ -12,7 +12,7 @@ use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::{State, Strobe};
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, driven, fine_strobe, path, plane, searched, undriven};
+use crate::support::{advanced, driven, fine_strobe, plane, searched, simd, undriven};
 
 /// States inside an ellipse: spread over its area, and close to its edge all round.
 fn inside(ellipse: &Ellipse) -> Vec<State> {
@@ -38,7 +38,7 @@ fn cases() -> &'static [(Pendulum, Strobe, Catalogue)] {
             .into_iter()
             .chain([Pendulum::new(0.1, 0.5, 1.5, 0.3, 0.2).expect("in range"), undriven(0.2, 0.0)])
             .map(|pendulum| {
-                let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
+                let (strobe, catalogue) = searched(&pendulum, &plane(100), simd());
                 (pendulum, strobe, catalogue)
             })
             .collect()
@@ -48,7 +48,7 @@ fn cases() -> &'static [(Pendulum, Strobe, Catalogue)] {
 #[test]
 fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
     for (pendulum, strobe, catalogue) in cases() {
-        let fine = fine_strobe(pendulum, 2 * strobe.steps(), path());
+        let fine = fine_strobe(pendulum, 2 * strobe.steps(), simd());
         assert!(!catalogue.traps.ellipses.is_empty(), "{pendulum:?}");
         for ellipse in &catalogue.traps.ellipses {
             let attractor = &catalogue.attractors[ellipse.attractor];
@@ -123,9 +123,9 @@ fn ellipses_are_centred_on_the_points_of_their_attractors() {
 fn capture_agrees_with_waiting() {
     // Labels by traps against where trajectories are after 3000 periods, at a smooth point.
     let pendulum = driven(0.1, 0.6, 2.0);
-    let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
+    let (strobe, catalogue) = searched(&pendulum, &plane(100), simd());
     let starts: Vec<State> = (0..1600).map(|i| plane(40).get(i)).collect();
-    let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+    let fine = fine_strobe(&pendulum, 3 * strobe.steps(), simd());
     let ends = advanced(&fine, &starts, 3000);
     let mut different = 0;
     for (outcome, end) in
@@ -150,7 +150,7 @@ fn capture_agrees_with_waiting() {
 fn a_band_holds_the_running_state() {
     for pendulum in [undriven(0.1, 0.5), Pendulum::new(0.1, 0.1, 2.0, 0.0, 0.5).expect("in range")]
     {
-        let (strobe, catalogue) = searched(&pendulum, &plane(100), path());
+        let (strobe, catalogue) = searched(&pendulum, &plane(100), simd());
         let [band] = catalogue.traps.bands.as_slice() else { panic!("one band: {pendulum:?}") };
         assert!(band.half_width > 0.1, "{}", band.half_width);
         let states: Vec<State> = (0..500)
@@ -162,7 +162,7 @@ fn a_band_holds_the_running_state() {
             })
             .collect();
         assert!(states.iter().all(|s| band.contains(*s)));
-        let fine = fine_strobe(&pendulum, 3 * strobe.steps(), path());
+        let fine = fine_strobe(&pendulum, 3 * strobe.steps(), simd());
         for (start, end) in states.iter().zip(advanced(&fine, &states, 60)) {
             // Interpolation of the tabulated curve limits how close one can see it come.
             let off = (end[1] - band.at(end[0])).abs();

@@ -71,7 +71,7 @@ impl Family {
     }
 }
 
-/// What of the motion an effect's torque depends on: it decides which path of the kernel runs.
+/// What of the motion an effect's torque depends on: it decides which route of the kernel runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// A torque of angle and time.

@@ -324,7 +324,7 @@ fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
     })
 }
 
-/// Which path of the kernel runs.
+/// Which route of the kernel runs.
 fn action(tree: &Tree, jumps: bool, only_rubs: bool, loaded: bool) -> Action {
     let mut speeds = false;
     let mut beside = false;

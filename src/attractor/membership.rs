@@ -1,0 +1,73 @@
+//! Which attractor a trajectory belongs to that no trap has captured.
+
+use std::sync::atomic::AtomicBool;
+
+use super::catalogue::Attractor;
+use super::find::{Catalogue, Ending, REACH, SAME, open};
+use super::long_runs::{Cut, Window, long_runs};
+use super::near_returns::{nearest_return, tracks};
+use crate::integrate::{State, Strobe};
+use crate::orbit::newton;
+
+/// Stroboscopic points that tell on which set a trajectory stays.
+const LAST_POINTS: usize = 64;
+
+impl Catalogue {
+    /// The index of the one chaotic attractor, if there is no other attractor at all.
+    #[must_use]
+    pub fn only_chaos(&self) -> Option<usize> {
+        match self.attractors.as_slice() {
+            [one] if one.kind.is_chaotic() => Some(0),
+            _ => None,
+        }
+    }
+
+    /// Whether some attractor can be told only by where its trajectories stay.
+    #[must_use]
+    pub fn has_chaos(&self) -> bool {
+        self.attractors.iter().any(|a| a.kind.is_chaotic())
+    }
+
+    /// The attractors that open trajectories belong to, where Newton's method from a near return leads to
+    /// a known orbit, or the region of a known set holds the last points.
+    #[must_use]
+    pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+        let map = self.map(strobe);
+        let longest = self.effort.longest_cycle;
+        let place = |track: &Vec<State>| {
+            let nearest = nearest_return(strobe.angle, track, longest);
+            let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
+            orbit.and_then(|orbit| {
+                let own = |a: &Attractor| {
+                    a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME))
+                };
+                self.attractors.iter().position(own)
+            })
+        };
+        let tracks = tracks(strobe, states, longest);
+        let homes = self.homes(strobe, states).into_iter();
+        tracks.iter().zip(homes).map(|(track, home)| place(track).or(home)).collect()
+    }
+
+    /// Whether all starts are open and stay on chaotic attractors.
+    #[must_use]
+    pub fn holds_all(&self, strobe: &Strobe, endings: &[Ending]) -> bool {
+        let open = open(endings);
+        open.len() == endings.len() && self.homes(strobe, &open).iter().all(Option::is_some)
+    }
+
+    /// The chaotic attractors that open trajectories stay on, by their next stroboscopic points and the way they
+    /// turn over these.
+    #[must_use]
+    pub fn homes(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+        if !self.has_chaos() {
+            return vec![None; states.len()];
+        }
+        let cut = Cut { windows: 1, length: LAST_POINTS, side: self.effort.cells };
+        let runs = long_runs(strobe, states, cut, &AtomicBool::new(false)).unwrap_or_default();
+        let home = |window: &Window| {
+            self.attractors.iter().position(|a| a.keeps(&window.points, window.senses))
+        };
+        runs.iter().map(|windows| windows.last().and_then(home)).collect()
+    }
+}

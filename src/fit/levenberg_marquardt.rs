@@ -1,0 +1,233 @@
+//! Gauss-Newton steps with Levenberg's and Marquardt's damping, at fixed windows.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::normal::{Normal, Step};
+use super::problem::Problem;
+use super::single_window::relax;
+use super::step_scale::StepScale;
+use super::window::Window;
+use crate::error::Error;
+
+/// The first damping that is tried after a step that failed.
+const FIRST_DAMPING: f64 = 1e-4;
+/// By how much it grows after a failure; it falls by the square of that.
+const GROWTH: f64 = 8.0;
+/// The part of what a step promised that it must gain to be as good as another one ...
+const FAIR: f64 = 0.25;
+/// ... and for no other way to be tried.
+const KEPT: f64 = 0.75;
+/// The most steps by which all else follows the widths.
+const FOLLOWED: usize = 2;
+/// The part of what a step promised that such a step has to promise.
+const FOLLOWED_GAIN: f64 = 0.1;
+/// Steps down after which it shows where a descent leads, ...
+const TRIED: usize = 3;
+/// ... if the next one promises at most this part of what the last one gained; ...
+const SHRINKS: f64 = 0.5;
+/// ... then so many times as much is the most that is hoped for.
+const HOPE: f64 = 3.0;
+/// Beyond this damping no step is left.
+const MOST_DAMPING: f64 = 1e8;
+
+/// A point of the search.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Values of the free parameters.
+    pub values: Vec<f64>,
+    /// Windows with their initial states.
+    pub windows: Vec<Window>,
+    /// The equations there.
+    pub normal: Normal,
+    /// What initial states promise in vain: at a kink, as where friction just holds, a least sum of
+    /// squares is not flat.
+    pub(super) in_vain: f64,
+}
+
+impl Point {
+    /// The point at `values`.
+    ///
+    /// # Errors
+    /// [`Error::Diverges`] where a motion leaves the range of numbers, or a value is out of range.
+    pub fn new(problem: &Problem, values: Vec<f64>, windows: Vec<Window>) -> Result<Self, Error> {
+        let normal = Normal::at(problem, &values, &windows).ok_or(Error::Diverges)?;
+        Ok(Self { values, windows, normal, in_vain: 0.0 })
+    }
+
+    /// The samples that count, less the parameters and initial states that were adapted to them.
+    #[must_use]
+    pub fn degrees(&self, problem: &Problem) -> usize {
+        problem.samples().saturating_sub(self.values.len() + 2 * self.windows.len())
+    }
+
+    /// How far each parameter may go.
+    fn ends(&self, problem: &Problem) -> Vec<[f64; 2]> {
+        let both = self.values.iter().zip(&problem.ranges);
+        both.map(|(value, [low, high])| [(low - value).min(0.0), (high - value).max(0.0)]).collect()
+    }
+
+    /// The point a step further; none where it cannot be.
+    #[must_use]
+    pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
+        self.gone(problem, step, |_| StepScale::Linear)
+    }
+
+    fn gone(
+        &self,
+        problem: &Problem,
+        step: &Step,
+        scale: impl Fn(usize) -> StepScale,
+    ) -> Option<Self> {
+        let all = || self.values.iter().zip(&step.values).enumerate();
+        let part = all().map(|(k, (value, by))| scale(k).part(*value, *by)).fold(1.0, f64::min);
+        let gone = |(k, (value, by)): (usize, (&f64, &f64))| {
+            let [low, high] = problem.ranges[k];
+            scale(k).gone(*value, part * by).clamp(low, high)
+        };
+        let values = all().map(gone).collect();
+        let mut windows = self.windows.clone();
+        for (window, step) in windows.iter_mut().zip(&step.starts) {
+            window.start[0] += part * step[0];
+            window.start[1] += part * step[1];
+        }
+        Self::new(problem, values, windows).ok()
+    }
+
+    /// The point a step further if it is lower, and how many were tried: straight; where that leads
+    /// less far down than it promised in ratios too, all else following the widths.
+    fn lower(
+        &mut self,
+        problem: &Problem,
+        step: &Step,
+        held: &[usize],
+        cancel: &AtomicBool,
+    ) -> (usize, Option<Self>) {
+        let chi2 = self.normal.chi2;
+        let lower = |next: &Self| next.normal.chi2 < chi2;
+        let keeps = |next: &Self, part: f64| chi2 - next.normal.chi2 > part * step.gain;
+        let widths =
+            || (0..problem.scales.len()).filter(|k| problem.scales[*k] == StepScale::Width);
+        let mut straight = self.moved(problem, step);
+        if straight.as_ref().is_some_and(|next| keeps(next, KEPT)) {
+            return (1, straight);
+        }
+        let (mut tried, mut bent) = (1, None);
+        if widths().next().is_some() {
+            tried += 1;
+            if let Some(next) = self.gone(problem, step, |place| problem.scales[place]) {
+                let held: Vec<usize> = held.iter().copied().chain(widths()).collect();
+                let (more, next) = next.followed(problem, &held, FOLLOWED_GAIN * step.gain);
+                tried += more;
+                bent = Some(next).filter(lower);
+            }
+        }
+        let fair = |next: &Self| keeps(next, FAIR);
+        if let Some(next) = straight.as_mut().filter(|next| !fair(next))
+            && !bent.as_ref().is_some_and(fair)
+        {
+            relax(problem, next, self, step, cancel);
+            self.in_vain = next.in_vain;
+        }
+        let both = straight.filter(lower).into_iter().chain(bent);
+        (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
+    }
+
+    /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
+    ///
+    /// A step that is too long for the widths leads up only because sizes and initial states, which
+    /// go with them nearly linearly, are not yet those of the new widths.
+    fn followed(mut self, problem: &Problem, held: &[usize], enough: f64) -> (usize, Self) {
+        for tried in 0..FOLLOWED {
+            let step = self.normal.step(0.0, held);
+            if step.gain < enough {
+                return (tried, self);
+            }
+            match self.moved(problem, &step) {
+                Some(next) if next.normal.chi2 < self.normal.chi2 => self = next,
+                _ => return (tried + 1, self),
+            }
+        }
+        (FOLLOWED, self)
+    }
+}
+
+/// How far to go.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit {
+    /// The gain in the sum of squares, expected of the next step, at which it is over ...
+    pub gain: f64,
+    /// ... or the part of the sum of squares that this is.
+    pub part: f64,
+    /// The most steps.
+    pub steps: usize,
+    /// The sum of squares that is to be reached: a descent that promises far less is given up;
+    /// infinite where any is worth it.
+    pub target: f64,
+}
+
+/// How a descent ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Points at which the equations were set up.
+    pub steps: usize,
+    /// Whether the limit was reached, or no step leads further down.
+    pub converged: bool,
+    /// Whether it was given up: it leads nowhere near [`Limit::target`].
+    pub given_up: bool,
+}
+
+/// Goes down from `point`, parameters `held` kept where they are.
+///
+/// # Errors
+/// [`Error::Interrupted`] when `cancel` is set.
+pub fn descend(
+    problem: &Problem,
+    point: &mut Point,
+    held: &[usize],
+    limit: Limit,
+    cancel: &AtomicBool,
+) -> Result<Outcome, Error> {
+    let (mut damping, mut steps, mut down, mut fell) = (0.0, 0, 0, 0.0);
+    let ended = |steps, converged| Ok(Outcome { steps, converged, given_up: false });
+    loop {
+        if cancel.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let chi2 = point.normal.chi2;
+        let step = point.normal.step_between(damping, held, &point.ends(problem));
+        let promised = step.gain - point.in_vain;
+        if damping == 0.0 && promised <= limit.gain + limit.part * chi2 {
+            // The last step costs one more point and is worth it: what is left is its square.
+            if let Some(next) = point.moved(problem, &step).filter(|next| next.normal.chi2 <= chi2)
+            {
+                *point = next;
+            }
+            return ended(steps + 1, true);
+        }
+        let settles = damping == 0.0 && down >= TRIED && promised < SHRINKS * fell;
+        if settles && chi2 - HOPE * promised > limit.target {
+            return Ok(Outcome { steps, converged: false, given_up: true });
+        }
+        if steps >= limit.steps {
+            return ended(steps, false);
+        }
+        let (tried, next) = point.lower(problem, &step, held, cancel);
+        steps += tried;
+        if let Some(next) = next {
+            fell = chi2 - next.normal.chi2;
+            let fair = fell > FAIR * step.gain;
+            *point = next;
+            down += 1;
+            if fair {
+                damping = if damping > FIRST_DAMPING { damping / (GROWTH * GROWTH) } else { 0.0 };
+            }
+        } else {
+            damping = (damping * GROWTH).max(FIRST_DAMPING);
+            // At a kink, as where a half swing more or less is made before the last stop, the sum
+            // of squares has a least value without being flat.
+            if promised <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
+                return ended(steps, true);
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! A block of trajectories at one phase of the drive, one forcing period at a time.
+//!
+//! Smooth motions run a bundle at a time through the whole period. With friction, or another law that
+//! changes with the sign of the velocity, all bundles take each step with the sign held; lanes whose
+//! velocity passed zero, or that met a corner ([`super::corner`]), go into a queue that runs in lanes itself, each with its own phase and step
+//! ([`super::event`]). Lanes that are held fast wait for their release.
+
+use std::f64::consts::{FRAC_1_PI, PI};
+use std::ops::Range;
+
+use super::event::EventSearch;
+use super::runner::{Runner, smooth};
+use super::stroboscopic::Strobe;
+use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
+use crate::model::Angle;
+use crate::model::pendulum::Route;
+
+/// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
+const WITH_EVENTS: usize = 6144;
+
+/// States, accelerations or times of a bundle, and from the seventh on what [`super::event::Switching`] holds: 0
+/// where there is no corner.
+pub(super) type Scratch = [[f64; MAX_WIDTH]; 11];
+
+/// A lane that is held fast.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub lane: usize,
+    pub half_turns: f64,
+    pub until: f64,
+    pub sense: f64,
+}
+
+/// The states of a block, in memory, and those that wait.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Angles over pi.
+    pub half_turns: Vec<f64>,
+    /// Velocities times the schedule's `kick`.
+    pub kick: Vec<f64>,
+    /// Whole turns taken off.
+    pub turns: Vec<f64>,
+    /// Angles over pi at which friction has held a trajectory during the last period; NaN where it
+    /// has not.
+    pub held_at: Vec<f64>,
+    pub(super) held: Vec<Held>,
+    pub(super) queue: Vec<EventSearch>,
+    /// What goes between lanes and queue.
+    pub(super) scratch: Box<Scratch>,
+}
+
+impl Block {
+    /// `width` trajectories at rest.
+    #[must_use]
+    pub fn new(width: usize) -> Self {
+        let zeros = vec![0.0; width];
+        Self {
+            half_turns: zeros.clone(),
+            kick: zeros.clone(),
+            turns: zeros,
+            held_at: vec![f64::NAN; width],
+            held: Vec::new(),
+            queue: Vec::new(),
+            scratch: Box::new([[0.0; MAX_WIDTH]; 11]),
+        }
+    }
+
+    /// These states in front, rest behind them; `kick` is the schedule's.
+    pub fn fill(&mut self, theta: &[f64], velocity: &[f64], kick: f64) {
+        self.half_turns.fill(0.0);
+        self.kick.fill(0.0);
+        self.turns.fill(0.0);
+        for (slot, theta) in self.half_turns.iter_mut().zip(theta) {
+            *slot = theta * FRAC_1_PI;
+        }
+        for (slot, velocity) in self.kick.iter_mut().zip(velocity) {
+            *slot = velocity * kick;
+        }
+    }
+
+    /// Takes whole turns off the angles and adds them to `turns`.
+    pub fn wrap(&mut self, angle: Angle) {
+        for (half_turns, turns) in self.half_turns.iter_mut().zip(&mut self.turns) {
+            let (wrapped, whole) = angle.wrap(*half_turns);
+            *half_turns = wrapped;
+            *turns += whole;
+        }
+    }
+
+    /// Holds the held lanes through the step, and lets go those whose time has come.
+    #[inline(never)]
+    pub(super) fn let_go(&mut self, time: [f64; 2]) {
+        let Self { half_turns, kick, held, queue, .. } = self;
+        held.retain(|h| {
+            half_turns[h.lane] = h.half_turns;
+            kick[h.lane] = 0.0;
+            if h.until >= time[1] {
+                return true;
+            }
+            let state = [h.half_turns * PI, 0.0];
+            queue.push(EventSearch::new(h.lane, state, h.sense, h.until.max(time[0]), time[1]));
+            false
+        });
+    }
+}
+
+impl Strobe {
+    /// Number of trajectories of a block for `count` of them: one bundle of lanes, a small one for a
+    /// handful, or with events so many that those of a step fill the lanes of their queue.
+    #[must_use]
+    pub fn block_width(&self, count: usize) -> usize {
+        let [few, wide, both] = dispatch::run(self.simd, Widths);
+        match (self.route, self.events, self.extra) {
+            (Route::Smooth, false, false) if count <= few => few,
+            (Route::Smooth, false, false) => wide,
+            (_, true, _) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
+            _ => both,
+        }
+    }
+
+    /// One forcing period on; the block is [`Strobe::block_width`] wide.
+    pub fn period(&self, block: &mut Block) {
+        dispatch::run(self.simd, Steps { strobe: self, block, range: 0..self.steps() });
+    }
+
+    /// Step `k` of a period alone; the steps of a period follow one another from 0 on.
+    pub fn step(&self, block: &mut Block, k: usize) {
+        dispatch::run(self.simd, Steps { strobe: self, block, range: k..k + 1 });
+    }
+
+    /// The same for a block of any width, one trajectory at a time with the arithmetic of a lane.
+    // Compiled where it is called: in tests alone.
+    #[inline]
+    pub fn period_singly(&self, block: &mut Block) {
+        dispatch::run(self.simd, Singly(Steps { strobe: self, block, range: 0..self.steps() }));
+    }
+}
+
+/// The width of a small bundle and of a whole one, and the least that holds whole bundles of
+/// either kind.
+struct Widths;
+
+impl Job for Widths {
+    type Output = [usize; 3];
+    #[inline(always)]
+    fn run<S: Isa>(self, _: S) -> [usize; 3] {
+        let (wide, narrow) = (S::Lanes::WIDTH, S::Narrow::WIDTH);
+        let both = (1..=narrow).map(|k| k * wide).find(|w| w % narrow == 0);
+        [S::Few::WIDTH, wide, both.unwrap_or(wide * narrow)]
+    }
+}
+
+struct Steps<'a> {
+    strobe: &'a Strobe,
+    block: &'a mut Block,
+    range: Range<usize>,
+}
+
+impl Job for Steps<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, isa: S) {
+        let Self { strobe, block, range } = self;
+        if block.kick.len() == S::Few::WIDTH && strobe.route == Route::Smooth && !strobe.extra {
+            smooth::<S::Few>(strobe, isa, block, range);
+            return;
+        }
+        Runner::<S::Lanes, S::Narrow>::new(strobe, (isa, isa)).run(block, range);
+    }
+}
+
+struct Singly<'a>(Steps<'a>);
+
+impl Job for Singly<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, _: S) {
+        let Steps { strobe, block, range } = self.0;
+        Runner::<S::Single, S::Single>::new(strobe, ((), ())).run(block, range);
+    }
+}

@@ -1,0 +1,160 @@
+//! The stroboscopic map for many trajectories: states at `tau = 0 mod T`, one forcing period at a
+//! time, every lane at the same phase.
+
+use std::f64::consts::PI;
+
+use super::block::Block;
+use super::general::Timetable;
+use super::schedule::Schedule;
+use crate::error::Error;
+use crate::lanes::InstructionSet;
+use crate::model::pendulum::Route;
+use crate::model::{Angle, Equation, Pendulum};
+
+/// Angle and velocity, `[theta, th']`.
+pub type State = [f64; 2];
+
+/// From steps of this length on, in units of `1/sqrt(1 + |p|)`, the method errs about as much as the
+/// coarse sine does, or more: measured from p = 0 to 30, where both grow with the stretching.
+const COARSE_SINE_FROM: f64 = 0.28;
+
+/// The stroboscopic map of one pendulum at a chosen accuracy, on a chosen instruction set.
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on one another
+#[derive(Clone, Debug)]
+pub struct Strobe {
+    /// The model.
+    pub pendulum: Pendulum,
+    /// The steps over one period.
+    pub schedule: Schedule,
+    /// The instruction set.
+    pub simd: InstructionSet,
+    /// Whether the sine of degree 15 is used.
+    pub fine: bool,
+    /// Which way through the kernel the model takes.
+    pub route: Route,
+    /// Whether the model changes with the sign of the velocity.
+    pub events: bool,
+    /// Whether friction can hold the pendulum fast.
+    pub friction: bool,
+    /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb
+    /// friction.
+    pub extra: bool,
+    /// The drive at the stages of the general method; empty on other routes.
+    pub timetable: Timetable,
+    /// Where its angle lives.
+    pub angle: Angle,
+    /// The equation, time in the laboratory held.
+    pub equation: Equation<f64>,
+}
+
+impl Strobe {
+    /// `steps` steps a period; their length chooses the sine's degree.
+    #[must_use]
+    pub fn new(pendulum: &Pendulum, steps: usize, simd: InstructionSet) -> Self {
+        let schedule = Schedule::period(pendulum, steps);
+        let pull = pendulum.greatest_pull().sqrt();
+        let fine = pendulum.period() / steps as f64 * pull < COARSE_SINE_FROM;
+        let route = pendulum.route();
+        let general = if route == Route::General { steps } else { 0 };
+        Self {
+            pendulum: pendulum.clone(),
+            schedule,
+            simd,
+            fine,
+            route,
+            events: pendulum.has_events(),
+            friction: pendulum.has_friction(),
+            extra: pendulum.has_extra_load(),
+            timetable: Timetable::new(pendulum, general),
+            angle: pendulum.angle(),
+            equation: pendulum.equation(),
+        }
+    }
+
+    /// The same map with `factor` times as many steps.
+    #[must_use]
+    pub fn refined(&self, factor: usize) -> Self {
+        Self::new(&self.pendulum, self.steps() * factor, self.simd)
+    }
+
+    /// Steps a period.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.schedule.steps().len()
+    }
+
+    /// Advances every state by `periods` forcing periods, in place.
+    ///
+    /// Angles on the circle come back in [-pi, pi]; the whole turns taken off are added to `turns`.
+    ///
+    /// # Errors
+    /// [`Error::Lengths`] if the three slices differ in length.
+    pub fn advance(
+        &self,
+        theta: &mut [f64],
+        velocity: &mut [f64],
+        turns: &mut [f64],
+        periods: usize,
+    ) -> Result<(), Error> {
+        let width = self.block_width(theta.len());
+        self.advance_blocks(theta, velocity, turns, width, |block| {
+            for _ in 0..periods {
+                self.period(block);
+                block.wrap(self.angle);
+            }
+        })
+    }
+
+    /// As [`Strobe::advance`], one trajectory at a time with the same arithmetic as a lane.
+    ///
+    /// # Errors
+    /// As [`Strobe::advance`].
+    // Compiled where it is called: in tests alone.
+    #[inline]
+    pub fn advance_singly(
+        &self,
+        theta: &mut [f64],
+        velocity: &mut [f64],
+        turns: &mut [f64],
+        periods: usize,
+    ) -> Result<(), Error> {
+        self.advance_blocks(theta, velocity, turns, 1, |block| {
+            for _ in 0..periods {
+                self.period_singly(block);
+                block.wrap(self.angle);
+            }
+        })
+    }
+
+    fn advance_blocks(
+        &self,
+        theta: &mut [f64],
+        velocity: &mut [f64],
+        turns: &mut [f64],
+        width: usize,
+        run: impl Fn(&mut Block),
+    ) -> Result<(), Error> {
+        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
+        same_length(("theta", theta.len()), ("turns", turns.len()))?;
+        let kick = self.schedule.kick;
+        let mut block = Block::new(width);
+        let chunks = theta.chunks_mut(width).zip(velocity.chunks_mut(width));
+        for ((theta, velocity), turns) in chunks.zip(turns.chunks_mut(width)) {
+            block.fill(theta, velocity, kick);
+            run(&mut block);
+            for i in 0..theta.len() {
+                theta[i] = block.half_turns[i] * PI;
+                velocity[i] = block.kick[i] * (1.0 / kick);
+                turns[i] += block.turns[i];
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn same_length(a: (&'static str, usize), b: (&'static str, usize)) -> Result<(), Error> {
+    if a.1 == b.1 {
+        return Ok(());
+    }
+    Err(Error::Lengths { given: (a.1, b.1), names: (a.0, b.0) })
+}

@@ -1,0 +1,196 @@
+//! Bindings of maps over parameters.
+
+use numpy::PyReadonlyArray1;
+use pendmap::attractor::Attractor;
+use pendmap::integrate::State;
+use pendmap::lanes::InstructionSet;
+use pendmap::maps::bifurcation as diagram;
+use pendmap::maps::cell::{Found, HINTED};
+use pendmap::maps::parameter_map::{self as maps, Request, parameter_map as search};
+use pyo3::prelude::*;
+
+use super::convert::{Array, array, states};
+use super::long_calls::watched;
+use super::model::{Model, range};
+use super::raise;
+
+/// `(name of a parameter, values)`.
+type RangeTuple = (String, Vec<f64>);
+
+/// The attractors over a plane of two parameters: arrays over all attractors of all cells, one cell after
+/// the other, and over cells.
+#[pyclass(frozen, get_all, subclass, module = "pendmap._core")]
+pub struct ParameterMap {
+    /// The cell of each attractor.
+    cell: Array<i32>,
+    kind: Vec<&'static str>,
+    n: Array<i32>,
+    w: Array<i32>,
+    theta: Array<f64>,
+    velocity: Array<f64>,
+    exponent: Array<f64>,
+    exponent_stderr: Array<f64>,
+    /// Share of the cell's starts.
+    share: Array<f64>,
+    /// Of each cell.
+    undecided: Array<f64>,
+    failed: Array<f64>,
+    /// Periods for which chaos was watched in each cell.
+    chaos_periods: Array<u32>,
+    reached_error: f64,
+    searched_again: usize,
+    simd: &'static str,
+}
+
+/// The attractors along one parameter, their points, and what is followed up and down.
+#[pyclass(frozen, get_all, extends = ParameterMap, module = "pendmap._core")]
+pub struct Bifurcation {
+    /// The attractor of each point.
+    point_entry: Array<i32>,
+    point_theta: Array<f64>,
+    point_velocity: Array<f64>,
+    up: Py<Followed>,
+    down: Py<Followed>,
+}
+
+/// What a slow change of the parameter follows.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Followed {
+    /// The attractor at each value; -1 for none.
+    on: Array<i32>,
+    /// Place of the value, angle and velocity of points that are on no attractor.
+    value: Array<i32>,
+    theta: Array<f64>,
+    velocity: Array<f64>,
+}
+
+impl ParameterMap {
+    fn new(py: Python<'_>, map: &maps::ParameterMap) -> PyResult<Self> {
+        let cells = map.cells.iter();
+        let each = cells.clone().enumerate();
+        let all: Vec<(i32, &Found)> =
+            each.flat_map(|(i, cell)| cell.found.iter().map(move |f| (i as i32, f))).collect();
+        let number =
+            |of: &dyn Fn(&Found) -> f64| array(py, all.iter().map(|(_, f)| of(f)).collect());
+        let whole = |of: &dyn Fn(&Attractor) -> i64| {
+            array(py, all.iter().map(|(_, f)| of(&f.attractor) as i32).collect())
+        };
+        let point = |f: &Found, k: usize| f.attractor.points.first().map_or(f64::NAN, |p| p[k]);
+        Ok(Self {
+            cell: array(py, all.iter().map(|(cell, _)| *cell).collect()),
+            kind: all.iter().map(|(_, f)| f.attractor.kind.word()).collect(),
+            n: whole(&|a| a.n.unwrap_or(0) as i64),
+            w: whole(&|a| a.w.unwrap_or(a.sense)),
+            theta: number(&|f| point(f, 0)),
+            velocity: number(&|f| point(f, 1)),
+            exponent: number(&|f| f.attractor.exponent),
+            exponent_stderr: number(&|f| f.attractor.exponent_stderr),
+            share: number(&|f| f.share),
+            undecided: array(py, cells.clone().map(|cell| cell.open).collect()),
+            failed: array(py, cells.clone().map(|cell| cell.failed).collect()),
+            chaos_periods: array(py, cells.map(|cell| cell.watched).collect()),
+            reached_error: map.resolution.reached_error,
+            searched_again: map.searched_again,
+            simd: InstructionSet::choose().map_err(raise)?.name(),
+        })
+    }
+}
+
+impl Followed {
+    fn new(py: Python<'_>, all: &[diagram::Followed]) -> Self {
+        let each = all.iter().enumerate();
+        let loose = each.flat_map(|(k, f)| f.loose.iter().map(move |point| (k as i32, *point)));
+        let (value, theta, velocity) = columns(py, &loose.collect::<Vec<_>>());
+        let on = all.iter().map(|f| f.on.map_or(-1, |k| k as i32)).collect();
+        Self { on: array(py, on), value, theta, velocity }
+    }
+}
+
+/// The names of a model's parameters, in the order of their places.
+#[pyfunction]
+pub fn parameter_names(model: Model) -> PyResult<Vec<String>> {
+    Ok(model.pendulum()?.parameters().into_iter().map(|(name, _)| name).collect())
+}
+
+/// The attractors over a plane of two parameters: columns over all attractors of all cells, and over cells.
+#[pyfunction]
+#[pyo3(signature = (model, axes, theta, velocity, each, tol, bound, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+pub fn parameter_map(
+    py: Python<'_>,
+    model: Model,
+    axes: (RangeTuple, RangeTuple),
+    theta: PyReadonlyArray1<'_, f64>,
+    velocity: PyReadonlyArray1<'_, f64>,
+    each: usize,
+    tol: f64,
+    bound: Option<u32>,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<ParameterMap> {
+    let pendulum = model.pendulum()?;
+    let starts = states(&theta, &velocity)?;
+    let request = Request {
+        axes: [range(&pendulum, axes.0)?, range(&pendulum, axes.1)?],
+        starts,
+        each,
+        tol,
+        bound,
+        kept: HINTED,
+        threads,
+    };
+    let map = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
+    ParameterMap::new(py, &map)
+}
+
+/// The attractors along one parameter, their points, and what is followed up and down.
+#[pyfunction]
+#[pyo3(signature = (model, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+pub fn bifurcation(
+    py: Python<'_>,
+    model: Model,
+    axis: RangeTuple,
+    theta: PyReadonlyArray1<'_, f64>,
+    velocity: PyReadonlyArray1<'_, f64>,
+    each: usize,
+    first: Option<(f64, f64)>,
+    tol: f64,
+    bound: Option<u32>,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Py<Bifurcation>> {
+    let pendulum = model.pendulum()?;
+    let starts = states(&theta, &velocity)?;
+    let request = diagram::Request {
+        axis: range(&pendulum, axis)?,
+        starts,
+        each,
+        first: first.map(|(theta, velocity)| [theta, velocity]),
+        tol,
+        bound,
+        threads,
+    };
+    let found = watched(py, progress.as_ref(), |control| {
+        diagram::bifurcation(&pendulum, &request, control)
+    })?;
+    let all = found.map.cells.iter().flat_map(|cell| &cell.found).enumerate();
+    let points: Vec<(i32, State)> = all
+        .flat_map(|(i, f)| f.attractor.points.iter().map(move |point| (i as i32, *point)))
+        .collect();
+    let (point_entry, point_theta, point_velocity) = columns(py, &points);
+    let own = Bifurcation {
+        point_entry,
+        point_theta,
+        point_velocity,
+        up: Py::new(py, Followed::new(py, &found.up))?,
+        down: Py::new(py, Followed::new(py, &found.down))?,
+    };
+    Py::new(py, (own, ParameterMap::new(py, &found.map)?))
+}
+
+/// Numbers, angles and velocities of points.
+fn columns(py: Python<'_>, points: &[(i32, State)]) -> (Array<i32>, Array<f64>, Array<f64>) {
+    let column = |k: usize| array(py, points.iter().map(|(_, point)| point[k]).collect());
+    (array(py, points.iter().map(|(i, _)| *i).collect()), column(0), column(1))
+}
