@@ -1,4 +1,4 @@
-//! What each effect costs: the time of a step of a trajectory with it, beside that of a step of the
+//! The cost of each effect: the time of a step of a trajectory with it, beside that of a step of the
 //! fast route at the same number of steps a period; and the time of a period, beside the fast route's,
 //! where either takes the steps that it needs for an error of 1e-6.
 //!

@@ -1,17 +1,17 @@
-//! Everything that can be wrong with a request, with the values that were given.
+//! Errors of a request, with the values that were given.
 
 use std::fmt;
 
-/// What was wrong, and what a value must be.
+/// An error: the value that was given, and the values that are allowed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
     /// A quantity is not finite, or outside its range.
     Range {
         /// The name of the quantity.
         name: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
-        /// What it must be.
+        /// The values allowed.
         allowed: &'static str,
     },
     /// A parameter of an effect is not finite, or outside its range.
@@ -20,33 +20,33 @@ pub enum Error {
         effect: String,
         /// Its parameter.
         parameter: String,
-        /// What was given.
+        /// The value given.
         value: f64,
         /// The bounds.
         allowed: [f64; 2],
     },
     /// No effect of that name.
     Effect {
-        /// What was given.
+        /// The name given.
         name: String,
     },
     /// No parameter of that name.
     NoParameter {
-        /// What was given.
+        /// The name given.
         name: String,
     },
     /// A formula that cannot be an effect.
     Formula {
         /// Its name.
         name: String,
-        /// What is wrong, where, and what must be there.
+        /// The error, its place and the text expected there.
         why: String,
     },
-    /// One thing said twice.
+    /// One effect given twice.
     Twice {
-        /// What was given.
+        /// The name given.
         name: String,
-        /// What it repeats.
+        /// The effect or parameter that it repeats.
         other: String,
     },
     /// A map cannot have the effect.
@@ -63,7 +63,7 @@ pub enum Error {
     },
     /// Arrays that belong together have different lengths.
     Lengths {
-        /// What was given.
+        /// The lengths given.
         given: (usize, usize),
         /// The names of the arrays.
         names: (&'static str, &'static str),
@@ -77,19 +77,19 @@ pub enum Error {
     },
     /// `PENDMAP_SIMD` names no instruction set of this processor.
     Simd {
-        /// What was given.
+        /// The name given.
         name: String,
     },
     /// No number of steps reaches the tolerance.
     Tolerance {
-        /// What was asked for.
+        /// The tolerance requested.
         tol: f64,
         /// The smallest error reached.
         reached: f64,
     },
     /// More memory than is free.
     Memory {
-        /// What there would be too many of.
+        /// The items of which there are too many.
         what: String,
         /// How many.
         count: usize,
@@ -125,9 +125,9 @@ impl fmt::Display for Error {
                 write!(f, "{effect}: {parameter} must be {range}, got {value}")
             }
             Self::Effect { name } => {
-                write!(f, "no effect is named '{name}': pendmap effects lists them")
+                write!(f, "effect must be one that pendmap effects lists, got '{name}'")
             }
-            Self::NoParameter { name } => write!(f, "the model has no parameter '{name}'"),
+            Self::NoParameter { name } => write!(f, "parameter must be one of the model, got '{name}'"),
             Self::Formula { name, why } => write!(f, "formula '{name}': {why}"),
             Self::Twice { name, other } => {
                 write!(f, "{name} and {other} are the same effect: one of them must be left out")
@@ -138,12 +138,12 @@ impl fmt::Display for Error {
             Self::NoRest { why } => write!(f, "hanging at rest has no critical curves here: {why}"),
             Self::Lengths { given, names } => write!(
                 f,
-                "{} has {} values and {} has {}: they must be as many",
-                names.0, given.0, names.1, given.1
+                "{} and {} must be as many values, got {} and {}",
+                names.0, names.1, given.0, given.1
             ),
             Self::Values { effect, given: [own, given] } => write!(
                 f,
-                "{effect} has {own} values and the call has {given}: they must be as many"
+                "{effect} must have as many values as parameters, {own}, got {given}"
             ),
             Self::Simd { name } => write!(
                 f,
@@ -152,7 +152,7 @@ impl fmt::Display for Error {
             ),
             Self::Tolerance { tol, reached } => write!(
                 f,
-                "tol is {tol:e}: the smallest error that steps can reach here is {reached:.1e}"
+                "tol must be {reached:.1e} or more here, the smallest error that steps can reach, got {tol:e}"
             ),
             Self::Memory { what, count, needed, free } => {
                 write!(f, "{count} {what} need about {:.3} GB, ", needed / 1e9)?;

@@ -8,7 +8,7 @@ use std::fs::read_to_string;
 
 use crate::error::Error;
 
-/// What everything else may take meanwhile, in bytes: threads, modules, files.
+/// Memory reserved for everything else, in bytes: threads, modules, files.
 const SPARE: f64 = 64e6;
 
 /// Refuses `count` of `what` with `each` bytes each, where they need more memory than is free.
@@ -39,7 +39,7 @@ pub fn room<T>(what: &str, list: &mut Vec<T>, more: usize) -> Result<(), Error> 
 }
 
 /// Bytes that this process may still take, where Linux says it: of the machine, of its container, and
-/// of its own limit (`ulimit -v`).
+/// of the limit of the process (`ulimit -v`).
 fn free() -> Option<f64> {
     let machine = field("/proc/meminfo", "MemAvailable:").map(|kilobytes| 1024.0 * kilobytes);
     let container = number("/sys/fs/cgroup/memory.max");

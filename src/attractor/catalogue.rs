@@ -1,4 +1,4 @@
-//! The attractors of a map, numbered by a key of their own and named by what they are.
+//! The attractors of a map, numbered by their keys and named by kind, period and winding.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +20,7 @@ const EXACT: f64 = 1e-9;
 /// An attractor.
 #[derive(Clone, Debug)]
 pub struct Attractor {
-    /// What it looks like.
+    /// Its kind.
     pub kind: Kind,
     /// Period in forcing periods; `None` where it has no meaning.
     pub n: Option<usize>,
@@ -175,7 +175,7 @@ impl Attractor {
         self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
     }
 
-    /// What stays when a catalogue is sorted anew: the bits of the first point.
+    /// A key that stays when a catalogue is sorted again: the bits of the first point.
     #[must_use]
     pub fn mark(&self) -> [u64; 2] {
         self.points.first().map_or([0; 2], |p| p.map(f64::to_bits))

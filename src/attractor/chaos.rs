@@ -199,7 +199,7 @@ fn closes(angle: Angle, windows: &[Window], longest: usize) -> bool {
     })
 }
 
-/// What a set of windows is; `None` where it is neither chaos nor quasi-periodic.
+/// The attractor of a set of windows; `None` where it is neither chaotic nor quasi-periodic.
 fn describe(
     strobe: &Strobe,
     windows: &[&Window],
@@ -208,7 +208,7 @@ fn describe(
     cancel: &AtomicBool,
 ) -> Option<ChaoticSet> {
     if strobe.pendulum.is_autonomous() {
-        // A flow in the plane has no chaos; what is left here has not settled yet.
+        // A flow in the plane has no chaos: the remaining trajectories have not settled yet.
         return None;
     }
     let mut region = Region::new(effort.cells, &strobe.pendulum);

@@ -13,7 +13,7 @@ pub struct Effort {
     pub first_round: u32,
     /// Failures of Newton's method after which a round gives up.
     pub tries: usize,
-    /// Of the trajectories left over, so many are watched.
+    /// Number of uncaptured trajectories that are watched.
     pub watched: usize,
     /// Trajectories that nothing has captured are watched for this many times the first bound more.
     pub watch: u32,
@@ -34,11 +34,11 @@ pub struct Sampling {
     pub rays: usize,
     /// Levels, each `ratio` of the one before in radius.
     pub levels: usize,
-    /// What that is.
+    /// Ratio of the radii of successive levels.
     pub ratio: f64,
-    /// So many further times as many levels, where the ones before were all too wide.
+    /// Number of further sets of as many levels, where all levels before were too wide.
     pub rounds: usize,
-    /// After one to so many returns a sample must be lower: any of these will do.
+    /// Number of returns within which a sample must become lower.
     pub returns: usize,
 }
 

@@ -32,7 +32,7 @@ pub enum Ending {
     Failed,
 }
 
-/// What a search has found so far.
+/// The results of a search so far.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     /// The attractors, sorted and named.
@@ -49,7 +49,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// What is known without a search: the running states of an undriven pendulum.
+    /// The attractors known without a search: the running states of an undriven pendulum.
     #[must_use]
     pub fn new(strobe: &Strobe, effort: Effort) -> Self {
         let band = |r: &Rotation| Band::around(strobe, &r.curve, 0);
@@ -114,7 +114,7 @@ impl Catalogue {
             round *= 2;
             let free = open(&endings);
             if self.find_cycles(strobe, &map, &free, cancel) {
-                // What the new traps hold is captured at once.
+                // Trajectories within the new traps are captured at once.
                 self.run(strobe, &mut endings, self.effort.first_round, elapsed, cancel);
             }
             alive = endings.iter().any(|e| matches!(e, Ending::Open(_)));

@@ -1,6 +1,6 @@
-//! What a motion looks like.
+//! Kinds of motions.
 
-/// What a motion looks like.
+/// The kind of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Hanging at rest.

@@ -44,7 +44,7 @@ impl Senses {
     }
 }
 
-/// What a trajectory does over a number of periods.
+/// The behaviour of a trajectory over a number of periods.
 #[derive(Clone, Debug)]
 pub struct Window {
     /// Where its stroboscopic points lie.

@@ -8,7 +8,7 @@ use crate::model::{Angle, Effect, Pendulum};
 
 /// Stroboscopic points that come back this near are taken to Newton's method.
 const NEAR: f64 = 0.03;
-/// So many times faster than the drive and gravity no resonance with either can hold a rotation.
+/// Multiple of the rates of drive and gravity above which no resonance with either can hold a rotation.
 const ESCAPE: f64 = 10.0;
 
 /// Returns of one trajectory that are tried: one that has settled comes back after every multiple of

@@ -94,7 +94,7 @@ pub fn ellipses(
     traps
 }
 
-/// The same ellipses around the mirror image of their orbit, whose points have moved by `moved`
+/// These ellipses around the mirror image of their orbit, whose points have moved by `moved`
 /// places (see [`PeriodicOrbit::mirrored`]).
 #[must_use]
 pub fn mirrored(ellipses: &[Ellipse], moved: usize) -> Vec<Ellipse> {
@@ -220,7 +220,7 @@ impl Band {
     #[must_use]
     pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
         if strobe.angle == Angle::Line {
-            // What turns for ever there never comes back.
+            // A trajectory that turns for ever there never comes back.
             return None;
         }
         let curve = tabulate(states)?;

@@ -1,4 +1,4 @@
-//! What the trajectories are that nothing has captured: chaos, or not yet settled.
+//! Trajectories that no trap has captured: chaotic, or not yet settled.
 
 use std::sync::atomic::AtomicBool;
 
@@ -59,7 +59,7 @@ impl Catalogue {
         }
         let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
         if self.find_short_cycles(strobe, &points, cancel) {
-            // What was taken for chaos may end there.
+            // A trajectory taken for chaotic may end there.
             return self.watch(strobe, endings, bound, cancel);
         }
         let symmetric = strobe.pendulum.is_mirror_symmetric();

@@ -1,4 +1,4 @@
-//! What one window says of its initial state and of the parameters.
+//! The equations of one window for its initial state and the parameters.
 
 use nalgebra::DMatrix;
 
@@ -10,7 +10,7 @@ const BLIND: f64 = 1e-11;
 /// Columns of the initial state.
 pub const STATE: usize = 2;
 
-/// What one window says.
+/// The equations of one window.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// The free parameters that it depends on.

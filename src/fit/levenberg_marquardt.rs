@@ -1,4 +1,4 @@
-//! Gauss-Newton steps with Levenberg's and Marquardt's damping, at fixed windows.
+//! The Levenberg-Marquardt method at fixed windows.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,21 +13,21 @@ use crate::error::Error;
 const FIRST_DAMPING: f64 = 1e-4;
 /// By how much it grows after a failure; it falls by the square of that.
 const GROWTH: f64 = 8.0;
-/// The part of what a step promised that it must gain to be as good as another one ...
+/// Part of the predicted gain above which a step counts as good.
 const FAIR: f64 = 0.25;
-/// ... and for no other way to be tried.
+/// Part of the predicted gain above which no other scale is tried.
 const KEPT: f64 = 0.75;
-/// The most steps by which all else follows the widths.
+/// Largest number of steps in which the other parameters follow the widths.
 const FOLLOWED: usize = 2;
-/// The part of what a step promised that such a step has to promise.
+/// Part of the predicted gain that each of these steps must predict.
 const FOLLOWED_GAIN: f64 = 0.1;
-/// Steps down after which it shows where a descent leads, ...
+/// Number of accepted steps after which a descent may be given up.
 const TRIED: usize = 3;
-/// ... if the next one promises at most this part of what the last one gained; ...
+/// A descent may be given up if the next step predicts at most this part of the last gain.
 const SHRINKS: f64 = 0.5;
-/// ... then so many times as much is the most that is hoped for.
+/// Upper bound on the total further gain, as a multiple of the predicted gain of the next step.
 const HOPE: f64 = 3.0;
-/// Beyond this damping no step is left.
+/// Damping above which the steps are too short to matter.
 const MOST_DAMPING: f64 = 1e8;
 
 /// A point of the search.
@@ -39,8 +39,8 @@ pub struct Point {
     pub windows: Vec<Window>,
     /// The equations there.
     pub normal: Normal,
-    /// What initial states promise in vain: at a kink, as where friction just holds, a least sum of
-    /// squares is not flat.
+    /// Predicted gain of initial states that no step realises: at a kink, for example where friction
+    /// just holds, the gradient does not vanish at the minimum.
     pub(super) in_vain: f64,
 }
 
@@ -197,7 +197,7 @@ pub fn descend(
         let step = point.normal.step_between(damping, held, &point.ends(problem));
         let promised = step.gain - point.in_vain;
         if damping == 0.0 && promised <= limit.gain + limit.part * chi2 {
-            // The last step costs one more point and is worth it: what is left is its square.
+            // One more step: the error after it is of second order.
             if let Some(next) = point.moved(problem, &step).filter(|next| next.normal.chi2 <= chi2)
             {
                 *point = next;

@@ -33,9 +33,9 @@ pub struct Linear {
     pub states: Vec<State>,
     /// Reading less model; 0 where a sample does not count.
     pub apart: Vec<f64>,
-    /// The same over the standard error; of a reading rounded to counts, what stands for it there.
+    /// Residuals over the standard error; of a reading rounded to counts, [`Likelihood::residual`].
     pub residuals: Vec<f64>,
-    /// One over the standard error, or what stands for it; 0 where a sample does not count.
+    /// One over the standard error, or [`Likelihood::weight`]; 0 where a sample does not count.
     pub weights: Vec<f64>,
     /// For each sample a row of derivatives of the model times that weight: by the record's
     /// columns, then by the initial angle and velocity.
@@ -86,7 +86,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let mut first = 0;
     while first < directions {
         let left = directions - first;
-        // The narrowest numbers that hold what is left.
+        // The narrowest numbers that hold the remaining derivatives.
         match register {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Register::Avx512(isa) => match left {
@@ -110,11 +110,11 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     follow.read(motion)
 }
 
-/// What the integrator tells of a window.
+/// The motion in a window.
 struct Motion {
     /// Angle and velocity at the samples.
     states: Vec<State>,
-    /// What the sensor is given: the same, or a rod sensor's reading and nothing.
+    /// The input of the sensor: angle and velocity, or the reading of a rod sensor and 0.
     heard: Vec<State>,
     /// Its derivatives: for each sample two rows.
     slopes: Vec<f64>,
@@ -152,7 +152,7 @@ impl Follow<'_> {
             ode = ode.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
-        // A mode of the rig asks for steps of its own, however slow the rest.
+        // A mode of the rig needs short steps, however slow the pendulum is.
         let rate = if ode.field().sways() { rate.min(QUICKEST) } else { 1.0 };
         let rate = rate.max(pendulum.motion().omega);
         let most =
@@ -181,7 +181,7 @@ impl Follow<'_> {
         }
     }
 
-    /// What the sensor makes of what it is given.
+    /// The reading of the sensor, by its input.
     fn read(&self, motion: Motion) -> Linear {
         let Motion { states, heard, slopes, stride } = motion;
         let record = &self.problem.records[self.window.record];

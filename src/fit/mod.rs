@@ -3,14 +3,14 @@
 //! - [`record`]: a record of one motion
 //! - [`problem`]: records, and which parameters of their pendulums are free
 //! - [`rod_sensor`]: what a gyroscope or an accelerometer on the rod reads of a motion
-//! - [`window`]: a record cut into windows, each with an initial state of its own
-//! - [`quantised`]: what readings rounded to counts say
+//! - [`window`]: a record cut into windows, each with its own initial state
+//! - [`quantised`]: the likelihood of readings rounded to counts
 //! - [`linear`]: residuals of a window and their derivatives
-//! - [`block`]: what one window says
+//! - [`block`]: the equations of one window
 //! - [`normal`]: the equations of all windows, their initial states eliminated
-//! - [`step_scale`]: how parameters go along a step, straight or in ratios
-//! - [`levenberg_marquardt`]: Gauss-Newton steps with Levenberg's and Marquardt's damping
-//! - [`single_window`]: one window by itself
+//! - [`step_scale`]: linear and logarithmic steps of parameters
+//! - [`levenberg_marquardt`]: the Levenberg-Marquardt method at fixed windows
+//! - [`single_window`]: the initial state of one window, parameters held
 //! - [`window_growth`]: from short windows to long ones
 //! - [`profile`]: intervals from the profile of the likelihood
 //! - [`replay`]: the pendulum of a record from many starts at once

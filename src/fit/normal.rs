@@ -25,7 +25,7 @@ pub fn linearised(problem: &Problem, values: &[f64], windows: &[Window]) -> Opti
     over(problem, values, windows, |linear, _| linear)
 }
 
-/// What `make` makes of each window, in their order.
+/// The results of `make` for all windows, in their order.
 fn over<T: Send>(
     problem: &Problem,
     values: &[f64],
@@ -163,8 +163,8 @@ impl Normal {
         self.step_between(damping, held, &[])
     }
 
-    /// The same with steps of parameters kept between `ends`: where one would lead beyond, it leads
-    /// to the end, and the others follow. A step cut short as a whole would creep along there.
+    /// The step with the parameters kept between `ends`: one that would lead beyond its end leads to the
+    /// end, and the others follow. A step cut short as a whole would creep along there.
     #[must_use]
     pub fn step_between(&self, damping: f64, held: &[usize], ends: &[[f64; 2]]) -> Step {
         let (information, pull) = self.reduced(damping);
@@ -189,7 +189,7 @@ impl Normal {
         }
     }
 
-    /// The same with the step of the parameters given: the initial states follow.
+    /// The step with that of the parameters given: the initial states follow.
     #[must_use]
     pub fn completed(&self, values: &DVector<f64>, damping: f64) -> Step {
         let mut starts = Vec::with_capacity(self.blocks.len());
@@ -223,7 +223,7 @@ impl Normal {
     pub fn covariance(&self) -> DMatrix<f64> {
         let (information, _) = self.reduced(0.0);
         let mut covariance = pseudo_inverse(&information, &[]);
-        // What a parameter can do without changing anything is what is missing in A^+ A.
+        // Directions that change nothing are those missing in A^+ A.
         let seen = &covariance * &information;
         for i in 0..self.count {
             if seen[(i, i)] < 0.99 {

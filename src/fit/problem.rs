@@ -28,7 +28,7 @@ pub enum Slot {
 /// A free parameter.
 #[derive(Clone, Debug)]
 pub struct Free {
-    /// What it is in which records; the same number in all of them, at most once in each.
+    /// Its records and its place in each; one number for all of them, at most once in each.
     pub places: Vec<(usize, Slot)>,
     /// Where the search starts.
     pub start: f64,
@@ -46,7 +46,7 @@ impl Free {
         self.places.first().and_then(of_effect).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
-    /// What it is in record `index`.
+    /// Its place in record `index`.
     fn slot(&self, index: usize) -> Option<Slot> {
         self.places.iter().find(|(record, _)| *record == index).map(|(_, slot)| *slot)
     }
@@ -111,7 +111,7 @@ impl Problem {
     /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
     /// that is not finite, a time that is not after the one before it, a negative weight, a record
     /// with fewer than 3 trusted samples, or a free parameter that its record does not have;
-    /// [`Error::Simd`] as of [`InstructionSet::choose`].
+    /// [`Error::Simd`], see [`InstructionSet::choose`].
     pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
         for record in &records {
             record.check()?;

@@ -1,4 +1,4 @@
-//! What readings rounded to counts say: each an interval, not a value.
+//! Readings rounded to counts: each is an interval, not a value.
 //!
 //! A sensor that gives whole counts says that the angle plus its own noise lay within half a count
 //! of what it reads. With Gaussian noise of standard error `s` before the rounding, the likelihood
@@ -25,7 +25,7 @@ const REACH: f64 = 9.0;
 /// Points of that mean.
 const POINTS: usize = 400;
 
-/// What one reading says about the model's angle.
+/// The likelihood of one reading as a function of the model's angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Likelihood {
     /// `-2 log P`.
@@ -37,15 +37,15 @@ pub struct Likelihood {
     pub weight: f64,
 }
 
-/// What a reading says that is `apart` from the model, of a count `count`, with the noise
-/// `1 / sharpness` before it was rounded.
+/// The likelihood of a reading that differs by `apart` from the model, rounded to a multiple of `count`,
+/// with noise of standard error `1 / sharpness` before the rounding.
 #[must_use]
 pub fn likelihood(apart: f64, count: f64, sharpness: f64) -> Likelihood {
     // Mirrored so that the model lies below the middle of the count.
     let middle = apart.abs() * sharpness;
     let half = 0.5 * count * sharpness;
     let (low, high) = (middle - half, middle + half);
-    // What lies above each end, over the density there.
+    // The probability above each end, over the density there.
     let root = (0.5 * PI).sqrt();
     let above = |x: f64| root * scaled_erfc(x * FRAC_1_SQRT_2);
     let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * PI).sqrt();

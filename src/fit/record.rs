@@ -16,7 +16,7 @@ pub struct Record {
     pub recorded: Option<Arc<Recorded>>,
     /// Times of the samples, times `w_ref`; each after the one before it.
     pub times: Vec<f64>,
-    /// What the sensor read, rad; of a sensor on the rod in the unit of its factors.
+    /// Readings, rad; of a sensor on the rod in the unit of its factors.
     pub readings: Vec<f64>,
     /// The gyroscope or accelerometer that read, where it was no sensor of the angle; of effects on
     /// the reading only those that multiply it act.

@@ -12,7 +12,7 @@ use crate::integrate::reference::problem::{OdeProblem, greatest_rate};
 use crate::integrate::reference::sample::sample;
 use crate::model::Observation;
 
-/// What the sensor of the angle reads at `times`, rad and not wrapped, of the pendulum of `record` under
+/// Readings of the sensor of the angle at `times`, rad and not wrapped, of the pendulum of `record` under
 /// its drive and its pivot's motion, from each of `starts` at the first of these times; with an error
 /// of `tolerance` a step; `done` is called after each. Not numbers after a motion left their range.
 ///

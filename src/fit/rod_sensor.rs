@@ -18,7 +18,7 @@ use crate::integrate::tangent::Number;
 use crate::lanes::Work;
 use crate::lanes::sine::Fine;
 
-/// What a sensor on the rod reads of a motion: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
+/// The reading of a sensor on the rod: `rate th' + place (th'' cos tilt + th'^2 sin tilt) +
 /// gravity sin(th + tilt) + bias`, in any unit that the readings have. A gyroscope has a rate alone,
 /// an accelerometer none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct RodSensor {
     pub place: f64,
     /// The factor on gravity's part; 0 where gravity has been taken out.
     pub gravity: f64,
-    /// What it reads of nothing.
+    /// Its reading at rest without gravity.
     pub bias: f64,
     /// The interval that a reading is the mean over, in `1 / w_ref`.
     pub interval: f64,
@@ -61,7 +61,7 @@ impl RodSensor {
     }
 }
 
-/// A reading, in a function of its own.
+/// A reading, in its own function.
 struct Reading<'a, N> {
     sensor: RodSensor,
     ode: &'a OdeProblem<N>,

@@ -1,4 +1,4 @@
-//! One window by itself: its initial state where all parameters are held.
+//! The fit of the initial state of one window, all parameters held.
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,17 +10,17 @@ use super::problem::Problem;
 use super::window::Window;
 use crate::error::Error;
 
-/// The gain in the sum of squares up to which it goes ...
+/// Gain in the sum of squares below which the fit ends.
 const GAIN: f64 = 0.1;
-/// ... or the part of the sum that this is: beyond that the parameters say more.
+/// Part of the sum of squares below which a gain ends the fit: the parameters then matter more.
 const PART: f64 = 1e-3;
-/// The most steps where a step of all windows failed: at a kink more lead nowhere.
+/// Largest number of steps after a step of all windows failed: at a kink, more do not help.
 const RELAXED: usize = 6;
-/// The part of the most that a window missed of what was promised from which others are looked at.
+/// A window is fitted again if it missed this part of the largest missed gain.
 const PART_MISSED: f64 = 0.1;
-/// The part of what it promised that a window keeps at most that is at a kink.
+/// A window is at a kink if its gain is at most this part of the predicted one.
 const KEPT_AT_KINK: f64 = 0.1;
-/// So many windows at most are looked at.
+/// Largest number of windows that are fitted again.
 const FEW: usize = 2;
 
 /// A window with the initial state that fits best at fixed parameters.
@@ -28,12 +28,12 @@ const FEW: usize = 2;
 pub struct SingleWindow {
     /// The point of this window alone.
     pub point: Point,
-    /// What it promised in vain: at a kink, as where friction just holds, a least sum of squares is
-    /// not flat.
+    /// Predicted gain that no step realises: at a kink, for example where friction just holds, the
+    /// gradient does not vanish at the minimum.
     pub in_vain: f64,
 }
 
-/// Fits the initial state of `window` alone in at most so many `steps`; none where its motion leaves
+/// Fits the initial state of `window` alone in at most `steps` steps; none where its motion leaves
 /// the range of numbers.
 ///
 /// # Errors

@@ -1,33 +1,33 @@
-//! How parameters go along a step: straight, or in ratios.
+//! Steps of parameters: on a linear or on a logarithmic scale.
 //!
-//! What records say of a rough spot, a magnet or a warming is nearly a product of powers of its size
-//! and its width: the sum of squares has a valley along which one is halved while the other doubles.
-//! That valley is straight in the logarithms alone; a step to the values `x + d`, which leads far up
-//! its side, leads along its bottom as `x exp(d / x)`. To first order the two are the same, so that
-//! derivatives, errors and the end of the search are. Where a size makes up for another one, as that
-//! of a drag for damping, the valley is straight as it is: both ways are tried.
+//! Records of a rough spot, a magnet or a warming determine mainly a product of powers of its size and
+//! its width: the sum of squares has a valley along which one is halved while the other doubles. The
+//! valley is straight in logarithms only; a step to `x + d` leads far up its side, a step to
+//! `x exp(d / x)` leads along its bottom. To first order the two are equal, and so are derivatives,
+//! errors and the end of the search. Where one size compensates another, for example a drag and damping,
+//! the valley is straight on the linear scale: both scales are tried.
 
 use super::problem::{Free, Slot};
 use super::record::Record;
 
-/// The most that a width changes in one step, as the logarithm of its ratio.
+/// Largest change of a width in one step, as the logarithm of the ratio.
 const FARTHEST: f64 = 2.0;
-/// A size that changes by more than this part of itself may change its sign.
+/// Relative change of a size above which its sign may change: the step is then linear.
 const SIGN: f64 = 1.0;
 
-/// How a parameter goes.
+/// The scale of the steps of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepScale {
-    /// By the step.
+    /// Linear.
     Linear,
-    /// In ratios, as long as its sign is sure: the size of an effect whose width is free too.
+    /// Logarithmic while the sign is certain: the size of an effect whose width is free too.
     Size,
-    /// In ratios: a width, a time constant, what is always positive.
+    /// Logarithmic: a width, a time constant, any parameter that is always positive.
     Width,
 }
 
 impl StepScale {
-    /// How the parameter `free` goes, one of `all` of `records`.
+    /// The scale of the parameter `free`, one of `all` of `records`.
     #[must_use]
     pub fn of(free: &Free, all: &[Free], records: &[Record]) -> Self {
         let Some((record, Slot::Parameter(place))) = free.places.first().copied() else {
@@ -48,13 +48,13 @@ impl StepScale {
         }
     }
 
-    /// The part of a step `by` from `value` that is not too far.
+    /// The largest allowed part of a step `by` from `value`.
     #[must_use]
     pub fn part(self, value: f64, by: f64) -> f64 {
         if self == Self::Width { (FARTHEST * value.abs() / by.abs()).min(1.0) } else { 1.0 }
     }
 
-    /// Where a step `by` leads from `value`.
+    /// The value after a step `by` from `value`.
     #[must_use]
     pub fn gone(self, value: f64, by: f64) -> f64 {
         let ratio = by / value;

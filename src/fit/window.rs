@@ -1,10 +1,10 @@
-//! A record cut into windows, each with an initial state of its own.
+//! A record cut into windows, each with its own initial state.
 
 use super::problem::Problem;
 use super::record::Record;
 use crate::integrate::State;
 
-/// A window needs so many trusted samples to say anything about the parameters.
+/// Least number of trusted samples of a window that determines parameters.
 const FEWEST: usize = 8;
 /// The initial state comes from a cubic through the readings within this time on either side; at an
 /// end of the record, where a cubic's slope is uncertain, from a parabola over twice the time.

@@ -16,7 +16,7 @@ use super::window::{Window, cut, guess, halves};
 use crate::error::Error;
 use crate::integrate::State;
 
-/// Windows whose mean squared residual is so many times the median's squared are split.
+/// Windows whose mean squared residual exceeds this multiple of the squared median are split.
 const ASTRAY: f64 = 36.0;
 /// How often they are.
 const MOST_SPLITS: usize = 3;
@@ -34,10 +34,10 @@ pub struct Settings {
     pub steps: usize,
     /// The gain in the sum of squares that is worth no further step.
     pub gain: f64,
-    /// So many parameters, the first ones, stay at their starts: a model is tried on a record that
-    /// it was not fitted to, and the initial states alone are adapted.
+    /// Number of leading parameters that stay at their starts: to test a model on a record that it was
+    /// not fitted to, the initial states alone are adapted.
     pub hold: usize,
-    /// As of [`Limit::target`], of a search that begins at given windows.
+    /// [`Limit::target`] of a search that begins at given windows.
     pub target: f64,
 }
 
@@ -47,7 +47,7 @@ impl Default for Settings {
     }
 }
 
-/// What came out.
+/// The result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The best point.

@@ -17,7 +17,7 @@ pub struct Tangent<L, const N: usize> {
     pub slope: [L; N],
 }
 
-// No closures: what the compiler leaves as a function of its own would lose the
+// No closures: one that the compiler does not inline would lose the
 // instruction set that the caller was compiled for.
 
 impl<L: Lane, const N: usize> Add for Tangent<L, N> {

@@ -43,7 +43,7 @@ pub struct Trajectory {
     /// Distance that a 16 times smaller error of each step makes after five periods, or at the end
     /// if that is sooner.
     pub reached_error: f64,
-    /// The same at the end.
+    /// The error at the end.
     pub end_error: f64,
     /// Steps a period, on average.
     pub steps: usize,
@@ -58,7 +58,7 @@ pub struct Trajectory {
     pub interrupted: bool,
 }
 
-/// What to compute.
+/// A request for a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     /// Angle and velocity at `tau = 0`.
@@ -88,11 +88,11 @@ pub fn simulate(
     if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
 }
 
-/// The same, and each sample is shown to `seen`, with its time, as soon as it is known. If `cancel` is
-/// set after the first of them the trajectory ends with the last one.
+/// Computes a trajectory and shows each sample, with its time, to `seen` as soon as it is known. If
+/// `cancel` is set after the first sample, the trajectory ends with the last one.
 ///
 /// # Errors
-/// As of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
+/// Those of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
 pub fn simulate_watched(
     pendulum: &Pendulum,
     request: &Request,
@@ -154,12 +154,12 @@ fn from(
         return Err(Error::Diverges);
     }
     let last = time[time.len() - 1];
-    // What the last, unfinished step met lies beyond the last sample.
+    // Events of the last, unfinished step lie beyond the last sample.
     run.events.retain(|event| !interrupted || event.tau <= last);
     let coarse = Run::to(pendulum, request, &[last], TIGHTENING * tolerance, cancel, &mut |_| ());
     let unknown = cancel.load(Ordering::Relaxed);
     let periods = last / pendulum.period();
-    // What is held for ever neither parts nor comes together any more.
+    // States that are held for ever neither diverge nor converge.
     let held = run.events.last().is_some_and(|e| e.kind == EventKind::StuckForEver);
     Ok(Trajectory {
         theta: run.states.iter().map(|state| state[0]).collect(),
@@ -260,7 +260,7 @@ impl Run {
         })
     }
 
-    /// The same with the growth of a tangent from sample to sample, as logarithms.
+    /// The samples, and the growth of a tangent from sample to sample, as logarithms.
     fn stretched(
         pendulum: &Pendulum,
         request: &Request,

@@ -136,7 +136,7 @@ impl FromStr for InstructionSet {
 
 /// Work that is written once and compiled for every instruction set.
 pub trait Job {
-    /// What the work returns.
+    /// The result of the work.
     type Output;
     /// The work; mark the implementation `#[inline(always)]`, and all that it calls in its loops.
     fn run<S: Isa>(self, isa: S) -> Self::Output;

@@ -11,7 +11,7 @@ pub trait Isa: Simd {
     const FUSED: bool;
     /// Trajectories side by side: enough registers to hide the latency of one.
     type Lanes: Lane<Token = Self>;
-    /// The same for numbers with a derivative, which need twice the registers.
+    /// Lanes of numbers with a derivative, which need twice the registers.
     type Narrow: Lane<Token = Self>;
     /// For a handful of trajectories: what one waits for another's work cannot hide.
     type Few: Lane<Token = Self>;

@@ -50,7 +50,7 @@ impl<W: Work> WithSimd for Apart<W> {
     }
 }
 
-// No closures: what the compiler leaves as a function of its own would lose the instruction set that
+// No closures: one that the compiler does not inline would lose the instruction set that
 // the caller was compiled for, and run 50 times slower.
 macro_rules! operator {
     ($name:ident, $method:ident, $simd:ident) => {
@@ -79,7 +79,7 @@ impl<S: Isa, const N: usize> Neg for Bundle<S, N> {
     fn neg(mut self) -> Self {
         each!(i in N => {
             let a = &mut self.0[i];
-            // As a difference the compiler sees through it, and joins it with sums and products.
+            // The compiler recognises a difference and fuses it with sums and products.
             a.value = a.isa.sub_f64s(a.isa.splat_f64s(-0.0), a.value);
         });
         self
@@ -200,7 +200,7 @@ impl<S: Isa, const N: usize> Lane for Bundle<S, N> {
 
     #[inline(always)]
     fn first(self) -> f64 {
-        // As memory: taking a lane out is a function call where the instruction set is not known.
+        // Through memory: extracting a lane is a function call where the instruction set is not known.
         bytemuck::cast_slice(std::slice::from_ref(&self.0[0].value))[0]
     }
 

@@ -51,7 +51,7 @@ pub trait Real:
     /// The square root.
     #[must_use]
     fn root(self) -> Self;
-    /// Does `work` in a function of its own, compiled for the instruction set of these numbers.
+    /// Does `work` in its own function, compiled for the instruction set of these numbers.
     fn aside<W: Work>(self, work: W);
     /// 1 or -1, the sign of `self`; no derivative.
     #[must_use]
@@ -66,16 +66,16 @@ pub trait Work {
 
 /// A [`Real`] without derivatives: it can be stored, compared and reduced modulo a turn.
 pub trait Lane: Real {
-    /// What an instruction set needs to make a value; a marker without size.
+    /// The token of the instruction set that makes values; a marker without size.
     type Token: Copy;
     /// Number of trajectories side by side.
     const WIDTH: usize;
     /// Whether [`Real::mul_add`] rounds once.
     const FUSED: bool;
 
-    /// Does `work` in a function of its own, compiled for the instruction set of these lanes.
+    /// Does `work` in its own function, compiled for the instruction set of these lanes.
     fn apart<W: Work>(token: Self::Token, work: W);
-    /// The same constant in every lane.
+    /// A constant in every lane.
     fn splat(token: Self::Token, value: f64) -> Self;
     /// The first [`Lane::WIDTH`] values of `source`.
     fn load(token: Self::Token, source: &[f64]) -> Self;

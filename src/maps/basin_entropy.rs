@@ -29,7 +29,7 @@ pub struct Texture {
     pub boundary_boxes: usize,
     /// Share of pairs of neighbouring cells that have the same label.
     pub neighbours_agree: f64,
-    /// The same share if labels were drawn at random with the fractions of the map: `sum f^2`.
+    /// That share for labels drawn at random with the fractions of the map: `sum f^2`.
     pub chance: f64,
 }
 
@@ -58,7 +58,7 @@ pub fn texture(labels: &Labels, starts: &Starts, pool: &rayon::ThreadPool) -> Te
     of_cells(&labels.label, theta.count, pool)
 }
 
-/// From labels in rows of so many columns.
+/// From labels in rows of `columns` cells.
 #[must_use]
 pub fn of_cells(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Texture {
     let rows = cells.len() / columns.max(1);
@@ -98,7 +98,7 @@ pub fn of_cells(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Text
     }
 }
 
-/// What a row of boxes adds.
+/// The contribution of a row of boxes.
 struct Band {
     /// Entropies of the boxes that hold more than one label.
     mixed: Vec<f64>,

@@ -33,7 +33,7 @@ const LEAST_CELLS: usize = 10_000;
 /// Bytes of a start: label, settling time, turns, exponent, and what copies them.
 const EACH: usize = 32;
 
-/// What to compute, and how well.
+/// A request and its numerical choices.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// The 95th percentile of the error after five periods.
@@ -57,7 +57,7 @@ impl Default for Options {
     }
 }
 
-/// Why labels tell nothing, where they do not.
+/// Whether labels are meaningful for this map, and if not why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Labelling {
     /// Labels tell basins apart.
@@ -75,9 +75,9 @@ pub struct BasinMap {
     pub attractors: Vec<Attractor>,
     /// Labels, settling times and turns.
     pub labels: Labels,
-    /// Turns and exponents over a fixed time, where labels tell nothing.
+    /// Turns and exponents over a fixed time, where labels are not meaningful.
     pub layers: Option<FiniteTime>,
-    /// Which of the cases this is.
+    /// Whether the labels are meaningful.
     pub labelling: Labelling,
     /// Periods of the finite-time layers.
     pub layer_periods: u32,
@@ -90,7 +90,7 @@ pub struct BasinMap {
     pub uncertainty: Option<Uncertainty>,
     /// Texture of the labels.
     pub texture: Texture,
-    /// What half the step and mirroring change.
+    /// Parts of labels that half the step and mirroring change.
     pub reliability: Reliability,
     /// Steps a period.
     pub steps: usize,
@@ -275,7 +275,7 @@ fn to_capture(
             }
             now = bound(catalogue).max(now);
         } else if now < max_periods {
-            // What is left is given all the time that there is.
+            // The remaining starts get the whole bound.
             now = max_periods;
         } else {
             break;

@@ -16,14 +16,14 @@ const KEPT: usize = 200;
 const ROUND: usize = 32;
 /// Looks before it counts as on no known orbit.
 const ROUNDS: usize = 12;
-/// So near to a known orbit, a period later too, it has arrived.
+/// Distance to a known orbit, also a period later, below which a trajectory has arrived.
 const ARRIVED: f64 = 1e-3;
-/// What is followed is moved by this at every value: no motion stays on an orbit that repels.
+/// Displacement at every value: no motion stays on an unstable orbit.
 const NUDGE: f64 = 1e-6;
 /// The place of the phase in the list of parameters, which a plane of one row needs.
 const PHASE: usize = 5;
 
-/// What to compute, and how well.
+/// A request and its numerical choices.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// The parameter and its values.
@@ -34,15 +34,15 @@ pub struct Request {
     pub each: usize,
     /// Where what is followed starts, at either end; by default on the attractor that most starts end on.
     pub first: Option<State>,
-    /// As of [`MapRequest`].
+    /// See [`MapRequest`].
     pub tol: f64,
-    /// As of [`MapRequest`].
+    /// See [`MapRequest`].
     pub bound: Option<u32>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
 
-/// What is followed, at one value.
+/// The followed motion at one value.
 #[derive(Clone, Debug, Default)]
 pub struct Followed {
     /// The attractor that it is on, as a place among those of all values one after the other.
@@ -56,16 +56,16 @@ pub struct Followed {
 pub struct Diagram {
     /// The attractors at each value.
     pub map: ParameterMap,
-    /// What a slow increase follows, value by value.
+    /// The motion under a slow increase, value by value.
     pub up: Vec<Followed>,
-    /// What a slow decrease follows, likewise in the order of the values.
+    /// The motion under a slow decrease, in the order of the values.
     pub down: Vec<Followed>,
 }
 
 /// All attractors along one parameter, and what is followed from each end to the other.
 ///
 /// # Errors
-/// As of [`parameter_map`].
+/// Those of [`parameter_map`].
 pub fn bifurcation(
     base: &Pendulum,
     request: &Request,

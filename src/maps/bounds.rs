@@ -12,9 +12,9 @@ pub const LEAST: u32 = 4000;
 const MOST: f64 = 1e6;
 /// Damping shrinks a free motion by `exp(-DECAY)` within the bound of a start.
 const DECAY: f64 = 200.0;
-/// The same of a cell of a map over parameters, and its least bound.
+/// These numbers for a cell of a map over parameters, and its least bound.
 const CELL: (f64, f64) = (40.0, 64.0);
-/// The part of a start's bound after which a search begins to watch what is left.
+/// Part of the bound of a start after which a search begins to watch uncaptured trajectories.
 const SEARCHED: u32 = 4;
 
 /// Periods in which damping shrinks a free motion by `exp(-decay)`, `2 decay / (gamma T)`, within limits.
@@ -32,7 +32,7 @@ pub fn max_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, DECAY, f64::from(LEAST))
 }
 
-/// Periods after which a cell of a map over parameters begins to watch what is left, where none are
+/// Periods after which a cell of a map over parameters begins to watch uncaptured trajectories, where none are
 /// given.
 #[must_use]
 pub fn cell_periods(pendulum: &Pendulum) -> u32 {
@@ -40,7 +40,7 @@ pub fn cell_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, decay, least)
 }
 
-/// Periods after which a search begins to watch what is left, whatever bound is set for the starts:
+/// Periods after which a search begins to watch uncaptured trajectories, whatever bound is set for the starts:
 /// what counts as chaos does not depend on it.
 #[must_use]
 pub fn search_periods(pendulum: &Pendulum) -> u32 {

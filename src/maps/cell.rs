@@ -25,13 +25,13 @@ pub const HINTED: usize = 4;
 /// An attractor of a cell.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// What it is.
+    /// The attractor.
     pub attractor: Attractor,
     /// Share of the cell's starts that end on it.
     pub share: f64,
 }
 
-/// What is known of one pendulum.
+/// The attractors of one pendulum.
 #[derive(Clone, Debug, Default)]
 pub struct Cell {
     /// Its attractors.
@@ -61,7 +61,7 @@ pub struct Search {
     pub starts: Vec<State>,
     /// How many starts a cell has.
     pub each: usize,
-    /// Periods after which a search begins to watch what is left; by default what damping asks for.
+    /// Periods after which a search begins to watch uncaptured trajectories; by default by the damping.
     pub bound: Option<u32>,
     /// Points that are kept of an attractor that does not close.
     pub kept: usize,

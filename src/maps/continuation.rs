@@ -199,7 +199,7 @@ impl Continuation<'_> {
         None
     }
 
-    /// The same orbit within what is asked for, if it goes there.
+    /// This orbit within the requested range, if it reaches it.
     fn within(&self, seed: Place) -> Option<Place> {
         if seed.p <= self.p_max {
             return Some(seed);

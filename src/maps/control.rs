@@ -1,4 +1,4 @@
-//! What a long computation shares with whoever waits for it: how far it is, and whether to stop.
+//! Progress and cancellation of a long computation, and its threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

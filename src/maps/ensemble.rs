@@ -39,7 +39,7 @@ pub struct Ensemble {
     pub sum: (f64, f64),
 }
 
-/// What an ensemble is followed with.
+/// The arguments of an ensemble.
 pub(super) struct Run<'a> {
     pub(super) strobe: &'a Strobe,
     /// Standard error over the exponent that it goes on for.

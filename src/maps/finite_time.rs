@@ -1,4 +1,4 @@
-//! What a map can show where no label tells anything: turns and stretching over a fixed time.
+//! Layers of a map without basins: turns and stretching over a fixed time.
 
 use rayon::prelude::*;
 

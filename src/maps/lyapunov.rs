@@ -17,7 +17,7 @@ use crate::integrate::{State, accuracy};
 use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 
-/// Periods that each trajectory is followed for at the most, where nothing is said.
+/// Default of the largest number of periods that each trajectory is followed.
 const MOST: u32 = 20_000;
 /// Where nothing is damped the tangent of regular motion grows in proportion to time, and no number
 /// of periods is enough.
@@ -37,7 +37,7 @@ const AT_ONCE: u32 = 2;
 /// Periods within which a trap takes what lies in it.
 const TAKEN: u32 = 64;
 
-/// What to compute, and how well.
+/// A request and its numerical choices.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     /// Angle and velocity at `tau = 0`.
@@ -74,7 +74,7 @@ pub enum End {
 pub struct Exponent {
     /// How the start ended.
     pub end: End,
-    /// What it reached.
+    /// How the search ended.
     pub attractor: Option<Attractor>,
     /// Periods until that captured it.
     pub transient: Option<u32>,

@@ -52,7 +52,7 @@ const FURTHEST: f64 = 0.3;
 /// ... and at so many halves of that.
 const HALVINGS: u32 = 9;
 
-/// What to look for, and where.
+/// A request for closed orbits.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     /// Smallest period, in forcing periods.
@@ -67,7 +67,7 @@ pub struct Request {
     pub threads: usize,
 }
 
-/// What was found.
+/// The closed orbits found.
 #[derive(Clone, Debug)]
 pub struct Orbits {
     /// Orbits of the stroboscopic map.

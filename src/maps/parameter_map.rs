@@ -40,7 +40,7 @@ pub struct Range {
     pub values: Vec<f64>,
 }
 
-/// What to compute, and how well.
+/// A request and its numerical choices.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// The parameters of columns and rows.
@@ -74,7 +74,7 @@ pub struct ParameterMap {
 /// A grid of pendulums.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane<'a> {
-    /// What does not vary.
+    /// The parameters that do not vary.
     pub base: &'a Pendulum,
     /// Columns and rows.
     pub axes: &'a [Range; 2],

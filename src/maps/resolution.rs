@@ -27,7 +27,7 @@ impl Resolution {
     /// [`error_reached`] defines it, at cells spread over the plane and halfway between them.
     ///
     /// # Errors
-    /// As [`choose`].
+    /// Those of [`choose`].
     pub fn new(
         plane: &Plane,
         probes: &[State],

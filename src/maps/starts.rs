@@ -40,7 +40,7 @@ impl Axis {
         self.between(i as f64)
     }
 
-    /// The value so many cells after the centre of the first one.
+    /// The value `cells` cells after the centre of the first one.
     #[must_use]
     pub fn between(&self, cells: f64) -> f64 {
         self.low + (cells + 0.5) * (self.high - self.low) / self.count as f64

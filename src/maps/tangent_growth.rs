@@ -116,7 +116,7 @@ impl TangentTrajectory {
     /// Goes on until `periods` are over from the start.
     ///
     /// # Errors
-    /// As of [`Bundle::grow`].
+    /// Those of [`Bundle::grow`].
     pub fn extend(
         &mut self,
         strobe: &Strobe,

@@ -52,7 +52,7 @@ impl Balance {
     }
 }
 
-/// What happens at a critical amplitude. Under a torque the orbit that continues rest ceases where its
+/// A critical amplitude. Under a torque the orbit that continues rest ceases where its
 /// multiplier is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
@@ -134,7 +134,7 @@ pub fn tongues(
     })
 }
 
-/// The same pendulum under another drive.
+/// This pendulum under another drive.
 pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     let mut other = pendulum.clone();
     (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);

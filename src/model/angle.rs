@@ -47,7 +47,7 @@ impl Angle {
         self.wrapped(a[0] - b[0]).hypot(a[1] - b[1])
     }
 
-    /// As [`sine::wrap`], in half turns; on the line nothing is taken off.
+    /// The angle wrapped by [`sine::wrap`], in half turns; on the line the angle itself.
     #[inline(always)]
     pub fn wrap<L: Lane>(self, half_turns: L) -> (L, L) {
         let part = if self == Self::Circle { 0.5 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! What moves the pivot.
+//! The harmonic drive of the pivot.
 
 use std::f64::consts::TAU;
 

@@ -46,7 +46,7 @@ pub struct Equation<R> {
     frictions: Vec<(Kind, [R; MOST_PARAMETERS])>,
     /// The formulas once more, for what they hold at rest.
     formulas: Vec<(Arc<Formula>, [R; MOST_PARAMETERS])>,
-    /// What depends on the last turn: an effect with a torque, and the sensor's play.
+    /// Effects that depend on the last turn: one with a torque, and the sensor's play.
     keepers: [Option<(Kind, [R; MOST_PARAMETERS])>; 2],
     /// The effect with a mode of the rig.
     mode: Option<(Kind, [R; MOST_PARAMETERS])>,
@@ -58,7 +58,7 @@ pub struct Equation<R> {
     holds: [bool; 2],
 }
 
-/// What the drive does at one time.
+/// The accelerations of the drive at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Forcing<R> {
     /// Gravity times `1 + a`.
@@ -74,7 +74,7 @@ pub struct Forcing<R> {
 }
 
 impl Forcing<f64> {
-    /// The same in the shape of `number`.
+    /// These accelerations in the shape of `number`.
     #[inline(always)]
     #[must_use]
     pub fn like<R: Real>(&self, number: R) -> Forcing<R> {
@@ -187,7 +187,7 @@ impl<R: Real> Equation<R> {
         }
     }
 
-    /// The same with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
+    /// This equation with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
     #[must_use]
     pub fn with_gravity(mut self, gravity: R) -> Self {
         self.gravity = [gravity, gravity.like(1.0) / gravity];
@@ -200,7 +200,7 @@ impl<R: Real> Equation<R> {
         self.gravity[0]
     }
 
-    /// The same with sideways accelerations taken into account even where no effect makes them: for
+    /// This equation with sideways accelerations taken into account even where no effect makes them, for
     /// forcings that are changed before use.
     #[must_use]
     pub fn with_lateral(mut self) -> Self {
@@ -208,14 +208,14 @@ impl<R: Real> Equation<R> {
         self
     }
 
-    /// What the drive does at time `tau`.
+    /// The drive at time `tau`.
     #[inline(always)]
     pub fn forcing(&self, tau: R) -> Forcing<R> {
         let lateral = if self.sideways { self.motion.sideways(tau) } else { tau.like(0.0) };
         self.pushed(self.motion.vertical(tau, self.plain), lateral, tau)
     }
 
-    /// The same under a pivot whose motion is known otherwise: `vertical` is `1 + a`.
+    /// The drive of a pivot whose motion is known: `vertical` is `1 + a`.
     #[inline(always)]
     pub fn pushed(&self, vertical: R, lateral: R, tau: R) -> Forcing<R> {
         let [gravity, per_gravity] = self.gravity;
@@ -252,7 +252,7 @@ impl<R: Real> Equation<R> {
         at
     }
 
-    /// The same with both the sense and the side of a corner given, as a step holds them.
+    /// The point where formulas are evaluated, with the sense and the side of a corner that a step holds.
     #[inline(always)]
     pub fn point_held(
         &self,
@@ -273,7 +273,7 @@ impl<R: Real> Equation<R> {
         [self.keepers[0].is_some(), self.keepers[1].is_some()]
     }
 
-    /// What that torque keeps, or what the play reads less the angle; none where there is none.
+    /// The memory of the torque, or the reading of the play less the angle; none where there is none.
     #[must_use]
     pub fn kept(&self, which: usize, at: &Point<R>) -> Option<R> {
         let (kind, parameters) = self.keepers[which].as_ref()?;
@@ -351,8 +351,8 @@ impl<R: Real> Equation<R> {
         if self.inertias.is_empty() { all } else { all / self.inertia(at) }
     }
 
-    /// What acts besides gravity, the constant torque and viscous damping, moving in the sense of
-    /// `at`.
+    /// The acceleration by effects and friction, without gravity, constant torque and viscous damping,
+    /// moving in the sense of `at`.
     #[inline(always)]
     pub fn besides(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         self.extra(forcing, at) - self.library_friction(at) * at.sense
@@ -368,7 +368,7 @@ impl<R: Real> Equation<R> {
         (-forcing.vertical).mul_add(at.sine, extra + bias + damping)
     }
 
-    /// What of that is besides gravity, the constant torque and viscous damping.
+    /// The load by the sideways drive and by torques of effects.
     #[inline(always)]
     fn extra(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         let mut sum = at.constant(0.0);
@@ -427,7 +427,7 @@ impl<R: Real> Equation<R> {
     }
 }
 
-/// What acts besides damping, friction and effects: `torque - vertical sin(pi half_turns)`.
+/// The load without damping, friction and effects: `torque - vertical sin(pi half_turns)`.
 ///
 /// The angle is in half turns, as the kernel counts it (see [`crate::lanes::sine`]). Linear in
 /// `vertical` and `torque`, so that an integrator may put its own factor into both.

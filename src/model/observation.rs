@@ -1,4 +1,4 @@
-//! What the sensor makes of the angle and of how fast it passes. The motion does not depend on it, so maps leave it out.
+//! The reading of the sensor, by angle and velocity. The motion does not depend on it: maps leave it out.
 
 use super::effects::{Action, Kind, MOST_PARAMETERS};
 use super::pendulum::Pendulum;

@@ -40,7 +40,7 @@ pub enum Symmetry {
 pub enum Route {
     /// Torques of angle and time, viscous damping: Runge-Kutta-Nystrom.
     Smooth,
-    /// The same with a friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
+    /// A friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
     Friction,
     /// Torques of the velocity: Runge-Kutta, with events where something changes with its sign.
     General,
@@ -67,7 +67,7 @@ impl Pendulum {
         Ok(Self { gamma, drive, torque, theta_r: 0.0, effects: Vec::new(), lab_time: 0.0 })
     }
 
-    /// The same with Coulomb friction.
+    /// This pendulum with Coulomb friction.
     ///
     /// # Errors
     /// [`Error::Range`] if it is negative or not finite.
@@ -79,7 +79,7 @@ impl Pendulum {
         Ok(self)
     }
 
-    /// The same with one effect more.
+    /// This pendulum with one effect more.
     ///
     /// Viscous damping, Coulomb friction and a bias torque become `gamma`, `theta_r` and `torque`:
     /// they are the same effects under the paper's names.
@@ -192,10 +192,7 @@ impl Pendulum {
     /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
     #[must_use]
     pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
-        let equation = self.equation();
-        let forcing = equation.forcing(tau);
-        let at = equation.point(&forcing, theta, velocity, 1_f64.copysign(velocity));
-        equation.acceleration(&forcing, &at)
+        self.equation().acceleration_at(tau, theta, velocity)
     }
 
     /// The pivot's motion with all that effects add to it.
@@ -210,7 +207,7 @@ impl Pendulum {
         let motion = self.motion();
         let (mut own, mut further) = (1.0, 1.0);
         for effect in self.effects.iter().filter(|e| e.is(&[Action::Driven])) {
-            // What drifts acts on gravity as on the drive.
+            // A drift acts on gravity and on the drive alike.
             let drifts = effect.kind.definition().mappable == Mappable::Frozen;
             let share = effect.parameters[0].abs() * if drifts { self.lab_time.abs() } else { 1.0 };
             further += share;

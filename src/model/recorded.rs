@@ -6,7 +6,7 @@
 use super::spline::Spline;
 use crate::error::Error;
 
-/// What of the motion was recorded.
+/// The recorded quantity of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Where the pivot is.
@@ -20,7 +20,7 @@ pub enum Quantity {
 /// Samples of one component of the motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// What they are.
+    /// Their quantity.
     pub quantity: Quantity,
     /// One for each time.
     pub values: &'a [f64],

@@ -21,9 +21,9 @@ const HALVINGS: usize = 60;
 /// Steps of the golden section.
 const SECTIONS: usize = 45;
 
-/// What loads a pendulum at rest.
+/// The load of a pendulum at rest.
 pub trait Load {
-    /// The load at rest, and what it must exceed to move the pendulum.
+    /// The load at rest, and the friction that it must exceed to move the pendulum.
     fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2];
     /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
     /// `sense`; it stays at rest while this is not positive for either sense.
@@ -64,7 +64,7 @@ impl Load for Equation<f64> {
 }
 
 impl Equation<f64> {
-    /// What a drive without sideways motion does where its vertical factor is known.
+    /// The drive without sideways motion, by its vertical factor.
     fn at_rest(&self, vertical: f64) -> Forcing<f64> {
         self.pushed(vertical, 0.0, 0.0)
     }
@@ -75,7 +75,7 @@ impl Equation<f64> {
         self.excess(theta) <= EDGE * self.hold(theta)
     }
 
-    /// What a load must exceed to move the pendulum from `theta`, at `tau = 0`.
+    /// The friction that a load must exceed to move the pendulum from `theta`, at `tau = 0`.
     #[must_use]
     pub fn hold(&self, theta: f64) -> f64 {
         let forcing = self.forcing(0.0);

@@ -14,7 +14,7 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// As many samples are needed at least.
+    /// The least number of samples.
     pub const FEWEST: usize = DEGREE + 1;
 
     /// The derivative of this `order` of the spline through `values` at `times`, which rise, are as

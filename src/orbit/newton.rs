@@ -81,7 +81,7 @@ pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<Per
     find_other(map, start, n, reach, &[])
 }
 
-/// The same for an orbit that has none of the points `known`.
+/// A periodic orbit near `start` that has none of the points `known`.
 ///
 /// The gap is divided by the distances to them, `m(x) = prod (1 + 1/|x - r|^2)` times `P^n(x) - x`, which has
 /// its zeros but for theirs: Newton's method is repelled by what it has found already, and finds
@@ -130,7 +130,7 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
         if iteration == 0 {
             first = size;
         }
-        // What repels lets the gap grow first.
+        // Near an unstable orbit the gap grows first.
         if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > 1.0 {
             break;
         }

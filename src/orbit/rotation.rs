@@ -1,4 +1,4 @@
-//! Running states without drive: closed on the angle section, with a period of their own.
+//! Running states without drive: closed on the angle section, with their own period.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! What several results have: arrays, and attractors.
+//! Arrays, states and attractors, which several results have.
 
 use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pendmap::attractor;

@@ -325,7 +325,7 @@ pub fn fit_rows(
     each.collect()
 }
 
-/// What a record's sensor of the angle would have read at `times` from each start, all at the first of
+/// Readings of the record's sensor of the angle at `times` from each start, all at the first of
 /// these: a row for each.
 #[pyfunction]
 #[pyo3(signature = (run, theta, velocity, times, tolerance, threads, progress=None))]

@@ -14,7 +14,7 @@ use super::raise;
 /// How often signals and progress are looked at.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Runs `work` on a thread of its own and waits for it, detached from the interpreter; at every
+/// Runs `work` on another thread and waits for it, detached from the interpreter; at every
 /// pause it checks for signals and calls `progress(done, total)`.
 pub fn watched<T: Send>(
     py: Python<'_>,

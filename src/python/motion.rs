@@ -32,10 +32,10 @@ pub fn acceleration<'py>(
     theta: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let pendulum = model.pendulum()?;
+    let equation = model.pendulum()?.equation();
     let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
     let states = tau.iter().zip(theta).zip(velocity);
-    let all: Vec<f64> = states.map(|((t, x), v)| pendulum.acceleration(*t, *x, *v)).collect();
+    let all: Vec<f64> = states.map(|((t, x), v)| equation.acceleration_at(*t, *x, *v)).collect();
     Ok(all.into_pyarray(py))
 }
 

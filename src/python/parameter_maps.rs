@@ -53,7 +53,7 @@ pub struct Bifurcation {
     down: Py<Followed>,
 }
 
-/// What a slow change of the parameter follows.
+/// The motion under a slow change of the parameter.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
 pub struct Followed {
     /// The attractor at each value; -1 for none.

@@ -140,7 +140,7 @@ fn chaos_beside_other_attractors() {
     let share = cells.len() as f64 / starts.len() as f64;
     assert!(share > 0.02 && share < 0.1, "{share}");
     assert!(cells.iter().all(|i| labels.settle[*i] == NEVER));
-    // What is labelled so is captured by none of the others for very long.
+    // No other attractor captures a start with this label for very long.
     let states: Vec<State> = cells.iter().map(|i| starts.get(*i)).collect();
     for outcome in outcomes(strobe, &catalogue.traps, 3000, &states, &AtomicBool::new(false))
         .expect("outcomes")

@@ -130,7 +130,7 @@ fn sets_at_random_points_do_what_their_kind_says() {
     assert!(seen > 3, "{seen} sets");
 }
 
-/// What a search finds from the starts of cell `number`.
+/// The attractors that a search finds from the starts of cell `number`.
 fn searched_from(own: &Own, number: usize) -> Cell {
     let starts = plane(1000).sampled_states(9 * (number + 1), 1);
     let search = Search { starts, each: 9, bound: None, kept: 64 };

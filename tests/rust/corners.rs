@@ -153,7 +153,7 @@ fn derivatives_stay_right_through_corners() {
     }
 }
 
-/// The distances of lanes from the reference after so many periods, in rising order.
+/// The distances of lanes from the reference after a number of periods, in rising order.
 fn errors(pendulum: &Pendulum, starts: &[State], steps: usize, periods: usize) -> Vec<f64> {
     let flow = Flow::new(pendulum);
     let ends = advanced(&Strobe::new(pendulum, steps, simd()), starts, periods);

@@ -20,7 +20,7 @@ fn rubbing(gamma: f64, p: f64, omega: f64, theta_r: f64) -> Pendulum {
     driven(gamma, p, omega).with_friction(theta_r).expect("in range")
 }
 
-/// The same for which the closed form of the release is not used.
+/// A pendulum for which the closed form of the release is not used.
 fn disguised(pendulum: Pendulum) -> Pendulum {
     let nothing = Effect::new(Kind::BearingHarmonic, &[0.0, 1.0, 0.0]).expect("in range");
     pendulum.with_effect(nothing).expect("once")
@@ -175,7 +175,7 @@ fn starts() -> impl Strategy<Value = State> {
 }
 
 proptest! {
-    // The same cases in every run: a failure can be looked at again.
+    // A fixed seed: a failure can be reproduced.
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(3), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

@@ -1,4 +1,4 @@
-//! Effects of the library, written again as formulas of a user.
+//! Effects of the library, written as formulas of a user.
 
 use pendmap::model::effects::{Parameter, Power};
 use pendmap::model::formula::{ParameterSpec, Spec};
@@ -38,7 +38,7 @@ fn like(parameter: Parameter) -> ParameterSpec {
         Power::TwoMinus(place) => (2.0, Some(place)),
     };
     let name = match name {
-        // Names with a meaning of their own in terms.
+        // Names that have another meaning in terms.
         "a" => "size",
         "phase" => "psi",
         other => other,

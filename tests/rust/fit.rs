@@ -112,7 +112,7 @@ fn initial_states_are_eliminated_exactly() {
 
 #[test]
 fn chaotic_motion_takes_no_digits_from_the_covariance() {
-    // The state's part of the information is 1e10 times what is left of the parameters' part.
+    // The state's part of the information is 1e10 times the rest of the parameters' part.
     let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
     let start = [1.0, 0.4];
     let record = record(pendulum, None, start, 45.0);
@@ -225,7 +225,7 @@ fn what_cannot_be_fitted_is_refused() {
         refusal(&|r, _| {
             r[1].weights.pop();
         })
-        .contains("weights has")
+        .contains("weights must be as many")
     );
     assert!(refusal(&|_, f| f[0].start = f64::INFINITY).contains("start of a free parameter"));
     assert!(refusal(&|_, f| f[0].places.push((9, Slot::Gravity))).contains("record of a free"));

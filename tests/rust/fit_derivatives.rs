@@ -302,7 +302,7 @@ fn derivatives_hold_under_a_recorded_motion() {
 
 #[test]
 fn derivatives_hold_where_friction_is_negative() {
-    // What is missing in a model may ask for that.
+    // A term missing in a model may lead there.
     let mut pendulum = with(undriven(0.05, 0.0), &[(Kind::QuadraticDrag, &[0.1])]);
     pendulum.set_parameter(1, -0.01);
     let start = [1.5, 0.0];

@@ -51,7 +51,7 @@ fn what_leads_nowhere_near_its_target_is_given_up() {
     let (point, outcome) = searched(vec![with_drag()], &[[1.2, 0.0]], 0.5 * least, 40);
     assert!(outcome.given_up && !outcome.converged, "{outcome:?}");
     assert!(outcome.steps < whole.steps, "{outcome:?} {whole:?}");
-    // What it has by then is near what it could have: it was right to give up.
+    // Its sum of squares is then near the least possible: giving up was right.
     assert!(point.normal.chi2 < 1.05 * least, "{} {least}", point.normal.chi2);
     let (point, outcome) = searched(vec![with_drag()], &[[1.2, 0.0]], 1.01 * least, 40);
     assert!(outcome.converged && !outcome.given_up, "{outcome:?}");

@@ -103,7 +103,7 @@ fn the_pull_is_the_slope_of_the_likelihood() {
         Point::new(&problem, values, vec![Window { start, ..window }]).expect("a point").normal
     };
     let here = at([0.0; 4]);
-    // What a small step promises is what the slope of the sum of deviances says.
+    // The predicted gain of a small step agrees with the slope of the sum of deviances.
     let step = here.step(1e6, &[]);
     let size = 1e-4 / step.gain.sqrt();
     let all: Vec<f64> = step.values.iter().chain(&step.starts[0]).map(|x| x * size).collect();

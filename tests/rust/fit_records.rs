@@ -57,7 +57,7 @@ pub fn record(
     }
 }
 
-/// The same parameters free in all records.
+/// Parameters that are free, with one value, in all records.
 pub fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
     let all = |slot: &Slot| (0..records).map(|record| (record, *slot)).collect();
     slots.iter().zip(start).map(|(slot, start)| Free { places: all(slot), start: *start }).collect()

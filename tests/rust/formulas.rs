@@ -38,7 +38,7 @@ fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
             _ => Draws(seed).effect(kind),
         };
         if let Some(other) = rewritten(&own) {
-            // What has a parameter of its own in the model is there but once.
+            // An effect with its own parameter in the model may occur only once.
             let bare = match kind {
                 Kind::ViscousDamping => Pendulum { gamma: 0.0, ..base.clone() },
                 Kind::CoulombFriction => Pendulum { theta_r: 0.0, ..base.clone() },
@@ -118,7 +118,7 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
                 let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, side));
                 let (a, b) = (cell_names(&a), cell_names(&b));
                 let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();
-                // What costs the library nothing goes through steps of its own: a cell within their
+                // Effects that cost the library nothing take general steps as formulas: a cell within their
                 // error of a boundary may be on its other side.
                 let other = matches!(kind, Kind::ViscousDamping | Kind::BiasTorque);
                 let allowed = if other { a.len() / 200 } else { 0 };

@@ -1,4 +1,4 @@
-//! What is refused, and in which words: each names the value, what it must be and what was got.
+//! Invalid input and its messages: each names the quantity, the allowed values and the value given.
 
 use std::sync::atomic::AtomicBool;
 
@@ -97,7 +97,7 @@ fn arrays_of_different_lengths() {
     assert_eq!(go(3, 2, 3), lengths((3, 2), ("theta", "velocity")));
     assert_eq!(go(3, 3, 4), lengths((3, 4), ("theta", "turns")));
     let error = go(3, 2, 3).expect("refused").to_string();
-    assert_eq!(error, "theta has 3 values and velocity has 2: they must be as many");
+    assert_eq!(error, "theta and velocity must be as many values, got 3 and 2");
 
     let stretch = |n: [usize; 6]| {
         let [mut a, mut b, mut c, mut d, mut e, mut f] = n.map(|n| vec![1.0; n]);
@@ -129,7 +129,8 @@ fn tolerances() {
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
     assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
     let error = Error::Tolerance { tol: 1e-13, reached: 2.34e-11 }.to_string();
-    let expected = "tol is 1e-13: the smallest error that steps can reach here is 2.3e-11";
+    let expected =
+        "tol must be 2.3e-11 or more here, the smallest error that steps can reach, got 1e-13";
     assert_eq!(error, expected);
 }
 

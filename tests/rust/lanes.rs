@@ -63,7 +63,7 @@ fn lanes_equal_single_trajectories_bit_for_bit() {
 
 #[test]
 fn a_lane_does_not_see_its_neighbours() {
-    // The same trajectory comes out of every place in a bundle, beside failures too.
+    // A trajectory does not depend on its place in a bundle, beside failures either.
     for simd in instruction_sets() {
         let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 20, simd);
         let alone = advanced(&strobe, &[[1.0, 0.5]], 4)[0];
@@ -101,7 +101,7 @@ fn paths_agree_within_rounding() {
         for steps in [24, 60] {
             let strobe = Strobe::new(&pendulum, steps, InstructionSet::Portable);
             let reference = advanced(&strobe, &states, 3);
-            // What a shift by a few units in the last place becomes is what rounding may cost.
+            // The effect of a shift by a few units in the last place bounds that of rounding.
             let shifted: Vec<State> = states.iter().map(|s| [s[0] + 1e-10, s[1] + 1e-10]).collect();
             let shifted = advanced(&strobe, &shifted, 3);
             for simd in instruction_sets() {
@@ -116,7 +116,7 @@ fn paths_agree_within_rounding() {
     }
 }
 
-/// What 95 in 100 of the distances between two maps after five periods stay below.
+/// The 95th percentile of the distances between two maps after five periods.
 fn typical_distance(a: &Strobe, b: &Strobe, states: &[State]) -> f64 {
     let (a, b) = (advanced(a, states, 5), advanced(b, states, 5));
     let mut distances: Vec<f64> = a.iter().zip(b).map(|(a, b)| distance(*a, b)).collect();

@@ -24,7 +24,7 @@ fn a_list_of_starts_is_the_same_cells() {
     for p in [0.6, 1.0] {
         let (strobe, catalogue, labels) = labelled(&driven(0.1, p, 2.0), &starts, simd());
         assert_same(&labels, &relabelled(&strobe, &catalogue, &list, None, 1), "list");
-        // And so is a part of them, in any order.
+        // A part of them in any order gives the same labels.
         let picks: Vec<usize> = (0..900).rev().step_by(7).collect();
         let part = relabelled(&strobe, &catalogue, &starts, Some(&picks), 1);
         for (k, i) in picks.iter().enumerate() {
@@ -107,7 +107,7 @@ fn settling_times_and_turns_are_those_of_the_trajectory() {
         let attractor = &catalogue.attractors[labels.label[i] as usize - 1];
         let off = attractor.points.iter().map(|p| distance(*p, end)).fold(9.0, f64::min);
         assert!(off < 1.0, "start {i} has come to within {off} of {}", attractor.name);
-        // And from there it goes where the label says.
+        // From there it goes to the attractor of its label.
         let map = PoincareMap::new(&pendulum);
         let settled = map.iterate(end, 200).state;
         assert!(attractor.points.iter().any(|p| distance(*p, settled) < 1e-8), "start {i}");

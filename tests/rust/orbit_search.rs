@@ -108,7 +108,7 @@ fn through_friction_the_known_ones_come_out() {
             let at = [value("theta"), value("v")];
             let own = found.iter().find(|o| o.contains(at, 1e-8));
             assert!(own.is_some_and(PeriodicOrbit::is_stable), "{key}: {at:?} of {}", found.len());
-            // What friction holds is a set, no orbit.
+            // States that friction holds form a set, not an orbit.
             let held = |o: &PeriodicOrbit| o.points.iter().all(|p| p[1] == 0.0);
             assert!(!found.iter().any(held));
         }

@@ -1,4 +1,4 @@
-//! What holds for every pendulum and every start, tried on random ones.
+//! Properties of every pendulum and every start, tested on random ones.
 
 use std::f64::consts::PI;
 
@@ -30,13 +30,13 @@ fn mirrored(state: State) -> State {
     [-state[0], -state[1]]
 }
 
-/// The same pendulum with a torque.
+/// This pendulum with a torque.
 fn with_torque(pendulum: &Pendulum, torque: f64) -> Pendulum {
     Pendulum { torque, ..pendulum.clone() }
 }
 
 proptest! {
-    // The same cases in every run: a failure can be looked at again.
+    // A fixed seed: a failure can be reproduced.
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]

@@ -116,7 +116,7 @@ fn a_recorded_push_frees_a_stuck_pendulum_when_it_is_strong_enough() {
     assert_eq!(kinds[..2], [EventKind::Stick, EventKind::Release]);
     assert!((driver.events[1].tau - 30.0).abs() < 1e-10, "{:?}", driver.events);
     assert!(driver.state[0] < 0.0, "it stays behind the pivot");
-    // What comes after the end is not looked at, so nothing is said of ever.
+    // Times after the end are not examined: "for ever" cannot be reported.
     let mut short = Driver::new(&ode, 0.0, [0.0, 0.0], 20.0);
     short.finish(|_| ());
     assert!(short.is_stuck() && !short.is_stuck_for_ever());
@@ -167,7 +167,7 @@ fn what_cannot_be_interpolated_is_refused() {
     assert!(refusal(&good[..5], &good[..5]).contains("6 or more"));
     assert!(refusal(&[0.0, 1.0, 2.0, 2.0, 4.0, 5.0], &good).contains("after the one before"));
     assert!(refusal(&[0.0, 1.0, 2.0, 3.0, 4.0, f64::NAN], &good).contains("time of a sample"));
-    assert!(refusal(&good, &good[..5]).contains("has 5"));
+    assert!(refusal(&good, &good[..5]).contains("got 6 and 5"));
     assert!(
         refusal(&good, &[0.0, 1.0, f64::INFINITY, 3.0, 4.0, 5.0])
             .ends_with("sample must be a finite number, got inf")

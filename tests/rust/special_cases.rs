@@ -1,4 +1,4 @@
-//! Planes of their own kind: inverted rest, no damping, no drive, drive beside a running state.
+//! Special cases: inverted rest, no damping, no drive, drive beside a running state.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;

@@ -1,4 +1,4 @@
-//! What several modules need: instruction sets, pendulums, starts that cover a plane, whole maps.
+//! Helpers of several modules: instruction sets, pendulums, starts that cover a plane, whole maps.
 
 use std::f64::consts::PI;
 use std::marker::PhantomData;
@@ -61,7 +61,7 @@ pub fn plane(count: usize) -> Starts {
     }
 }
 
-/// What a user gets but for the reliability check.
+/// The default options without the reliability check.
 pub fn unchecked() -> Options {
     Options { check: false, ..Options::default() }
 }
@@ -154,7 +154,7 @@ pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// What one function of the lane arithmetic makes of many numbers.
+/// A function of the lane arithmetic, applied to many numbers.
 struct Each<'a, F>(&'a [f64], PhantomData<F>);
 
 /// A function over any lane; a trait, since a closure cannot be generic.

@@ -58,7 +58,7 @@ fn damping_alone_shrinks_area() {
         let exact = (-pendulum.gamma * pendulum.period()).exp();
         for state in spread(200, PI, 3.0) {
             let image = map.once(state);
-            // What the difference of two products of the entries loses.
+            // The cancellation in the difference of two products of the entries.
             let lost = 1e-14 * image.derivative.norm().powi(2);
             let error = (image.derivative.determinant() - exact).abs();
             assert!(error < lost + 1e-13, "{pendulum:?} at {state:?}: {error:e}");

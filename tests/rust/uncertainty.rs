@@ -11,7 +11,7 @@ use pendmap::maps::uncertainty::{Uncertainty, uncertainty};
 
 use crate::support::{driven, plane};
 
-/// A window of so many cells, far from the unit square.
+/// A window of `count` cells, far from the unit square.
 fn window(side: usize) -> [Axis; 2] {
     [(-PI, PI), (2.0, 3.0)].map(|(low, high)| Axis { low, high, count: side })
 }

@@ -2,8 +2,8 @@
 //!
 //! Smooth motions run a bundle at a time through the whole period. With friction, or another law that
 //! changes with the sign of the velocity, all bundles take each step with the sign held; lanes whose
-//! velocity passed zero, or that met a corner ([`super::corner`]), go into a queue that runs in lanes itself, each with its own phase and step
-//! ([`super::event`]). Lanes that are held fast wait for their release.
+//! velocity passed zero, or that met a corner ([`super::corner`]), go into a queue that runs in lanes too,
+//! each with its own phase and step ([`super::event`]). Lanes that are held fast wait for their release.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
@@ -45,7 +45,7 @@ pub struct Block {
     pub held_at: Vec<f64>,
     pub(super) held: Vec<Held>,
     pub(super) queue: Vec<EventSearch>,
-    /// What goes between lanes and queue.
+    /// Values handed from lanes to the queue.
     pub(super) scratch: Box<Scratch>,
 }
 
@@ -128,7 +128,7 @@ impl Strobe {
         dispatch::run(self.simd, Steps { strobe: self, block, range: k..k + 1 });
     }
 
-    /// The same for a block of any width, one trajectory at a time with the arithmetic of a lane.
+    /// Runs a block of any width, one trajectory at a time with the arithmetic of a lane.
     // Compiled where it is called: in tests alone.
     #[inline]
     pub fn period_singly(&self, block: &mut Block) {

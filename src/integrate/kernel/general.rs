@@ -10,7 +10,7 @@ use crate::model::equation::{Equation, Forcing};
 
 /// When the stages of a step are, and what the drive then does.
 pub trait Clock<R> {
-    /// What the drive does at `stage`; `STAGES` is the step's end.
+    /// The drive at `stage`; `STAGES` is the end of the step.
     fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R>;
     /// The length of the step.
     fn length(&self) -> R;
@@ -164,7 +164,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
     }
 }
 
-/// What the drive does at every stage of every step of one forcing period.
+/// The drive at every stage of every step of one forcing period.
 #[derive(Clone, Debug)]
 pub struct Timetable {
     steps: Vec<[Forcing<f64>; STAGES + 1]>,

@@ -23,7 +23,7 @@ pub struct StageLoads {
     pub torque: [f64; STAGES],
     /// `h_u^2 exp(2 gamma s) / pi`.
     pub factor: [f64; STAGES],
-    /// What the drive does.
+    /// The accelerations of the drive.
     pub forcing: [Forcing<f64>; STAGES],
 }
 

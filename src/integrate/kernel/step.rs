@@ -18,7 +18,7 @@ pub struct Moving<R> {
     pub kick: R,
 }
 
-/// What acts besides gravity, drive, constant torque and viscous damping.
+/// The load besides gravity, drive, constant torque and viscous damping.
 pub trait Extra<R> {
     /// `load` with it added, at a stage.
     fn on(&self, loads: &StageLoads, stage: usize, load: R) -> R;

@@ -14,7 +14,7 @@ use crate::model::pendulum::Route;
 const SHADOW: f64 = 1e-7;
 
 impl Strobe {
-    /// As [`Strobe::advance`], with one tangent vector beside each state.
+    /// [`Strobe::advance`] with one tangent vector beside each state.
     ///
     /// Adds to `growth` the natural logarithm of the factor by which the vector has grown: over the
     /// time it is the finite-time Lyapunov exponent. The vectors come back with length 1.

@@ -71,7 +71,7 @@ impl Strobe {
         }
     }
 
-    /// The same map with `factor` times as many steps.
+    /// This map with `factor` times as many steps.
     #[must_use]
     pub fn refined(&self, factor: usize) -> Self {
         Self::new(&self.pendulum, self.steps() * factor, self.simd)
@@ -105,10 +105,10 @@ impl Strobe {
         })
     }
 
-    /// As [`Strobe::advance`], one trajectory at a time with the same arithmetic as a lane.
+    /// [`Strobe::advance`], one trajectory at a time with the arithmetic of a lane.
     ///
     /// # Errors
-    /// As [`Strobe::advance`].
+    /// Those of [`Strobe::advance`].
     // Compiled where it is called: in tests alone.
     #[inline]
     pub fn advance_singly(

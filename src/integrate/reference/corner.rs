@@ -23,7 +23,7 @@ pub fn first<N: Number>(ode: &OdeProblem<N>, dense: &DenseStep<N>, since: bool) 
         side * ode.switch(tau, curve.at(tau))
     };
     let part = first_below_zero(&value, since)?;
-    // What the curve is off, once.
+    // One correction for the error of the curve.
     step.shorten(field, part * length);
     let rest = side * ode.switch(start + part * length, step.end);
     let by = 1e-3_f64.min(0.5 * part);

@@ -21,7 +21,7 @@ pub struct DenseStep<N> {
     pub length: f64,
     /// The sense and the side held: 1 or -1.
     pub signs: [f64; 2],
-    /// What the motion carries besides at its start.
+    /// Memories at its start.
     pub past: Past<N>,
     /// Angle and velocity at its start.
     pub start: [N; 2],
@@ -191,7 +191,7 @@ impl<N: Number> DenseStep<N> {
         curve
     }
 
-    /// The same into a curve that there is.
+    /// The curve of the step, written into `curve`.
     pub fn trace(&mut self, field: &Field<N>, curve: &mut Curve<N>) {
         (curve.tau, curve.length) = (self.tau, self.length);
         (curve.theta[0], curve.velocity[0]) = (self.start[0], self.start[1]);

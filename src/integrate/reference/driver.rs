@@ -49,7 +49,7 @@ enum Mode<N> {
     Lost,
 }
 
-/// A trajectory under way.
+/// The integration of one trajectory.
 #[derive(Debug)]
 pub struct Driver<'a, N> {
     ode: &'a OdeProblem<N>,
@@ -57,7 +57,7 @@ pub struct Driver<'a, N> {
     pub tau: f64,
     /// Angle, not wrapped, and velocity.
     pub state: [N; 2],
-    /// What the motion carries besides.
+    /// Memories of effects and the mode of the rig.
     pub past: Past<N>,
     /// Turns, sticks and releases so far.
     pub events: Vec<Event>,

@@ -1,6 +1,6 @@
-//! What happens to a trajectory where its velocity is zero.
+//! Events of a trajectory where its velocity is zero.
 
-/// What happened.
+/// The kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
     /// The velocity passed zero.
@@ -9,7 +9,7 @@ pub enum EventKind {
     Stick,
     /// The load overcame the friction.
     Release,
-    /// It never will.
+    /// Friction holds for ever.
     StuckForEver,
 }
 
@@ -26,13 +26,13 @@ impl EventKind {
     }
 }
 
-/// What happened, when and where.
+/// An event of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
-    /// When.
+    /// Its time.
     pub tau: f64,
-    /// What.
+    /// Its kind.
     pub kind: EventKind,
-    /// At which angle, rad, not wrapped.
+    /// The angle there, rad, not wrapped.
     pub theta: f64,
 }

@@ -45,7 +45,7 @@ impl Flow {
         Self::with_tolerance(pendulum, PRECISE)
     }
 
-    /// The same with an error of about `tolerance` a step.
+    /// The map with an error of about `tolerance` a step.
     #[must_use]
     pub fn with_tolerance(pendulum: &Pendulum, tolerance: f64) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! What a single trajectory obeys, and how precisely it is followed.
+//! The problem of the reference integrator: equation of motion, events and tolerance.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -13,19 +13,19 @@ use crate::model::{Equation, Pendulum};
 /// The longest step is this times a power of the tolerance, over the greatest rate of small motions
 /// or of the drive. At fine tolerances that is what the error of a linear oscillator allows: a state
 /// at rest would else be crossed in steps too long for its derivatives. At coarse ones it is less,
-/// and motions smaller than the tolerance keep seven digits of their own, so that their turns are
+/// and motions smaller than the tolerance keep seven digits, so that their turns are
 /// turns. It falls with the tolerance all along, so that tightening always tells.
 const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
-/// What of a mode's rate counts for the longest step: it moves little beside the pendulum, and each
-/// step's error covers it.
+/// Part of the rate of a mode that limits the longest step: the mode moves little beside the pendulum,
+/// and the error of each step includes it.
 const MODE: f64 = 0.25;
 /// The smallest error of a step that rounding allows to be estimated.
 pub const FINEST: f64 = 1e-15;
 /// Angles, and times of a drive's period, at which the rate is looked for.
 const LOOKS: [usize; 2] = [32, 8];
 
-/// What a motion carries besides angle and velocity: the angle of the last turn, what an effect and the
-/// sensor's play kept there, and displacement and momentum of a mode of the rig.
+/// State besides angle and velocity: the angle of the last turn, the memories of an effect and of the
+/// sensor's play there, displacement and momentum of a mode of the rig.
 pub type Past<N> = [N; 5];
 
 /// The right-hand side: the equation of motion over numbers of some kind, and the motion
@@ -40,8 +40,8 @@ pub struct Field<N> {
 #[derive(Clone, Debug)]
 pub struct OdeProblem<N> {
     field: Field<N>,
-    /// The same with plain numbers, for what has no derivative: where the velocity passes zero, when
-    /// a stuck pendulum is released.
+    /// The field over plain numbers, for times of events: where the velocity passes zero, when a stuck
+    /// pendulum is released.
     plain: Field<f64>,
     watches: bool,
     jumps: bool,
@@ -68,7 +68,7 @@ impl<N: Number> OdeProblem<N> {
         Self::with_rate(pendulum, greatest_rate(pendulum), ages, tolerance, number)
     }
 
-    /// The same with the [`greatest_rate`] of the pendulum, for several problems with one pendulum.
+    /// The problem with a known [`greatest_rate`], for several problems with one pendulum.
     #[must_use]
     pub fn with_rate(
         pendulum: &Pendulum,
@@ -99,7 +99,7 @@ impl<N: Number> OdeProblem<N> {
         }
     }
 
-    /// The same with the recorded motion of the pivot besides the drive.
+    /// This problem with the recorded motion of the pivot added to the drive.
     #[must_use]
     pub fn driven_by(mut self, recorded: Arc<Recorded>) -> Self {
         self.field = self.field.driven_by(Arc::clone(&recorded));
@@ -111,7 +111,7 @@ impl<N: Number> OdeProblem<N> {
         self
     }
 
-    /// The same with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
+    /// This problem with gravity `(w0 / w_ref)^2`, time being counted in `1 / w_ref`.
     #[must_use]
     pub fn with_gravity(mut self, gravity: N) -> Self {
         let value = gravity.value();
@@ -121,7 +121,7 @@ impl<N: Number> OdeProblem<N> {
         self
     }
 
-    /// The same with every turn found, also where nothing changes there: derivatives by the
+    /// This problem with every turn found, also where nothing changes there: derivatives by the
     /// strength of a friction that is 0 need them.
     #[must_use]
     pub fn watched(mut self) -> Self {
@@ -129,13 +129,13 @@ impl<N: Number> OdeProblem<N> {
         self
     }
 
-    /// What accelerates the pendulum.
+    /// The field of accelerations.
     #[must_use]
     pub fn field(&self) -> &Field<N> {
         &self.field
     }
 
-    /// The same without derivatives.
+    /// The field without derivatives.
     #[must_use]
     pub fn plain(&self) -> &Field<f64> {
         &self.plain
@@ -146,7 +146,7 @@ impl<N: Number> OdeProblem<N> {
         self.field.acceleration(tau, state, signs, past)
     }
 
-    /// What a motion carries that begins in this state: the mode where it is pulled to, at rest.
+    /// The memories of a motion that begins in this state; the mode is in its equilibrium.
     #[must_use]
     pub fn begin(&self, tau: f64, state: [N; 2]) -> Past<N> {
         let zero = state[0].like(0.0);
@@ -176,7 +176,7 @@ impl<N: Number> OdeProblem<N> {
         [theta, kept, self.played(theta, sense, past) - theta, past[3], past[4]]
     }
 
-    /// What the sensor's play makes of an angle, reached in this sense from the last turn.
+    /// The angle behind the sensor's play, reached in this sense from the last turn.
     #[must_use]
     pub fn played(&self, theta: N, sense: f64, [turned, _, played, x, y]: Past<N>) -> N {
         if !self.plain.equation.keeps()[1] {
@@ -256,7 +256,7 @@ impl<N: Number> Field<N> {
         &self.equation
     }
 
-    /// What the pivot does at time `tau`, in the shape of `number`.
+    /// The drive at time `tau`, in the shape of `number`.
     #[inline(always)]
     #[must_use]
     pub fn forcing(&self, tau: f64, number: N) -> Forcing<N> {
@@ -270,7 +270,7 @@ impl<N: Number> Field<N> {
         forcing
     }
 
-    /// What the pivot does, and where the formulas are evaluated.
+    /// The drive, and the point where the formulas are evaluated.
     #[inline(always)]
     fn point(
         &self,
@@ -321,7 +321,7 @@ impl<N: Number> Field<N> {
         acceleration
     }
 
-    /// The same within its caller.
+    /// The acceleration, inlined.
     #[inline(always)]
     pub fn at(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> N {
         let (forcing, at) = self.point(tau, state, signs, past);
@@ -329,7 +329,7 @@ impl<N: Number> Field<N> {
     }
 }
 
-/// The acceleration, in a function of its own.
+/// The acceleration, in its own function.
 struct Accelerating<'a, N> {
     field: &'a Field<N>,
     tau: f64,
@@ -347,7 +347,7 @@ impl<N: Number> Work for Accelerating<'_, N> {
     }
 }
 
-/// Where formulas are evaluated, in a function of its own.
+/// The point where formulas are evaluated, in its own function.
 struct Placing<'a, N> {
     field: &'a Field<N>,
     tau: f64,
@@ -365,7 +365,7 @@ impl<N: Number> Work for Placing<'_, N> {
     }
 }
 
-/// The rates of a mode of the rig, in a function of its own.
+/// The rates of a mode of the rig, in their own function.
 struct Swaying<'a, N> {
     field: &'a Field<N>,
     state: [N; 2],
@@ -394,7 +394,7 @@ pub fn greatest_rate(pendulum: &Pendulum) -> f64 {
             let theta = PI * (2.0 * i as f64 / LOOKS[0] as f64 - 1.0);
             let (theta, velocity) = (Tangent::seeded(theta, 0), Tangent::seeded(0.0, 1));
             let mut at = equation.point(&forcing, theta, velocity, Tangent::constant(1.0));
-            // What an effect keeps changes quickest right after a turn.
+            // The memory of an effect changes fastest right after a turn.
             at.past = [theta.value, -1.0].map(Tangent::constant);
             let [by_theta, by_velocity] = equation.acceleration(&forcing, &at).slope;
             stiffness = stiffness.max(by_theta.abs());

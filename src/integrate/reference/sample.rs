@@ -13,7 +13,7 @@ pub struct Sampled<N> {
     pub states: Vec<[N; 2]>,
     /// The sense of the motion and the side of a corner at each time; none where it does not move.
     pub signs: Vec<Option<[f64; 2]>>,
-    /// What the motion carries besides at each time; empty where nothing depends on it.
+    /// Memories at each time; empty where nothing depends on them.
     pub pasts: Vec<Past<N>>,
     /// Turns, sticks and releases up to the last time.
     pub events: Vec<Event>,
@@ -32,7 +32,7 @@ impl<N: Number> Sampled<N> {
         self.pasts.get(place).copied().unwrap_or([theta, zero, zero, zero, zero])
     }
 
-    /// What the sensor is given at the time of that place: the angle, or what its play makes of it.
+    /// The input of the sensor at the time of that place: the angle, or the angle behind its play.
     #[must_use]
     pub fn given(&self, ode: &OdeProblem<N>, place: usize) -> N {
         let ([theta, _], past) = (self.states[place], self.past(place));

@@ -56,7 +56,7 @@ pub fn sensitivities(
     let count = all.names.len();
     let mut first = 0;
     while first < count {
-        // The narrowest numbers that hold what is left.
+        // The narrowest numbers that hold the remaining derivatives.
         first += match count - first {
             ..=8 => pass.run::<8>(first, &mut all),
             _ => pass.run::<WIDEST>(first, &mut all),

@@ -11,9 +11,9 @@ use super::problem::OdeProblem;
 use crate::integrate::tangent::Number;
 
 const DEGREE: usize = 7;
-/// What rounding may add to a coefficient, over the sum of the polynomial's coefficients.
+/// Rounding error of a coefficient, over the sum of the polynomial's coefficients.
 const ROUNDING: f64 = 1e-15;
-/// A velocity so much smaller than those of the step is zero: a contact, if not a passage.
+/// A velocity smaller than this part of those of the step is zero: a contact, if not a passage.
 const CLOSE: f64 = 1e-12;
 const MOST_HALVINGS: i32 = 50;
 /// Newton's steps; two are common.
@@ -38,7 +38,7 @@ const CHOOSE: [[f64; DEGREE + 1]; DEGREE + 1] = {
 /// A polynomial over `[0, 1]` by its Bernstein coefficients.
 type Bernstein = [f64; DEGREE + 1];
 
-/// What the velocity does within a step.
+/// Zeros of the velocity within a step.
 #[derive(Debug)]
 pub enum Turning {
     /// It keeps its sense.

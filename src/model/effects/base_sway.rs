@@ -1,4 +1,4 @@
-//! A floor, a table or a tower that sways sideways, at a frequency of its own.
+//! A floor, a table or a tower that sways sideways, at its own frequency.
 
 use std::f64::consts::FRAC_1_PI;
 

@@ -1,4 +1,4 @@
-//! What an effect is: its definition, and the formulas that it may have.
+//! Effects: their definitions, and the formulas that an effect may have.
 
 use std::hint::black_box;
 
@@ -71,7 +71,7 @@ impl Family {
     }
 }
 
-/// What of the motion an effect's torque depends on: it decides which route of the kernel runs.
+/// The quantities that an effect depends on; they decide which route of the kernel runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// A torque of angle and time.
@@ -89,9 +89,9 @@ pub enum Action {
     /// A force against the motion that jumps with the sign of the velocity and can hold the
     /// pendulum fast, of angle and time only.
     Friction,
-    /// The same, and depending on the velocity besides.
+    /// Dry friction that depends on the velocity too.
     SlidingFriction,
-    /// The same, and on the drive too, so that what it holds changes during a period.
+    /// Dry friction that depends on velocity and drive, so that the load it can hold changes during a period.
     LoadedFriction,
     /// Another amplitude, phase or frequency of the harmonic drive.
     Drive,
@@ -132,13 +132,13 @@ impl Mappable {
 pub enum Power {
     /// `w0^k`.
     Of(i32),
-    /// The same where `k` is not whole.
+    /// `w0^k` where `k` is not whole.
     Real(f64),
     /// `w0^(2 - n)` where `n` is the effect's parameter of that place.
     TwoMinus(usize),
 }
 
-/// What a parameter does in its effect. A search asks for it, never for a name.
+/// The role of a parameter in its effect. A search asks for the role, never for a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// How strong the effect is: at 0 there is none.
@@ -201,7 +201,7 @@ impl Role {
 pub struct Parameter<'a> {
     /// Its name in model files.
     pub name: &'a str,
-    /// What it does.
+    /// Its role.
     pub role: Role,
     /// Its unit in SI.
     pub unit: &'a str,
@@ -211,7 +211,7 @@ pub struct Parameter<'a> {
     pub range: [f64; 2],
     /// Smallest and largest value of interest: where a search looks.
     pub typical: [f64; 2],
-    /// What it is.
+    /// Its meaning, in words.
     pub meaning: &'a str,
 }
 
@@ -252,7 +252,7 @@ impl<'a> Parameters<'a> {
     }
 }
 
-/// All that is said about an effect, besides its formulas.
+/// The definition of an effect, without its formulas.
 #[derive(Clone, Copy, Debug)]
 pub struct Definition<'a> {
     /// Its name, the field's standard term.
@@ -261,7 +261,7 @@ pub struct Definition<'a> {
     pub group: Group,
     /// Its family.
     pub family: Family,
-    /// What it depends on.
+    /// The quantities that it depends on.
     pub action: Action,
     /// The term on the right of `th'' = ...`, per inertia, or the reading, or the drive.
     pub formula: &'a str,
@@ -340,8 +340,8 @@ impl<R: Real> Point<R> {
         self.velocity * self.sense
     }
 
-    /// The same, and the compiler cannot tell: it would else compute ahead of a loop over effects
-    /// whatever cosines and logarithms any effect of the library might want.
+    /// Hides the value from the compiler, which otherwise computes, ahead of a loop over effects, all
+    /// cosines and logarithms that any effect of the library needs.
     #[inline(always)]
     #[must_use]
     pub fn hidden(&self) -> Self {
@@ -399,9 +399,9 @@ pub trait Law {
         None
     }
 
-    /// What it keeps of the motion, 0 where a motion begins; none where it keeps nothing. The formulas
+    /// The memory of the effect, 0 where a motion begins; none where it has none. The formulas
     /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
-    /// without a motion before, and no map can have it; one effect of a model may keep something. Of
+    /// without a motion before, and no map can have it; one effect of a model may have a memory. Of
     /// [`Action::Play`] it is the reading less the angle.
     #[inline(always)]
     #[must_use]
@@ -430,7 +430,7 @@ pub trait Law {
     #[inline(always)]
     fn drive<R: Real>(_: &[R; MOST_PARAMETERS], _: &mut Motion<R>) {}
 
-    /// What it adds to the inertia, which is 1 without it; of [`Action::Inertia`] only.
+    /// The inertia that it adds, over the inertia without it; of [`Action::Inertia`] only.
     #[inline(always)]
     fn inertia<R: Real>(_: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         at.constant(0.0)
@@ -439,7 +439,7 @@ pub trait Law {
     /// Whether it multiplies a reading, so that it acts on a velocity or a force as on an angle.
     const SCALES: bool = false;
 
-    /// What a sensor reads at the angle `theta`, passing it at `velocity` at the laboratory's time
+    /// The reading of a sensor at the angle `theta` and velocity `velocity`, at the laboratory's time
     /// `lab`.
     #[inline(always)]
     fn reading<R: Real>(_: &[R; MOST_PARAMETERS], theta: R, _: R, _: R) -> R {

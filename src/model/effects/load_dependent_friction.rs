@@ -42,7 +42,7 @@ impl Law for LoadDependentFriction {
     }
 }
 
-/// What the rod carries over the weight.
+/// The load of the rod over its weight.
 #[inline(always)]
 fn load<R: Real>(at: &Point<R>) -> R {
     at.vertical * at.cosine() + at.velocity * at.velocity

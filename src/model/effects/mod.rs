@@ -248,7 +248,7 @@ impl Kind {
 }
 
 impl Kind {
-    /// The same; of a formula, its corner stepped over.
+    /// This kind; of a formula, the version that steps over its corner.
     #[must_use]
     pub fn loosened(&self) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! A pivot that gives way sideways, with a mode of its own.
+//! A pivot that gives way sideways, with its own mode.
 //!
 //! With the pivot's displacement `x` over the pendulum's length, Lagrange's equations are
 //! `th'' + x'' cos th = all else` and `x'' + 2 z wx x' + wx^2 x = -mu (th'' cos th - v^2 sin th)`. With

@@ -1,7 +1,7 @@
 //! A sensor that is late: a filter of first order, `tau y' = theta - y`, much quicker than the swing.
 //!
-//! What is kept is the first power of `tau`; the next is `tau^2 th''`, smaller by `tau w0`. A free decay
-//! read late is one that began late: only what has a clock of its own, a drive, shows it.
+//! The term of first order in `tau` is kept; the next, `tau^2 th''`, is smaller by `tau w0`. A free decay
+//! that is read late equals one that began late: only a drive, which has its own clock, shows the lag.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

@@ -1,10 +1,18 @@
-//! The equation with plain numbers, over numbers of another kind.
+//! The equation over plain numbers: acceleration, and conversion to other numbers.
 
 use super::Equation;
 use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 impl Equation<f64> {
+    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
+    #[must_use]
+    pub fn acceleration_at(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
+        let forcing = self.forcing(tau);
+        let at = self.point(&forcing, theta, velocity, 1_f64.copysign(velocity));
+        self.acceleration(&forcing, &at)
+    }
+
     /// The equation over numbers in the shape of `number`.
     #[inline(always)]
     #[must_use]

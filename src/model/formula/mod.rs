@@ -62,16 +62,16 @@ pub struct ParameterSpec {
     pub range: [f64; 2],
     /// The smallest and the largest value of interest, without dimensions.
     pub typical: [f64; 2],
-    /// What it is.
+    /// Its meaning, in words.
     pub meaning: String,
-    /// What it does; as the term shows it where nothing is said.
+    /// Its role; by default the one that the term shows.
     pub role: Option<Role>,
 }
 
 /// A formula that is ready to run.
 #[derive(Debug)]
 pub struct Formula {
-    /// As the user gives it, with the role of every parameter.
+    /// The text of the user, with the role of every parameter.
     spec: Spec,
     group: Group,
     action: Action,
@@ -79,7 +79,7 @@ pub struct Formula {
     tree: Tree,
     program: Program,
     switch: Option<Program>,
-    /// The same, its corner stepped over: for a model in which another effect has one.
+    /// The version that steps over its corner, for a model in which another effect has one.
     loose: Option<Arc<Self>>,
     timed: bool,
     driven: bool,
@@ -180,7 +180,7 @@ impl Formula {
         Ok(Arc::new(Self { loose: Some(Arc::new(loose)), ..whole }))
     }
 
-    /// What is said about it.
+    /// Its definition as an effect.
     #[must_use]
     pub fn definition(&self) -> Definition<'_> {
         let Self { spec, group, action, mappable, .. } = self;
@@ -217,7 +217,7 @@ impl Formula {
         self.driven
     }
 
-    /// The same without a corner of its own.
+    /// The version that steps over its corner.
     #[must_use]
     pub fn loosened(self: &Arc<Self>) -> Arc<Self> {
         self.loose.as_ref().unwrap_or(self).clone()
@@ -259,7 +259,7 @@ impl Formula {
         probe::mirrors(&self.tree, parameters, 0.0)
     }
 
-    /// The same half a period of the drive later.
+    /// Whether mirror images half a period of the drive later stay mirror images.
     #[must_use]
     pub fn keeps_mirror_later(&self, parameters: &[f64; MOST_PARAMETERS]) -> bool {
         probe::mirrors(&self.tree, parameters, PI)

@@ -44,7 +44,7 @@ pub fn is_taken(name: &str) -> bool {
 /// The tree of `text`, in which the names `parameters` are known besides.
 ///
 /// # Errors
-/// What is wrong, where (in characters from 1), and what must be there.
+/// A message: the error, its place (in characters from 1), and the text expected there.
 pub fn parse(text: &str, parameters: &[String]) -> Result<Tree, String> {
     let characters: Vec<char> = text.chars().collect();
     if characters.len() > LONGEST {

@@ -1,5 +1,5 @@
-//! What a term does, by its values: whether its units balance, whether it jumps at rest, repeats
-//! every turn, mirrors.
+//! Properties of a term, found by evaluating it: whether its units balance, whether it jumps at rest,
+//! repeats every turn, keeps mirror images.
 //!
 //! Terms are made of analytic functions, so that an identity which holds at several places drawn
 //! without pattern holds everywhere.
@@ -109,8 +109,7 @@ pub fn is_proportional(term: &Tree, parameters: &[Parameter]) -> bool {
     })
 }
 
-/// What the parameter of a `place` in their list does, by the term, how it scales, and where it is
-/// looked for.
+/// The role of the parameter at `place` of their list, by the term, its scaling and its typical range.
 pub fn role(term: &Tree, parameters: &[Parameter], place: usize) -> Role {
     let Parameter { power, typical, unit, .. } = parameters[place];
     let turned = |values: &[f64]| {

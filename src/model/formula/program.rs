@@ -15,7 +15,7 @@ use crate::model::effects::{MOST_PARAMETERS, Point};
 pub const SLOTS: usize = 8;
 
 /// Under a root, a logarithm or a power that is not whole, `|x|` is `sqrt(x^2 + FLOOR)`: so
-/// derivatives are finite where `x` is 0. The same as of the library's power laws.
+/// derivatives are finite where `x` is 0, as for the power laws of the library.
 const FLOOR: f64 = 1e-12;
 
 /// How absolute values and signs are taken.
@@ -101,7 +101,7 @@ impl Program {
     /// else have to keep theirs too.
     #[inline(always)]
     pub fn run<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
-        // What no operation takes is not copied.
+        // Values that no operation takes are not copied.
         let at = Point { sine: at.theta, ..*at };
         let mut value = at.theta;
         at.theta.aside(Running { program: self, parameters, at: &at, value: &mut value });
@@ -149,7 +149,7 @@ impl<R: Real> Work for Running<'_, R> {
                 Operation::Over(number) => x.like(*number) / x,
                 Operation::Whole(power) => whole_power(x, *power),
                 Operation::Root => x.root(),
-                // What is no number stays none: the functions of the lanes hold it in their range.
+                // A NaN stays a NaN: the functions of the lanes would clamp it to their range.
                 Operation::Exponential => x.exponential() + x.scale(0.0),
                 Operation::Logarithm => x.logarithm() + x.root().scale(0.0),
                 Operation::Sine => x.scale(FRAC_1_PI).sine::<Fine>(),
@@ -239,7 +239,7 @@ impl Builder<'_> {
         self.unary(Operation::Affine(factor, addend), of)
     }
 
-    /// The place where a value is, by an operation of its own if need be.
+    /// The place where a value is, by another operation if needed.
     fn stored(&mut self, value: Value) -> usize {
         let stored = match value {
             Value::At(Source::Slot(place)) => return place,

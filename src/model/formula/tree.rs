@@ -1,6 +1,6 @@
 //! A term as a tree: what it depends on, its value, and what replaces kinks.
 
-/// What a term may name.
+/// The variables of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variable {
     /// Angle, rad.
@@ -62,7 +62,7 @@ pub enum Operator {
 pub enum Tree {
     /// A number.
     Number(f64),
-    /// What a name stands for.
+    /// A variable or parameter.
     Variable(Variable),
     /// A function of a tree.
     Apply(Function, Box<Self>),
@@ -95,7 +95,7 @@ impl Tree {
         Self::Join(operator, Box::new(left), Box::new(right))
     }
 
-    /// The same with the other sign.
+    /// The tree with the other sign.
     pub fn negated(self) -> Self {
         match self {
             Self::Number(value) => Self::Number(-value),
@@ -104,7 +104,7 @@ impl Tree {
     }
 
     /// A function of a tree. Absolute values and signs of products are products of them, so that
-    /// what remains under them is a kink of its own.
+    /// the argument under them is a further kink.
     pub fn apply(function: Function, inner: Self) -> Self {
         if !matches!(function, Function::Abs | Function::Sign) {
             return Self::Apply(function, Box::new(inner));

@@ -19,7 +19,7 @@ pub struct Switching {
     pub(super) side: f64,
     /// Value and rate at the begin.
     begin: [f64; 2],
-    /// The same at the end.
+    /// Value and rate at the end.
     end: [f64; 2],
 }
 

@@ -1,7 +1,7 @@
 //! Turns, sticks and releases of one trajectory within one step of the block that it belongs to.
 //!
 //! An [`EventSearch`] asks for integrations from where its trajectory last was on an analytic piece of the
-//! motion, over lengths of its own; [`super::block`] runs those of many searches in lanes. From their
+//! motion, each over its own length; [`super::block`] runs those of many searches in lanes. From their
 //! ends it finds the first zero of the velocity, to rounding, and what comes after it; and the first
 //! zero of the switching function of a corner, where only the formula changes. The velocity's zero is
 //! found first, and then whether a corner comes before it.
@@ -34,7 +34,7 @@ const LEAST_GUESS: f64 = 1e-6;
 /// may be shorter than rounding can tell.
 const LEAST_SLIP: f64 = 1e-7;
 
-/// What a search waits for.
+/// The state that a search waits for.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     /// The end of the piece.
@@ -107,7 +107,7 @@ pub struct EventSearch {
     crossed: bool,
     end: f64,
     stage: Stage,
-    /// What the whole piece gave.
+    /// The result of the whole piece.
     whole: Option<Reached>,
     /// The length of the whole piece.
     piece: f64,
@@ -138,7 +138,7 @@ impl EventSearch {
         }
     }
 
-    /// The same where the end of the piece is known already.
+    /// Continues where the end of the piece is known already.
     #[must_use]
     pub fn known(
         lane: usize,

@@ -1,5 +1,5 @@
-//! What runs a block: steps of the routes through the kernel, and the queue of those lanes whose
-//! velocity passes zero or that meet a corner.
+//! The steps of a block on each route through the kernel, and the queue of the lanes whose velocity
+//! passes zero or that meet a corner.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::marker::PhantomData;
@@ -73,7 +73,7 @@ fn load<L: Lane>(token: L::Token, block: &Block, at: usize) -> Moving<L> {
     }
 }
 
-/// What a step of a block needs.
+/// The arguments of a step of a block.
 struct Step<'a, L: Lane, Q: Lane> {
     runner: &'a Runner<'a, L, Q>,
     block: &'a mut Block,
@@ -82,7 +82,7 @@ struct Step<'a, L: Lane, Q: Lane> {
     stages: &'a mut Stages<Q>,
 }
 
-// Each part of a step in a function of its own: the compiler's time grows faster than a function's length.
+// Each part of a step has its own function: the compiler's time grows faster than a function's length.
 macro_rules! apart {
     ($($name:ident => |$runner:ident, $block:ident, $k:ident, $time:ident, $stages:ident| $call:expr;)*) => {$(
         struct $name<'a, L: Lane, Q: Lane>(Step<'a, L, Q>);
@@ -104,8 +104,7 @@ apart! {
     Queue => |runner, block, _k, _time, stages| runner.work_off(block, stages);
 }
 
-/// What runs a block of one pendulum: `Q` is the narrower kind of lanes, for the queue and for
-/// effects.
+/// Runs the blocks of one pendulum; `Q` is the narrower kind of lanes, for the queue and for effects.
 pub(super) struct Runner<'a, L: Lane, Q: Lane> {
     strobe: &'a Strobe,
     tokens: (L::Token, Q::Token),
@@ -201,7 +200,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         }
     }
 
-    /// The same with effects that do not depend on the velocity but for its sign.
+    /// A step with effects that depend on the velocity by its sign only.
     #[inline(always)]
     fn step_with_effects(&self, block: &mut Block, k: usize, time: [f64; 2]) {
         let schedule = &self.strobe.schedule;
@@ -229,7 +228,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         }
     }
 
-    /// The same for torques that depend on the velocity.
+    /// A step with torques that depend on the velocity.
     #[inline(always)]
     fn general_step(&self, block: &mut Block, k: usize, time: [f64; 2], stages: &mut Stages<Q>) {
         let table = &self.strobe.timetable;

@@ -35,7 +35,7 @@ impl<L: Lane, Q: Lane> Runner<'_, L, Q> {
     #[inline(never)]
     fn enqueue(&self, block: &mut Block, at: usize, mut flags: u128, time: [f64; 2]) {
         let scale = 1.0 / self.strobe.schedule.kick;
-        // What a stage's load adds to the kick in one step.
+        // The change of the kick in one step by the load of a stage.
         let gain = scale / (time[1] - time[0]);
         while flags != 0 {
             let bit = flags.trailing_zeros() as usize;
