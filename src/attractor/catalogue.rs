@@ -49,7 +49,7 @@ pub struct Attractor {
 }
 
 impl Attractor {
-    /// From a closed orbit; one that does not attract is described alike.
+    /// The attractor of a closed orbit; one that does not attract is described alike.
     #[must_use]
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
@@ -121,7 +121,7 @@ impl Attractor {
         self.kind == Kind::Rotation && self.multipliers.len() == 1
     }
 
-    /// From a running state without drive; its one multiplier is that of the angle section.
+    /// The attractor of a running state without drive; its one multiplier is that of the angle section.
     #[must_use]
     pub fn running(rotation: &Rotation) -> Self {
         Self {
@@ -141,7 +141,7 @@ impl Attractor {
         }
     }
 
-    /// From a set of trajectories that nothing captures.
+    /// The attractor of a set of trajectories that no trap captures.
     #[must_use]
     pub fn sampled(set: &ChaoticSet) -> Self {
         Self {

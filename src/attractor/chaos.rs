@@ -25,9 +25,9 @@ const WINDOWS: usize = 4;
 const ROUNDS: usize = 16;
 /// Windows that draw the curve of a quasi-periodic set.
 const CURVES: usize = 128;
-/// An exponent this many standard errors above zero is positive ...
+/// An exponent is positive if it is at least this many standard errors above zero.
 const SIGNIFICANCE: f64 = 4.0;
-/// ... if it is greater than this, per period.
+/// Least exponent, per period, that counts as positive.
 const LEAST_EXPONENT: f64 = 1e-3;
 /// Points this near are the same.
 const SAME: f64 = 1e-6;

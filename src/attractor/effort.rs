@@ -1,7 +1,7 @@
-//! How much a search for attractors spends.
+//! The budget of a search for attractors.
 
-/// How much a search for attractors spends: the thorough one of a single plane of starts, the brisk
-/// one of each of many thousand pendulums.
+/// The budget of a search for attractors: thorough for a single plane of starts, brisk for each of many
+/// thousand pendulums.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Whether orbits are polished on the precise map, to rounding of the exact motion. Else they are
@@ -17,7 +17,7 @@ pub struct Effort {
     pub watched: usize,
     /// Trajectories that nothing has captured are watched for this many times the first bound more.
     pub watch: u32,
-    /// Runs that a chaotic set needs: where fewer have come to it, so many more from its own points must stay.
+    /// Runs that a chaotic set needs; where fewer have come to it, more runs from its points must stay.
     pub proved: usize,
     /// Cells around the circle of the region of a set: few enough for its points to fill what it visits.
     pub cells: usize,
@@ -43,7 +43,7 @@ pub struct Sampling {
 }
 
 impl Effort {
-    /// Of a single pendulum.
+    /// The budget for a single pendulum.
     pub const THOROUGH: Self = Self {
         precise: true,
         longest_cycle: 32,
@@ -55,7 +55,7 @@ impl Effort {
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
     };
-    /// Of one among thousands.
+    /// The budget for one pendulum among thousands.
     pub const BRISK: Self = Self {
         precise: false,
         longest_cycle: 32,

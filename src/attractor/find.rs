@@ -84,7 +84,7 @@ impl Catalogue {
     /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
     /// found to close on a new one, or `bound` periods are over.
     ///
-    /// Those left over are watched for some times as long again ([`Effort::watch`]). If then still
+    /// The remaining trajectories are watched for a multiple of `bound` ([`Effort::watch`]). If then still
     /// none of a set of them has been captured and their exponent is positive, the set is a chaotic
     /// attractor; else they stay undecided. Returns how each start ended.
     pub fn endings(

@@ -20,7 +20,7 @@ pub(super) type Return = (f64, State, usize);
 
 /// The near returns of all trajectories, the nearest first, and of each the nearest few.
 ///
-/// Those that have converged come before the chance returns of chaos.
+/// Converged trajectories come before the chance returns of chaos.
 pub(super) fn near_returns(strobe: &Strobe, alive: &[State], longest: usize) -> Vec<Return> {
     let mut returns: Vec<Return> = Vec::new();
     for track in tracks(strobe, alive, longest) {

@@ -46,7 +46,7 @@ impl Ellipse {
 /// Half widths of a band that are sampled, each `RATIO` of the one before.
 const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
-/// Of the linear shrinking, so much must be left in the nonlinear map.
+/// Part of the linear shrinking that the nonlinear map must have.
 const LEFT: f64 = 0.2;
 /// Ellipses need not shrink faster than this, however strong the damping.
 const LEAST_SHRINK: f64 = 0.3;

@@ -8,17 +8,17 @@ use super::find::{Catalogue, Ending};
 use super::kind::Kind;
 use crate::integrate::{State, Strobe};
 
-/// Damping must shrink a motion by this power of e, were it not driven, before what is left can be
-/// called chaos.
+/// Power of e by which damping must shrink a free motion before uncaptured trajectories can count as
+/// chaotic.
 const LEAST_DECAY: f64 = 20.0;
 
 /// Periods for which chaos is watched where another attractor could end it.
 const LONG: u32 = 5000;
 
 impl Catalogue {
-    /// Decides what the trajectories that nothing captured are.
+    /// Decides which uncaptured trajectories are chaotic.
     ///
-    /// Those that are watched end where that takes them.
+    /// Watched trajectories are left where watching ends.
     pub(super) fn watch(
         &mut self,
         strobe: &Strobe,

@@ -11,7 +11,7 @@ use crate::error::Error;
 
 /// The first damping that is tried after a step that failed.
 const FIRST_DAMPING: f64 = 1e-4;
-/// By how much it grows after a failure; it falls by the square of that.
+/// Factor of the damping after a failure; after a good step it falls by the square of that.
 const GROWTH: f64 = 8.0;
 /// Part of the predicted gain above which a step counts as good.
 const FAIR: f64 = 0.25;
@@ -151,17 +151,17 @@ impl Point {
     }
 }
 
-/// How far to go.
+/// The end of a descent.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit {
-    /// The gain in the sum of squares, expected of the next step, at which it is over ...
+    /// Predicted gain of the next step in the sum of squares at which the descent ends.
     pub gain: f64,
-    /// ... or the part of the sum of squares that this is.
+    /// Part of the sum of squares that a gain must exceed for the descent to go on.
     pub part: f64,
     /// The most steps.
     pub steps: usize,
-    /// The sum of squares that is to be reached: a descent that promises far less is given up;
-    /// infinite where any is worth it.
+    /// The sum of squares to be reached: a descent that cannot come near it is given up; infinite where
+    /// every descent is worth it.
     pub target: f64,
 }
 

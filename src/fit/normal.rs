@@ -75,11 +75,11 @@ pub struct Normal {
 /// A step of the parameters and of the initial states.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Of the free parameters.
+    /// The steps of the free parameters.
     pub values: Vec<f64>,
-    /// Of each window's initial state.
+    /// The steps of the initial states of all windows.
     pub starts: Vec<State>,
-    /// By how much the sum of squares falls if all is linear.
+    /// The fall of the sum of squares by the linear model.
     pub gain: f64,
     /// The part of each window in that.
     pub gains: Vec<f64>,

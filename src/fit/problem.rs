@@ -17,7 +17,7 @@ pub const MOST_READINGS: usize = 7;
 pub enum Slot {
     /// `(w0 / w_ref)^2`.
     Gravity,
-    /// That place in [`Pendulum::parameters`].
+    /// The parameter at that place in [`Pendulum::parameters`].
     Parameter(usize),
     /// [`RodSensor::bias`].
     Bias,
@@ -35,7 +35,7 @@ pub struct Free {
 }
 
 impl Free {
-    /// Between which values it means something: the ends of an effect's parameter, else all.
+    /// The range of its values: that of the parameter of an effect, otherwise unbounded.
     fn range(&self, records: &[Record]) -> [f64; 2] {
         let of_effect = |(record, slot): &(usize, Slot)| {
             let Slot::Parameter(place) = *slot else { return None };
@@ -85,9 +85,9 @@ pub struct Shaped {
 /// The free parameters of one record: their places in [`Problem::free`], and what they are.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
-    /// Those that the motion depends on.
+    /// Parameters on which the motion depends.
     pub motion: Vec<(usize, Slot)>,
-    /// Those that only the reading depends on, with their place in [`Pendulum::parameters`].
+    /// Parameters on which only the reading depends, with their place in [`Pendulum::parameters`].
     pub reading: Vec<(usize, usize)>,
 }
 

@@ -13,7 +13,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// From here on the complementary error function is a continued fraction.
+/// Argument from which the complementary error function is computed as a continued fraction.
 const TAIL: f64 = 2.0;
 /// The least weight, over `1 / s`: rows stay as they are, up to their length, where a reading says
 /// nothing.

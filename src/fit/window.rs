@@ -13,7 +13,7 @@ const REACH: f64 = 0.5;
 /// A stretch of a record, from sample `from` to before sample `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Of which record.
+    /// Its record.
     pub record: usize,
     /// Its first sample.
     pub from: usize,

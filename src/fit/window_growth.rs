@@ -1,4 +1,4 @@
-//! From short windows to long ones.
+//! Fits over windows that grow from short to long.
 //!
 //! Within a window of about a swing the model is nearly linear in all that is not known, so that the
 //! search converges from far; each stage starts from the last one's curve. Long windows are precise,
@@ -28,7 +28,7 @@ const SETTLED: usize = 10;
 pub struct Settings {
     /// Length of the first windows, in units of time; infinite to begin with the longest.
     pub shortest: f64,
-    /// By how much windows grow from stage to stage.
+    /// Factor by which windows grow from stage to stage.
     pub growth: f64,
     /// The most steps of a stage.
     pub steps: usize,
@@ -63,7 +63,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// By which factor the sum of squares exceeds its degrees of freedom, where that is more than
+    /// The factor by which the sum of squares exceeds its degrees of freedom, where that is more than
     /// chance and an error of `doubt` (relative) of the standard errors allow; else 1. Birge (1932),
     /// Physical Review 40, 207: the intervals of a model that does not fit are widened by its root.
     #[must_use]

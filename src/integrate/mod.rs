@@ -1,4 +1,4 @@
-//! From a state to a later one.
+//! Integrators of the equation of motion.
 //!
 //! - [`kernel`]: many trajectories in lanes, by steps of equal length
 //! - [`mod@reference`]: one trajectory of any model, adaptive, with exact events and derivatives

@@ -166,8 +166,8 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
 
 /// A single number whose value steers an integrator: with derivatives, or without.
 ///
-/// Of numbers on lanes the value is the same in all, and each lane of a slope is a direction of its
-/// own: one trajectory whose derivatives fill a register.
+/// Lanes of such a number have one value, and each lane of a slope is another direction: one trajectory
+/// whose derivatives fill a register.
 pub trait Number: Real {
     /// The value alone.
     fn value(self) -> f64;

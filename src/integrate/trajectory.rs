@@ -16,7 +16,7 @@ use crate::model::Pendulum;
 
 /// The first error of a step tried, over the tolerance.
 const FIRST_TRY: f64 = 0.1;
-/// By how much a step's error is tightened to see what that changes.
+/// Factor by which the error of a step is tightened to measure the effect on the result.
 const TIGHTENING: f64 = 16.0;
 /// Errors below this may be those of rounding, amplified by the motion.
 const ROUNDING: f64 = 1e-7;

@@ -1,4 +1,4 @@
-//! How finely the basins are interwoven.
+//! Basin entropy: how finely the basins are interwoven.
 
 use rayon::prelude::*;
 
@@ -34,7 +34,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Of a plane without basins: all alike.
+    /// The values of a plane without basins: all labels are equal.
     #[must_use]
     pub const fn plain() -> Self {
         Self {
@@ -49,7 +49,7 @@ impl Texture {
     }
 }
 
-/// From the labels of a grid; zeros for a list of starts, which has no neighbours.
+/// The entropies of the labels of a grid; zeros for a list of starts, which has no neighbours.
 #[must_use]
 pub fn texture(labels: &Labels, starts: &Starts, pool: &rayon::ThreadPool) -> Texture {
     let Starts::Grid { theta, .. } = starts else {
@@ -58,7 +58,7 @@ pub fn texture(labels: &Labels, starts: &Starts, pool: &rayon::ThreadPool) -> Te
     of_cells(&labels.label, theta.count, pool)
 }
 
-/// From labels in rows of `columns` cells.
+/// The entropies of labels in rows of `columns` cells.
 #[must_use]
 pub fn of_cells(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Texture {
     let rows = cells.len() / columns.max(1);

@@ -305,7 +305,7 @@ impl Labels {
         Self { label: Vec::new(), settle: Vec::new(), turns: Vec::new(), open: Vec::new(), work: 0 }
     }
 
-    /// Of a plane without labels: all chaotic, or all undecided.
+    /// The labels of a plane without basins: all chaotic, or all undecided.
     fn unlabelled(layers: &FiniteTime, chaotic: bool, periods: u32) -> Self {
         let count = layers.turns.len();
         let label = layers

@@ -1,4 +1,4 @@
-//! How many periods a trajectory is given to settle.
+//! Numbers of periods within which a trajectory must settle.
 //!
 //! Motions settle at the pace of the damping, so each bound is the time in which it shrinks a free motion
 //! by some power of e, within limits.
@@ -6,7 +6,7 @@
 use crate::attractor::Effort;
 use crate::model::Pendulum;
 
-/// Least bound of a start, in periods: what resonances and transient chaos take under strong damping.
+/// Least bound of a start, in periods: resonances and transient chaos last as long under strong damping.
 pub const LEAST: u32 = 4000;
 /// Greatest bound, in periods.
 const MOST: f64 = 1e6;
@@ -19,7 +19,7 @@ const SEARCHED: u32 = 4;
 
 /// Periods in which damping shrinks a free motion by `exp(-decay)`, `2 decay / (gamma T)`, within limits.
 ///
-/// Of dry friction alone the same with `theta_r` for `gamma`, its pace at velocities near 1.
+/// Under dry friction alone `theta_r` replaces `gamma`: its rate at velocities near 1.
 fn shrinking(pendulum: &Pendulum, decay: f64, least: f64) -> u32 {
     let rate = pendulum.damping_rate();
     let periods = if rate > 0.0 { 2.0 * decay / (rate * pendulum.period()) } else { 0.0 };

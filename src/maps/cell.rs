@@ -40,7 +40,7 @@ pub struct Cell {
     pub open: f64,
     /// Share of the starts that left the range of numbers.
     pub failed: f64,
-    /// Of chaos: periods within which nothing captured it; 0 without.
+    /// Periods within which no trap captured its chaotic trajectories; 0 without chaos.
     pub watched: u32,
 }
 
@@ -102,7 +102,7 @@ impl Search {
         }
     }
 
-    /// Those of `hints` that promise what `cell` does not have: a stable orbit that Newton's method finds
+    /// The `hints` of attractors that `cell` does not have: a stable orbit that Newton's method finds
     /// from there; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
     /// that may have changed into another.
     #[must_use]

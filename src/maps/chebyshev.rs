@@ -24,7 +24,7 @@ pub(super) struct Interpolant<const K: usize> {
 }
 
 impl<const K: usize> Interpolant<K> {
-    /// Of what `function` gives between two places. An entire function's series falls faster than any
+    /// The series of `function` between two places. An entire function's series falls faster than any
     /// power; where a few hundred terms are too few for it, the best is kept.
     pub fn of(low: f64, high: f64, mut function: impl FnMut(f64) -> Values<K>) -> Self {
         let mut made = Self { low, high, series: std::array::from_fn(|_| Vec::new()) };

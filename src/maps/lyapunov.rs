@@ -1,8 +1,8 @@
 //! The largest Lyapunov exponent of the attractor that a start reaches.
 //!
-//! Of a closed orbit it is exact, from the multipliers; of chaos the mean growth of tangents along an
+//! For a closed orbit it is exact, from the multipliers; for chaos it is the mean growth of tangents along an
 //! ensemble of trajectories on the attractor, with a standard error from their spread. A chaotic
-//! transient has a positive exponent too: what counts is what captured it.
+//! transient has a positive exponent too: the attractor that captures it counts.
 
 use super::basins::SEARCH_SAMPLE;
 use super::bounds::{chaos_periods, max_periods, search_periods};
@@ -78,7 +78,7 @@ pub struct Exponent {
     pub attractor: Option<Attractor>,
     /// Periods until that captured it.
     pub transient: Option<u32>,
-    /// Of chaos, and of undamped motion.
+    /// The ensemble, for chaos and undamped motion.
     pub ensemble: Option<Ensemble>,
     /// Members of an ensemble that something captured after all: what looked like an attractor is a
     /// transient.

@@ -53,7 +53,7 @@ struct Cell {
 /// Places from which Newton's method should find all zeros in the box.
 ///
 /// # Errors
-/// Those of `field`, which is asked for its values at many points at once.
+/// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn places(
     axes: [Axis; 2],
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
@@ -158,7 +158,7 @@ struct Walker {
 /// The places near zeros of the field that the starts reach within `reach`, each once.
 ///
 /// # Errors
-/// Those of `field`, which is asked for its values at many points at once.
+/// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn approach(
     starts: &[State],
     reach: f64,

@@ -31,9 +31,9 @@ const TOLERANCE: f64 = 1e-6;
 const EACH: usize = 128;
 /// Starts whose step error is measured.
 const ERROR_SAMPLE: usize = 200;
-/// Newton's method may wander so many cells away from where it began, and at least ...
+/// Largest distance of Newton's method from its start, in cells.
 const REACH_CELLS: f64 = 8.0;
-/// ... this far.
+/// Least value of that distance.
 const LEAST_REACH: f64 = 0.3;
 /// Points nearer than this are of one orbit.
 const SAME: f64 = 1e-6;
@@ -44,12 +44,12 @@ const CREEPS: f64 = 1e-3;
 /// Angles at which the pull on an undriven pendulum is looked at, and halvings between two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
-/// Only where the derivative of the displacement shrinks a direction below this are orbits looked for
-/// beside another ...
+/// Orbits beside another one are looked for only where the derivative of the displacement shrinks a
+/// direction below this.
 const WEAK: f64 = 0.3;
-/// ... so far away, ...
+/// Largest distance at which they are looked for.
 const FURTHEST: f64 = 0.3;
-/// ... and at so many halves of that.
+/// Number of halvings of that distance.
 const HALVINGS: u32 = 9;
 
 /// A request for closed orbits.

@@ -24,9 +24,9 @@ const COARSEST: usize = 8;
 const EXCHANGES: [usize; 3] = [8, 4, 2];
 /// Passes between next neighbours at the most; they end where no cell has gained an attractor.
 const MOST_PASSES: usize = 64;
-/// Bytes of a cell: its attractors, and the arrays that they become ...
+/// Bytes of a cell: its attractors, and their arrays.
 const EACH: usize = 4096;
-/// ... and of each point that is kept of those that do not close.
+/// Bytes of each point kept of an attractor that does not close.
 const ROOM: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
@@ -110,7 +110,7 @@ impl Plane<'_> {
         pendulum
     }
 
-    /// Those cells at the distance `stride` in both directions, or in one, that exist.
+    /// The existing cells at the distance `stride` in both directions, or in one.
     fn neighbours(&self, cell: usize, stride: usize, diagonal: bool) -> Vec<usize> {
         let [columns, rows] = self.size();
         let [i, j] = self.place(cell);

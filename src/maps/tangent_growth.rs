@@ -20,7 +20,7 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// From these states, every tangent along `(1, 1)/sqrt 2`.
+    /// The bundle at these states, every tangent along `(1, 1)/sqrt 2`.
     #[must_use]
     pub fn new(states: &[State]) -> Self {
         let part = vec![std::f64::consts::FRAC_1_SQRT_2; states.len()];
@@ -107,7 +107,7 @@ pub struct TangentTrajectory {
 }
 
 impl TangentTrajectory {
-    /// From this start.
+    /// The trajectory from this start.
     #[must_use]
     pub fn new(start: State) -> Self {
         Self { bundle: Bundle::new(&[start]), growth: Vec::new(), states: vec![start] }

@@ -9,9 +9,9 @@ use crate::error::Error;
 use crate::integrate::State;
 
 /// Distances are powers of two of the window's sides, from the first to the last exponent. Greater
-/// ones see several strips of a basin at once, where the law has not begun; ...
+/// distances cross several strips of a basin at once, where the power law does not hold yet.
 const SCALES: [i32; 2] = [-6, -26];
-/// ... they are taken where a short and smooth boundary leaves fewer distances than `LEAST_SCALES`.
+/// First exponent where a short and smooth boundary leaves fewer distances than `LEAST_SCALES`.
 const WIDEST: i32 = -4;
 const LEAST_SCALES: usize = 5;
 /// Starts at every other distance that say how many each takes.
@@ -24,13 +24,13 @@ const STARTS: [f64; 2] = [200.0, 16_000.0];
 const LEAST_TELLING: usize = 3;
 /// A distance at which fewer are expected from the most starts says too little.
 const LEAST_UNCERTAIN: f64 = 40.0;
-/// Labels in all: at least, over the cells of the map, and at most, where they leave the exponent ...
+/// Number of labels: the least, the multiple of the cells of the map, and the most.
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
-/// ... a greater standard error than this.
+/// Standard error of the exponent above which the largest number of labels is used.
 const ERROR: f64 = 0.015;
-/// Part of the starts that is drawn where the map shows a change within the distance, in the pilot and ...
+/// Part of the starts of the pilot that is drawn where the map shows a change within the distance.
 const PILOT_NEAR: f64 = 0.5;
-/// ... where this has met no uncertain start elsewhere.
+/// That part after a pilot without uncertain starts elsewhere.
 const NEAR: f64 = 0.9;
 /// Labels of a start: its own and one on either side.
 const SIDES: usize = 3;
@@ -136,7 +136,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// Of `starts`, this part at least from the first `near` of `cells`; all from all where it is 0.
+    /// Draws `starts`, this part at least from the first `near` of `cells`; all from all where it is 0.
     fn planned(near: usize, cells: usize, starts: usize, part: f64) -> Self {
         let stratum = |first, cells, drawn| Stratum { first, cells, drawn, known: 0, uncertain: 0 };
         if part == 0.0 || near == cells {

@@ -287,7 +287,7 @@ impl<R: Real> Equation<R> {
         self.mode.is_some()
     }
 
-    /// That mode's displacement where a motion begins; 0 where there is none.
+    /// The displacement of the mode where a motion begins; 0 where there is none.
     #[must_use]
     pub fn aside(&self, at: &Point<R>) -> R {
         match &self.mode {

@@ -11,7 +11,7 @@ pub struct Observation<R> {
 }
 
 impl<R: Real> Observation<R> {
-    /// Of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
+    /// The observation of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
     /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
     pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
         let mut first = Pendulum::OWN_PARAMETERS;

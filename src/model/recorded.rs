@@ -40,7 +40,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// From samples at `times` of the upward motion, the motion toward positive theta, or both.
+    /// The motion from samples at `times` of the upward motion, the motion toward positive theta, or both.
     ///
     /// # Errors
     /// [`Error::Range`] for a number that is not finite, a time that is not after the one before it,

@@ -25,7 +25,7 @@ const SECTIONS: usize = 45;
 pub trait Load {
     /// The load at rest, and the friction that it must exceed to move the pendulum.
     fn load_and_hold(&self, tau: f64, theta: f64) -> [f64; 2];
-    /// By how much the load at rest exceeds what holds the pendulum against moving in the sense
+    /// The excess of the load at rest over the friction that holds the pendulum against moving in the sense
     /// `sense`; it stays at rest while this is not positive for either sense.
     fn excess_toward(&self, tau: f64, theta: f64, sense: f64) -> f64 {
         let [load, hold] = self.load_and_hold(tau, theta);
@@ -82,7 +82,7 @@ impl Equation<f64> {
         self.friction(&self.point(&forcing, theta, 0.0, 1.0)).max(0.0)
     }
 
-    /// By how much the load at rest at `theta` exceeds the friction at its greatest, over the drive's
+    /// The greatest excess of the load at rest at `theta` over the friction, over the drive's
     /// period; negative where it never does.
     #[must_use]
     pub fn excess(&self, theta: f64) -> f64 {

@@ -23,7 +23,7 @@ impl Multipliers {
     }
 }
 
-/// From the monodromy matrix and the exact product of its eigenvalues.
+/// The multipliers, from the monodromy matrix and the exact product of its eigenvalues.
 ///
 /// The trace comes from the matrix; the product is the exact one, since the difference of large
 /// entries loses it where the contraction is strong.

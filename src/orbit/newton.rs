@@ -9,9 +9,9 @@ use super::poincare::PoincareMap;
 use crate::integrate::State;
 use crate::model::Angle;
 
-/// Largest `|P^n(x) - x|` of an orbit that counts as found, where rounding allows it; ...
+/// Largest `|P^n(x) - x|` of an orbit that counts as found, where rounding allows it.
 pub const RESIDUAL: f64 = 1e-12;
-/// ... else this times the derivative: what rounding moves a point by grows by that until it comes back.
+/// Rounding error of a point, times the derivative: the least residual that rounding allows.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Largest relative deviation of a period's shrinking of area from the exact product.
 pub const PRODUCT: f64 = 1e-9;

@@ -71,7 +71,7 @@ fn carry(
     ([theta.value, velocity.value], Matrix2::new(a, b, c, d))
 }
 
-/// From `theta = 0` with `velocity` once round; `None` if the pendulum turns back first.
+/// One turn from `theta = 0` with `velocity`; `None` if the pendulum turns back first.
 fn turn(pendulum: &Pendulum, velocity: f64, mut visit: impl FnMut(State)) -> Option<Turn> {
     let sense = velocity.signum();
     let goal = sense * TAU;

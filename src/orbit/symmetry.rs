@@ -21,7 +21,7 @@ pub struct Mirror {
 }
 
 impl Mirror {
-    /// Of `pendulum`; none where it has no such symmetry.
+    /// The symmetry of `pendulum`; none where it has no such symmetry.
     #[must_use]
     pub fn of(pendulum: &Pendulum) -> Option<Self> {
         let half = match pendulum.symmetry()? {

@@ -173,9 +173,9 @@ pub struct FitPoint {
     chi2: f64,
     samples: usize,
     degrees: usize,
-    /// Half the curvature of the sum of squares by the free parameters, the states following ...
+    /// Half the curvature of the sum of squares by the free parameters, the states following.
     information: Py<PyArray2<f64>>,
-    /// ... and half its slope.
+    /// Half the slope of the sum of squares.
     pull: Array<f64>,
     windows: Vec<WindowTuple>,
     runs: Vec<Py<FittedRun>>,
@@ -185,7 +185,7 @@ pub struct FitPoint {
 #[pyclass(frozen, get_all, extends = FitPoint, module = "pendmap._core")]
 pub struct Fit {
     covariance: Py<PyArray2<f64>>,
-    /// Of the profiled parameters.
+    /// Intervals of the profiled parameters.
     intervals: Vec<(f64, f64)>,
     widening: f64,
     steps: usize,
@@ -209,8 +209,8 @@ pub struct FittedRun {
 pub struct WindowRows {
     /// The free parameters of its record.
     free: Vec<usize>,
-    /// Of each sample the derivatives of the model, times its weight, by these parameters and by the
-    /// initial angle and velocity.
+    /// Derivatives of the model at each sample, times its weight, by these parameters and by the initial
+    /// angle and velocity.
     rows: Py<PyArray2<f64>>,
     residuals: Array<f64>,
     weights: Array<f64>,

@@ -32,7 +32,7 @@ pub struct ParameterMap {
     exponent_stderr: Array<f64>,
     /// Share of the cell's starts.
     share: Array<f64>,
-    /// Of each cell.
+    /// Share of undecided starts of each cell.
     undecided: Array<f64>,
     failed: Array<f64>,
     /// Periods for which chaos was watched in each cell.

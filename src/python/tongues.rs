@@ -26,7 +26,7 @@ pub struct CriticalAmplitudes {
 
 #[pymethods]
 impl CriticalAmplitudes {
-    /// Those of a pendulum that has no rest there: none.
+    /// The result for a pendulum without rest there: none.
     #[staticmethod]
     fn no_rest() -> Self {
         Self { stable: vec![false], ..Self::default() }

@@ -32,7 +32,7 @@ pub struct Switch<L> {
 }
 
 impl<L: Lane> Corner<L> {
-    /// Of an equation that has one; `number` is of the shape of the others.
+    /// The corner of an equation, if it has one; `number` has the shape of all numbers.
     #[inline(always)]
     pub fn new(equation: &Equation<f64>, number: L) -> Option<Self> {
         let zero = number.like(0.0);

@@ -50,7 +50,7 @@ impl<R: Real> Extra<R> for Rubbing<R> {
 }
 
 impl<R: Real> Moving<R> {
-    /// From the angle in rad and the velocity.
+    /// The state of an angle in rad and a velocity.
     #[inline(always)]
     #[must_use]
     pub fn new(schedule: &Schedule, theta: R, velocity: R) -> Self {

@@ -14,7 +14,7 @@ use crate::model::{Angle, Equation, Pendulum};
 /// Angle and velocity, `[theta, th']`.
 pub type State = [f64; 2];
 
-/// From steps of this length on, in units of `1/sqrt(1 + |p|)`, the method errs about as much as the
+/// Length of steps, in units of `1/sqrt(1 + |p|)`, from which the method errs about as much as the
 /// coarse sine does, or more: measured from p = 0 to 30, where both grow with the stretching.
 const COARSE_SINE_FROM: f64 = 0.28;
 

@@ -275,7 +275,7 @@ pub struct Curve<N> {
     theta: [N; 8],
     /// The coefficients of the velocity.
     pub velocity: [N; 8],
-    /// Those of displacement and momentum of a mode of the rig.
+    /// The polynomials of displacement and momentum of a mode of the rig.
     sway: Option<Box<[[N; 8]; 2]>>,
 }
 

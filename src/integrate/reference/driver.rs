@@ -77,7 +77,7 @@ pub struct Driver<'a, N> {
 }
 
 impl<'a, N: Number> Driver<'a, N> {
-    /// From `state` at time `tau` until `until`.
+    /// The integration from `state` at time `tau` until `until`.
     #[must_use]
     pub fn new(ode: &'a OdeProblem<N>, tau: f64, state: [N; 2], until: f64) -> Self {
         let step = FIRST_STEP * ode.longest_step();

@@ -38,7 +38,7 @@ pub struct Arrival {
 }
 
 impl Flow {
-    /// Of `pendulum`, with errors near rounding: a few 1e-14 after a period, times what the motion
+    /// The map of `pendulum`, with errors near rounding: a few 1e-14 after a period, times what the motion
     /// amplifies.
     #[must_use]
     pub fn new(pendulum: &Pendulum) -> Self {

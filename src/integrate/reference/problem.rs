@@ -53,7 +53,7 @@ pub struct OdeProblem<N> {
 }
 
 impl<N: Number> OdeProblem<N> {
-    /// Of `pendulum`, with an error of about `tolerance` a step in angle and velocity; `number`
+    /// The problem of `pendulum`, with an error of about `tolerance` a step in angle and velocity; `number`
     /// makes a number of each parameter as [`Equation::lift`] does.
     ///
     /// Where `ages`, time in the laboratory goes on; otherwise it is held, as in a map. The

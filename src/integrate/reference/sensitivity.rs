@@ -18,7 +18,7 @@ const WIDEST: usize = 16;
 /// A trajectory at chosen times, with derivatives.
 #[derive(Clone, Debug)]
 pub struct Sensitivities {
-    /// By what: the names of [`Pendulum::parameters`], then `theta0` and `v0`.
+    /// The variables of the derivatives: the names of [`Pendulum::parameters`], then `theta0` and `v0`.
     pub names: Vec<String>,
     /// Angle, not wrapped, and velocity at each time.
     pub states: Vec<State>,

@@ -41,9 +41,9 @@ type Bernstein = [f64; DEGREE + 1];
 /// Zeros of the velocity within a step.
 #[derive(Debug)]
 pub enum Turning {
-    /// It keeps its sense.
+    /// The velocity keeps its sense.
     None,
-    /// It passes zero at the end of a step of this length, where it is 0 to rounding.
+    /// The velocity passes zero at the end of a step of this length, where it is 0 to rounding.
     At(f64),
     /// The curve has a zero that the motion has not: the step is too long for its curve.
     Unclear,

@@ -16,13 +16,13 @@ pub const NOT_PERIODIC: &str = "it does not repeat every turn, and nothing bound
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// It takes energy out of the motion.
+    /// Takes energy out of the motion.
     Damping,
     /// A torque that does not.
     Torque,
-    /// It changes what moves the pivot.
+    /// Changes the drive of the pivot.
     Drive,
-    /// It changes what the sensor reads; the motion is the same.
+    /// Changes the readings of the sensor only.
     Reading,
 }
 
@@ -106,11 +106,11 @@ pub enum Action {
 /// Whether a map over initial conditions can have the effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mappable {
-    /// It can.
+    /// Maps can have it.
     Yes,
     /// With time in the laboratory held at a stated value.
     Frozen,
-    /// It cannot; [`Law::bars_maps`] says why.
+    /// Maps cannot have it, by the reason of [`Law::bars_maps`].
     No,
 }
 
@@ -218,9 +218,9 @@ pub struct Parameter<'a> {
 /// The parameters of an effect, in order.
 #[derive(Clone, Copy, Debug)]
 pub enum Parameters<'a> {
-    /// Those of an effect of the library.
+    /// Parameters of an effect of the library.
     Library(&'static [Parameter<'static>]),
-    /// Those of a formula.
+    /// Parameters of a formula.
     Formula(&'a [ParameterSpec]),
 }
 

@@ -1,4 +1,4 @@
-//! From text to a tree: precedence climbing (Pratt 1973, Top down operator precedence).
+//! The parser, from text to a tree: precedence climbing (Pratt 1973, Top down operator precedence).
 //!
 //! `+ -`, then `* /`, then the sign, then `^` (or `**`) from the right; functions of one argument,
 //! `min` and `max` of two.

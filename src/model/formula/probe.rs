@@ -156,7 +156,7 @@ pub fn gap(term: &Tree, parameters: &[Parameter]) -> Option<(Place, Vec<f64>)> {
 /// do not, the power of `w0` that the first parameter would need, where there is one.
 ///
 /// # Errors
-/// That power.
+/// The power of `w0` that the first parameter would need.
 pub fn balances(term: &Tree, parameters: &[Parameter]) -> Result<(), Option<f64>> {
     let mut powers = Vec::new();
     for values in usual(parameters) {

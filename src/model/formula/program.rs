@@ -84,7 +84,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Of a tree; none where it takes more than [`SLOTS`] intermediate values.
+    /// The program of a tree; none where it takes more than [`SLOTS`] intermediate values.
     pub fn new(tree: &Tree, kinks: Kinks<'_>) -> Option<Self> {
         let build = |shares: bool| {
             let mut builder = Builder { kinks, steps: Vec::new(), shares };

@@ -24,7 +24,7 @@ pub struct Switching {
 }
 
 impl Switching {
-    /// That of a lane of a bundle.
+    /// The function of a lane of a bundle.
     pub(in crate::integrate) fn of(scratch: &Scratch, lane: usize) -> Self {
         let [side, a, b, c, d] = [6, 7, 8, 9, 10].map(|row: usize| scratch[row][lane]);
         Self { side, begin: [a, b], end: [c, d] }

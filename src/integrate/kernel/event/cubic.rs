@@ -8,7 +8,7 @@ const POLISHINGS: usize = 3;
 pub(super) struct Cubic([f64; 4]);
 
 impl Cubic {
-    /// From the values at both ends and the rates there, over a piece of length `h`.
+    /// The cubic through the values at both ends and the rates there, over a piece of length `h`.
     pub(super) fn new([u0, u1, b0, b1]: [f64; 4], h: f64) -> Self {
         let (d0, d1, rise) = (b0 * h, b1 * h, u1 - u0);
         Self([u0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise])

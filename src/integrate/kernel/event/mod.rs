@@ -66,7 +66,7 @@ pub struct Reached {
 /// State of a search after an integration.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// It asks for another one.
+    /// The search asks for another integration.
     Asks,
     /// The step's end is reached.
     Arrived {
@@ -75,7 +75,7 @@ pub enum Progress {
         /// Velocity.
         velocity: f64,
     },
-    /// It has stopped and is held beyond the step's end.
+    /// The pendulum has stopped and is held beyond the step's end.
     Held {
         /// Angle, rad.
         theta: f64,
