@@ -158,7 +158,7 @@ fn positions(values: &[f64]) -> Samples<'_> {
 }
 
 #[test]
-fn what_cannot_be_interpolated_is_refused() {
+fn invalid_samples_are_refused() {
     let good = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
     let refusal = |times: &[f64], values: &[f64]| {
         Recorded::new(times, Some(positions(values)), None).expect_err("refused").to_string()
