@@ -21,6 +21,7 @@
 //!
 //! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
 //! `model` -> `lanes` -> `memory` -> `error`, and `fit` -> `integrate`. Threads live in `maps` and `fit` alone.
+//! The Python module `pendmap._core` is another crate, in `src/python`.
 //!
 //! ```
 //! use pendmap::maps::basins::{Options, basins};

@@ -1,7 +1,7 @@
 //! Integrators of the equation of motion.
 //!
 //! - [`kernel`]: many trajectories in lanes, by steps of equal length
-//! - [`reference`]: one trajectory of any model, adaptive, with exact events and derivatives
+//! - [`mod@reference`]: one trajectory of any model, adaptive, with exact events and derivatives
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`dop853`]: coefficients of the Runge-Kutta method that both use, and their source
 //! - [`accuracy`]: the number of steps that a tolerance needs

@@ -22,7 +22,7 @@ from pendmap.charts import decrement, half_cycles, identification, methods
 from pendmap.charts.names import signed
 from pendmap.formatting import estimate_text
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
-from pendmap.identification.methods.decrement import recursion
+from pendmap.identification.methods.combined import recursion
 from pendmap.paper import pendulum
 from pendmap.records import Experiment, Run
 from pendmap.render import drawing, style

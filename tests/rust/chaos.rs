@@ -37,7 +37,7 @@ fn a_rotation_that_gains_speed_for_ever_is_no_chaos() {
 }
 
 #[test]
-fn what_leaves_its_region_is_no_set() {
+fn trajectories_that_leave_their_region_form_no_set() {
     // Where nothing else would have left it out.
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
     for simd in instruction_sets() {

@@ -143,7 +143,7 @@ fn searched(own: &Own) -> Cell {
 }
 
 #[test]
-fn what_is_told_of_chaos_does_not_depend_on_the_starts() {
+fn chaotic_attractors_do_not_depend_on_the_starts() {
     let tumbling = vec![Kind::TumblingChaos];
     let rotating = vec![Kind::RotatingChaos; 2];
     for (p, omega, kinds) in

@@ -148,7 +148,7 @@ fn without_friction_a_kink_is_passed_smoothly() {
 }
 
 #[test]
-fn what_leaves_the_range_of_numbers_is_called_lost() {
+fn motions_that_leave_the_range_of_numbers_are_lost() {
     let effect = Effect::new(Kind::QuadraticDrag, &[-1.0]).expect("in range");
     let pendulum = undriven(0.0, 0.0).with_effect(effect).expect("once");
     let run = run(&pendulum, 0.0, [0.0, 3.0], 5.0, 100);

@@ -151,7 +151,7 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
 }
 
 #[test]
-fn maps_refuse_what_does_not_repeat_every_turn() {
+fn maps_refuse_effects_that_do_not_repeat_every_turn() {
     let effect = |kind: Kind, values: &[f64]| Effect::new(kind, values).expect("in range");
     for (effect, allowed) in [
         (effect(Kind::ElasticRestoring, &[0.01]), true),

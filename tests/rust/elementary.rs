@@ -78,7 +78,7 @@ fn the_logarithm_is_good_to_the_last_places() {
 }
 
 #[test]
-fn each_undoes_the_other() {
+fn exponential_and_logarithm_are_inverse() {
     let numbers: Vec<f64> = (-7000..7000).map(|i| 0.1 * f64::from(i)).collect();
     for simd in instruction_sets() {
         let there = each::<Exponential>(simd, &numbers);

@@ -132,7 +132,7 @@ fn asking_for_more_does_not_give_less() {
 }
 
 #[test]
-fn what_simulate_says_of_its_error_is_so() {
+fn simulate_reports_its_error() {
     // The error that it reports bounds the one against a run a thousand times as precise.
     let pendulum = driven(0.1, 1.0, 2.0);
     for tol in [1e-4, 1e-7, 1e-10] {

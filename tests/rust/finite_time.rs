@@ -36,7 +36,7 @@ fn turns_and_exponents_are_those_of_the_precise_map() {
 }
 
 #[test]
-fn without_drive_and_damping_energy_tells_who_turns() {
+fn without_drive_and_damping_energy_decides_rotation() {
     let pendulum = undriven(0.0, 0.0);
     let starts = plane(40);
     let strobe = Strobe::new(&pendulum, 40, simd());

@@ -140,7 +140,7 @@ fn chaotic_motion_takes_no_digits_from_the_covariance() {
 }
 
 #[test]
-fn intervals_end_where_the_best_of_the_rest_is_that_much_worse() {
+fn intervals_end_where_the_profile_exceeds_the_level() {
     let (mut problem, _) = several();
     let sigma = 0.3 / 12_f64.sqrt();
     for record in &mut problem.records {
@@ -170,7 +170,7 @@ fn intervals_end_where_the_best_of_the_rest_is_that_much_worse() {
 }
 
 #[test]
-fn what_is_stuck_says_where_it_is_and_no_more() {
+fn a_stuck_pendulum_determines_only_its_angle() {
     // At rest all along: angle and offset are one number, nothing is said about the rest.
     let pendulum = with(undriven(0.1, 0.0), &[(Kind::EncoderOffset, &[0.0])]);
     let pendulum = pendulum.with_friction(0.2).expect("in range");
@@ -210,7 +210,7 @@ fn a_gap_in_trust_is_bridged() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_refused() {
+fn invalid_fits_are_refused() {
     let (problem, _) = several();
     let refusal = |change: &dyn Fn(&mut Vec<Record>, &mut Vec<Free>)| {
         let (mut records, mut free) = (problem.records.clone(), problem.free.clone());
@@ -225,7 +225,7 @@ fn what_cannot_be_fitted_is_refused() {
         refusal(&|r, _| {
             r[1].weights.pop();
         })
-        .contains("weights has")
+        .contains("weights must be as many")
     );
     assert!(refusal(&|_, f| f[0].start = f64::INFINITY).contains("start of a free parameter"));
     assert!(refusal(&|_, f| f[0].places.push((9, Slot::Gravity))).contains("record of a free"));

@@ -132,7 +132,7 @@ fn derivatives_hold_for_a_decay_to_rest() {
 }
 
 #[test]
-fn derivatives_hold_for_what_sensors_on_the_rod_read() {
+fn derivatives_hold_for_sensors_on_the_rod() {
     let pendulum = with(
         undriven(0.02, 0.003).with_friction(0.05).expect("in range"),
         &[(Kind::LoadDependentFriction, &[0.01]), (Kind::QuadraticDrag, &[0.004])],

@@ -44,7 +44,7 @@ fn with_drag() -> Record {
 }
 
 #[test]
-fn what_leads_nowhere_near_its_target_is_given_up() {
+fn a_descent_far_from_its_target_is_given_up() {
     let (all, whole) = searched(vec![with_drag()], &[[1.2, 0.0]], f64::INFINITY, 40);
     let least = all.normal.chi2;
     assert!(whole.converged && !whole.given_up && least > 1000.0, "{whole:?} {least}");

@@ -64,7 +64,7 @@ fn a_size_may_change_its_sign() {
 }
 
 #[test]
-fn widths_and_their_sizes_go_in_ratios_and_all_else_straight() {
+fn widths_and_their_sizes_take_logarithmic_steps() {
     let problem = rough([0.001, 0.4, 0.3], &PLACES, &[0.0025, 0.001, 0.4, 0.3]);
     assert_eq!(
         problem.scales,
@@ -75,7 +75,7 @@ fn widths_and_their_sizes_go_in_ratios_and_all_else_straight() {
 }
 
 #[test]
-fn to_first_order_a_step_is_the_same() {
+fn both_scales_of_steps_agree_to_first_order() {
     for scale in [StepScale::Linear, StepScale::Size, StepScale::Width] {
         assert!((scale.gone(2.0, 1e-6) - 2.000_001).abs() < 1e-12);
         assert!((scale.gone(2.0, 1e-6) - scale.gone(2.0, 0.0) - 1e-6).abs() < 1e-12);

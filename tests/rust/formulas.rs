@@ -292,7 +292,7 @@ fn two_corners_do_not_hinder_each_other() {
 }
 
 #[test]
-fn what_is_wrong_is_said_in_one_line() {
+fn errors_of_formulas_have_one_line() {
     for (term, said) in [
         (
             "-k*thetta",
@@ -340,7 +340,7 @@ fn what_is_wrong_is_said_in_one_line() {
 }
 
 #[test]
-fn a_formula_runs_on_the_path_that_it_needs() {
+fn a_formula_runs_on_the_route_that_it_needs() {
     for (term, power, action) in [
         ("k*sin(3*theta)", 2.0, Action::Position),
         ("-k*v^3", -1.0, Action::Velocity),
@@ -365,7 +365,7 @@ proptest! {
     }
 
     #[test]
-    fn no_mixture_of_its_words_does(
+    fn no_mixture_of_tokens_makes_the_parser_panic(
         words in proptest::collection::vec(
             prop_oneof![
                 Just("theta"), Just("v"), Just("k"), Just("("), Just(")"), Just("+"), Just("-"),

@@ -147,7 +147,7 @@ fn orbits_with_friction_are_those_of_the_reference() {
 }
 
 #[test]
-fn what_creeps_at_the_edge_is_at_rest() {
+fn creeping_at_the_edge_counts_as_rest() {
     // Here every start ends at rest, the slowest by creeping.
     let map = basins_on_plane(&rubbing(0.1, 1.5, 0.87, 0.2), 60);
     let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();

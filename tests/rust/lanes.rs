@@ -95,7 +95,7 @@ fn avx512_and_avx2_give_the_same_bits() {
 }
 
 #[test]
-fn paths_agree_within_rounding() {
+fn instruction_sets_agree_within_rounding() {
     let states = spread(500, PI, 3.0);
     for pendulum in cases() {
         for steps in [24, 60] {

@@ -115,7 +115,7 @@ fn settling_times_and_turns_are_those_of_the_trajectory() {
 }
 
 #[test]
-fn every_path_gives_the_same_fractions() {
+fn every_instruction_set_gives_the_same_fractions() {
     for (p, allowed) in [(0.6, 0.0), (1.0, 0.015)] {
         let (pendulum, starts) = (driven(0.1, p, 2.0), plane(60));
         let (_, reference, expected) = labelled(&pendulum, &starts, InstructionSet::Portable);

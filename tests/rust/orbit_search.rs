@@ -97,7 +97,7 @@ fn fixed_points_add_up() {
 }
 
 #[test]
-fn through_friction_the_known_ones_come_out() {
+fn exponents_with_friction_are_the_reference_ones() {
     for (key, n, w) in [("rotation", 1, 1), ("oscillation", 2, 0)] {
         for entry in list(&truths()["coulomb_forced"][key]) {
             let value = |name: &str| number(&entry[name]);
@@ -148,7 +148,7 @@ fn a_box_limits_where_they_are_looked_for() {
 }
 
 #[test]
-fn what_is_asked_for_wrongly_is_refused() {
+fn invalid_requests_are_refused() {
     let control = Control::default();
     let pendulum = driven(0.1, 1.0, 2.0);
     for n in [0, 65] {
@@ -290,7 +290,7 @@ fn without_drive_the_orbits_are_the_rests() {
 }
 
 #[test]
-fn what_friction_holds_is_no_orbit() {
+fn held_states_are_no_orbits() {
     for (p, theta_r) in [(0.1, 0.5), (0.29, 0.013), (0.3, 3.0)] {
         let pendulum = driven(0.008, p, 2.0).with_friction(theta_r).expect("in range");
         let request = request(1, 0, 20);

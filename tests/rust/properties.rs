@@ -79,7 +79,7 @@ proptest! {
     }
 
     #[test]
-    fn a_turn_further_on_all_is_the_same(pendulum in pendulums(), state in states(), turns in -3_i32..4) {
+    fn a_whole_turn_changes_nothing(pendulum in pendulums(), state in states(), turns in -3_i32..4) {
         let map = PoincareMap::new(&pendulum);
         let (here, there) = (
             map.once(state),

@@ -158,7 +158,7 @@ fn positions(values: &[f64]) -> Samples<'_> {
 }
 
 #[test]
-fn what_cannot_be_interpolated_is_refused() {
+fn invalid_samples_are_refused() {
     let good = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
     let refusal = |times: &[f64], values: &[f64]| {
         Recorded::new(times, Some(positions(values)), None).expect_err("refused").to_string()
@@ -167,7 +167,7 @@ fn what_cannot_be_interpolated_is_refused() {
     assert!(refusal(&good[..5], &good[..5]).contains("6 or more"));
     assert!(refusal(&[0.0, 1.0, 2.0, 2.0, 4.0, 5.0], &good).contains("after the one before"));
     assert!(refusal(&[0.0, 1.0, 2.0, 3.0, 4.0, f64::NAN], &good).contains("time of a sample"));
-    assert!(refusal(&good, &good[..5]).contains("has 5"));
+    assert!(refusal(&good, &good[..5]).contains("got 6 and 5"));
     assert!(
         refusal(&good, &[0.0, 1.0, f64::INFINITY, 3.0, 4.0, 5.0])
             .ends_with("sample must be a finite number, got inf")

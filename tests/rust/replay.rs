@@ -61,7 +61,7 @@ fn a_recorded_pivot_drives_like_the_drive_that_it_is() {
 }
 
 #[test]
-fn it_begins_at_its_first_time_and_refuses_times_that_fall() {
+fn replay_begins_at_its_first_time_and_refuses_falling_times() {
     // Half a period of the drive later the drive has turned round: only the phase tells.
     let one = record(driven(0.1, 1.0, 2.0), None, [1.0, 0.0], 9.0);
     let never = AtomicBool::new(false);

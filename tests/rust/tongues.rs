@@ -65,7 +65,7 @@ fn inverted_rest_is_stable_between_the_known_amplitudes() {
 }
 
 #[test]
-fn what_is_asked_for_wrongly_is_refused() {
+fn invalid_requests_are_refused() {
     let control = Control::default();
     let ask = |pendulum: &Pendulum, p_max: f64| {
         tongues(pendulum, Balance::Hanging, &[2.0], p_max, true, 0, &control)

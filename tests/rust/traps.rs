@@ -46,7 +46,7 @@ fn cases() -> &'static [(Pendulum, Strobe, Catalogue)] {
 }
 
 #[test]
-fn whatever_is_inside_an_ellipse_converges_to_its_attractor() {
+fn starts_inside_an_ellipse_converge_to_its_attractor() {
     for (pendulum, strobe, catalogue) in cases() {
         let fine = fine_strobe(pendulum, 2 * strobe.steps(), simd());
         assert!(!catalogue.traps.ellipses.is_empty(), "{pendulum:?}");

@@ -126,7 +126,7 @@ fn starts_with_unknown_ends_are_left_out() {
 }
 
 #[test]
-fn a_map_has_it_and_a_list_a_hasty_map_or_a_sketch_has_not() {
+fn only_checked_grids_have_an_uncertainty() {
     let pendulum = driven(0.1, 0.6, 2.0);
     let made = |starts: &Starts, check: bool| {
         let options = Options { check, ..Options::default() };

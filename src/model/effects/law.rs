@@ -2,10 +2,10 @@
 
 use std::hint::black_box;
 
+pub use super::parameter::{Parameter, Parameters, Power, Role};
 use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 use crate::model::drive::Motion;
-use crate::model::formula::ParameterSpec;
 
 /// No effect has more parameters.
 pub const MOST_PARAMETERS: usize = 3;
@@ -123,132 +123,6 @@ impl Mappable {
             Self::Frozen => "frozen",
             Self::No => "no",
         }
-    }
-}
-
-/// How a parameter scales: its value in SI units is the one without dimensions times a power of
-/// `w0`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Power {
-    /// `w0^k`.
-    Of(i32),
-    /// `w0^k` where `k` is not whole.
-    Real(f64),
-    /// `w0^(2 - n)` where `n` is the effect's parameter of that place.
-    TwoMinus(usize),
-}
-
-/// The role of a parameter in its effect. A search asks for the role, never for a name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// How strong the effect is: at 0 there is none.
-    Size,
-    /// How far it reaches, in angle or velocity.
-    Width,
-    /// The angle at which it acts, on either side of the rest.
-    Place,
-    /// An exponent.
-    Power,
-    /// How many times it repeats in a turn: a whole number.
-    Order,
-    /// How long it takes.
-    Time,
-    /// An angle that may be anything within a turn.
-    Phase,
-    /// How often it repeats: records tell frequencies apart that differ by less than one in their span.
-    Frequency,
-    /// When it happens.
-    Instant,
-    /// The frequency of a mode of the rig, or its damping ratio.
-    Mode,
-}
-
-impl Role {
-    /// All of them.
-    pub const ALL: [Self; 10] = [
-        Self::Size,
-        Self::Width,
-        Self::Place,
-        Self::Power,
-        Self::Order,
-        Self::Time,
-        Self::Phase,
-        Self::Frequency,
-        Self::Instant,
-        Self::Mode,
-    ];
-
-    /// The words for it.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Size => "size",
-            Self::Width => "width",
-            Self::Place => "place",
-            Self::Power => "power",
-            Self::Order => "order",
-            Self::Time => "time constant",
-            Self::Phase => "phase",
-            Self::Frequency => "frequency",
-            Self::Instant => "instant",
-            Self::Mode => "mode",
-        }
-    }
-}
-
-/// A parameter of an effect.
-#[derive(Clone, Copy, Debug)]
-pub struct Parameter<'a> {
-    /// Its name in model files.
-    pub name: &'a str,
-    /// Its role.
-    pub role: Role,
-    /// Its unit in SI.
-    pub unit: &'a str,
-    /// How it scales with `w0`.
-    pub power: Power,
-    /// The least and the greatest value that make sense, without dimensions.
-    pub range: [f64; 2],
-    /// Smallest and largest value of interest: where a search looks.
-    pub typical: [f64; 2],
-    /// Its meaning, in words.
-    pub meaning: &'a str,
-}
-
-/// The parameters of an effect, in order.
-#[derive(Clone, Copy, Debug)]
-pub enum Parameters<'a> {
-    /// Parameters of an effect of the library.
-    Library(&'static [Parameter<'static>]),
-    /// Parameters of a formula.
-    Formula(&'a [ParameterSpec]),
-}
-
-impl<'a> Parameters<'a> {
-    /// How many there are.
-    #[must_use]
-    pub const fn count(self) -> usize {
-        match self {
-            Self::Library(all) => all.len(),
-            Self::Formula(all) => all.len(),
-        }
-    }
-
-    /// The parameter at a place.
-    ///
-    /// # Panics
-    /// If there is no such place.
-    #[must_use]
-    pub fn at(self, place: usize) -> Parameter<'a> {
-        match self {
-            Self::Library(all) => all[place],
-            Self::Formula(all) => all[place].parameter(),
-        }
-    }
-
-    /// All of them.
-    pub fn iter(self) -> impl Iterator<Item = Parameter<'a>> {
-        (0..self.count()).map(move |place| self.at(place))
     }
 }
 

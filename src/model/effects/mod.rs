@@ -5,6 +5,7 @@
 //! effect needs neither: it is a [`Formula`].
 
 pub mod law;
+pub mod parameter;
 
 pub use law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters,
