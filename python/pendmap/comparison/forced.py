@@ -128,9 +128,10 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
     first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
     _, (window,) = window_slopes(first, [run], (), fit.model)
     scale = np.array([1.0, fit.model.w0])
-    covariance = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
+    inverse = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
+    covariance = np.asarray(inverse * np.outer(scale, scale), np.float64)
     ((_, begin, _, theta, velocity),) = first.windows
-    return Start(float(run.time[begin]), theta, velocity, covariance * np.outer(scale, scale))
+    return Start(float(run.time[begin]), theta, velocity, covariance)
 
 
 def simulated_readings(
