@@ -17,7 +17,7 @@ from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.forced_summary import written
 from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.formatting import counted
-from pendmap.identification.methods.joint import as_angles
+from pendmap.identification.readings import as_angles
 from pendmap.units import Units
 
 if TYPE_CHECKING:

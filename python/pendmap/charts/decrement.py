@@ -16,8 +16,7 @@ from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points
 from pendmap.charts.methods import EVEN, MEASURED, MINUS, NOISE, NOISE_SAID, ODD, Z95, look, nothing
 from pendmap.formatting import Estimate, estimate_text
-from pendmap.identification.methods.combined import CUT
-from pendmap.identification.methods.combined import triplets
+from pendmap.identification.methods.combined import CUT, triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pendmap.charts.half_cycles import Course
     from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
-    from pendmap.identification.methods.joint import JointFit
+    from pendmap.identification.methods.trajectory import JointFit
     from pendmap.model import Rig
     from pendmap.records import Run
 
