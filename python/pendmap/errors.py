@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-MOST: Final = 500
-"""Characters of a message."""
+MOST: Final = 500  # Characters of a message
 
 
 def one_line(text: str) -> str:
@@ -60,11 +59,9 @@ MOST_DRAWS: Final = 10_000
 MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1
-MOST_THREADS: Final = 256
-"""Greatest values of arguments."""
+MOST_THREADS: Final = 256  # Greatest values of arguments
 
-_LONGEST: Final = 60
-"""Characters of a value in a message."""
+_LONGEST: Final = 60  # Characters of a value in a message
 
 
 def short_repr(value: object) -> str:

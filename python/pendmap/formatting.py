@@ -14,20 +14,15 @@ if TYPE_CHECKING:
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
-DIGITS: Final = 5
-"""Digits of a number whose uncertainty is not known."""
+DIGITS: Final = 5  # Digits of a number whose uncertainty is not known
 
-PLACES: Final = 10
-"""Most decimal places of a number."""
+PLACES: Final = 10  # Most decimal places of a number
 
-ERROR_DIGITS: Final = 2
-"""Digits of a standard error."""
+ERROR_DIGITS: Final = 2  # Digits of a standard error
 
-MOST_PLACES: Final = 15
-"""Most decimal places of an estimate."""
+MOST_PLACES: Final = 15  # Most decimal places of an estimate
 
-LONG_AGO: Final = 1e3
-"""Time from which six digits are coarser than milliseconds, s."""
+LONG_AGO: Final = 1e3  # Time from which six digits are coarser than milliseconds, s
 
 
 def counted(count: int, noun: str, several: str = "") -> str:

@@ -99,5 +99,4 @@ class Units:
 
 
 SI: Final = Units(si=True).name
-NONDIMENSIONAL: Final = Units()
-"""Units of :class:`pendmap.Pendulum`."""
+NONDIMENSIONAL: Final = Units()  # Units of :class:`pendmap.Pendulum`

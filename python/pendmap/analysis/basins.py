@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 
-DEFAULT_CELLS = 1000
-"""Default number of cells on each side of a map."""
+DEFAULT_CELLS = 1000  # Default number of cells on each side of a map
 RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 _LAYERS: Final = {

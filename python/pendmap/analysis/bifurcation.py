@@ -33,12 +33,9 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-_SAME = 1e-4
-"""Distance, in rad and in units of velocity, below which points of orbits are one."""
-_NEAR = 0.3
-"""Distance, likewise, below which neighbouring attractors may belong to one branch."""
-_LISTED = 12
-"""Branches that a summary lists."""
+_SAME = 1e-4  # Distance, in rad and in units of velocity, below which points of orbits are one
+_NEAR = 0.3  # Distance, likewise, below which neighbouring attractors may belong to one branch
+_LISTED = 12  # Branches that a summary lists
 
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 Floats: TypeAlias = NDArray[np.float64]
 
-_BENT = 2e-3
-"""Largest distance of a drawn line from its curve, in parts of the picture's height."""
+_BENT = 2e-3  # Largest distance of a drawn line from its curve, in parts of the picture's height
 
 _APART = 4e-3
 """Distance of the two sides of a curve below which the curve ends there, in parts of the height."""
@@ -42,17 +41,13 @@ _NOSE = 1e-6
 """Width of an interval in which a curve turns back, below which it is not divided, in parts of the
 picture's width. Beside such a turn the height varies as the square root of the distance."""
 
-_GRADED = 4.5
-"""Largest ratio of an interval to its neighbours."""
+_GRADED = 4.5  # Largest ratio of an interval to its neighbours
 
-_ROUNDS = 24
-"""Halvings of an interval at most."""
-_IN_VIEW = 1.05
-"""Height, in parts of the picture's, up to which curves matter."""
+_ROUNDS = 24  # Halvings of an interval at most
+_IN_VIEW = 1.05  # Height, in parts of the picture's, up to which curves matter
 PLANES = ("omega-p", "e-alpha2")
 """Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
-_HIGHEST = 2.6
-"""Largest ``e`` of a picture in the plane of eq. 1.4, if it was computed."""
+_HIGHEST = 2.6  # Largest ``e`` of a picture in the plane of eq. 1.4, if it was computed.
 
 
 def denser(

@@ -25,26 +25,18 @@ if TYPE_CHECKING:
     Labels = npt.NDArray[np.int16]
 
 
-_LEAST_SCALES: Final = 3
-"""Least number of distances that a power law is fitted to."""
+_LEAST_SCALES: Final = 3  # Least number of distances that a power law is fitted to
 _TELLING: Final = 5.0
 """Variance of a count above which its deviation is normal enough to judge the law by."""
 _UNLIKELY: Final = 0.01
 """Chance of a misfit below which the greatest distance is left out: there the law ends."""
-_PART: Final = 16
-"""Distances on a grid reach up to this part of its shorter side."""
-_STRIPS: Final = 16
-"""Strips of a grid that the jackknife leaves out one by one."""
-_ROUNDS: Final = 100
-"""Steps of Fisher's scoring at most."""
-_TIMES: Final = 1.96
-"""Standard errors in half a 95 % interval."""
-_EPS: Final = 1e-12
-"""Change of the exponent at which its fit has converged; least share."""
-BOX: Final = 5
-"""Side of a box of the basin entropy in cells, as in the core."""
-_MOST_LABELS: Final = 32_767
-"""Labels that a map may have."""
+_PART: Final = 16  # Distances on a grid reach up to this part of its shorter side
+_STRIPS: Final = 16  # Strips of a grid that the jackknife leaves out one by one
+_ROUNDS: Final = 100  # Steps of Fisher's scoring at most
+_TIMES: Final = 1.96  # Standard errors in half a 95 % interval
+_EPS: Final = 1e-12  # Change of the exponent at which its fit has converged; least share
+BOX: Final = 5  # Side of a box of the basin entropy in cells, as in the core
+_MOST_LABELS: Final = 32_767  # Labels that a map may have
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

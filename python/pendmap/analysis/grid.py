@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-FASTEST: Final = 3.0
-"""The greatest velocity of the default window, over ``w0`` with a rig."""
+FASTEST: Final = 3.0  # The greatest velocity of the default window, over ``w0`` with a rig
 
 
 @dataclasses.dataclass(frozen=True)

@@ -41,14 +41,11 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_STARTS: Final = 40_000
-"""Default number of starts."""
-_MOST_STARTS: Final = 10_000_000
-"""Largest number of starts."""
+_STARTS: Final = 40_000  # Default number of starts
+_MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
 """Standard errors by which the exponent must exceed the rate of escape for transient chaos."""
-_DRAWN: Final = 4000
-"""Largest number of periods of a stored survival curve."""
+_DRAWN: Final = 4000  # Largest number of periods of a stored survival curve
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:

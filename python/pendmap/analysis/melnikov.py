@@ -34,20 +34,15 @@ _FASTEST = 14.0
 """A drive that is faster than this many times the orbit's rate at upright rest does less work than
 ``exp(-pi/2 14)`` of its power: that is rounding."""
 
-_RANGE = (0.2, 4.0, 191)
-"""Frequencies of the curve in the figure, where none are given."""
+_RANGE = (0.2, 4.0, 191)  # Frequencies of the curve in the figure, where none are given
 
-_ROUNDING = 1e-13
-"""Work, and torque, below which there is none."""
-_LINEAR = 1e-9
-"""Relative deviation above which the drive's work is not proportional to p."""
-_RESOLVED = 1e-9
-"""Part of the drive's absolute power above which its work is told from rounding."""
+_ROUNDING = 1e-13  # Work, and torque, below which there is none
+_LINEAR = 1e-9  # Relative deviation above which the drive's work is not proportional to p
+_RESOLVED = 1e-9  # Part of the drive's absolute power above which its work is told from rounding
 _REACH, _SPACING = 42.0, 0.1
 """Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
 ``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
-_NODES = 16
-"""Gauss's nodes on a panel of the loop."""
+_NODES = 16  # Gauss's nodes on a panel of the loop
 _HALVED, _WIDTH, _END = 12, 0.5, 20.0
 """Panels of the loop's parameter: halved so often toward the turning point, beside which a small
 torque leaves the other upright rest; then of this width; to where the angle is rounding."""

@@ -19,11 +19,9 @@ from pendmap.errors import (
 )
 from pendmap.files.dataset import FORMAT_VERSION
 
-Progress = Callable[[int, int], object]
-"""Takes the number of units of work done, and in all."""
+Progress = Callable[[int, int], object]  # Takes the number of units of work done, and in all
 
-TOL = 1e-6
-"""Error of a state after 5 periods, where none is given; chooses the step."""
+TOL = 1e-6  # Error of a state after 5 periods, where none is given; chooses the step
 
 
 class Choices(TypedDict):

@@ -27,16 +27,11 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 
-LONGEST = 64
-"""Longest period of an orbit, in forcing periods."""
-_CELLS, _FINER = 200, 4
-"""Cells on each side of the box for each period, up to how many periods."""
-_SAMPLES = 128
-"""Samples in a forcing period of an orbit's path."""
-_TOLERANCE = 1e-9
-"""Error of a path after a period: it is a picture."""
-_LISTED = 12
-"""Orbits that a summary lists."""
+LONGEST = 64  # Longest period of an orbit, in forcing periods
+_CELLS, _FINER = 200, 4  # Cells on each side of the box for each period, up to how many periods
+_SAMPLES = 128  # Samples in a forcing period of an orbit's path
+_TOLERANCE = 1e-9  # Error of a path after a period: it is a picture
+_LISTED = 12  # Orbits that a summary lists
 
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:

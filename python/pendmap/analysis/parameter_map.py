@@ -47,14 +47,10 @@ if TYPE_CHECKING:
 
 CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
 """Comment of the variable ``chaos_periods``."""
-_LISTED = 10
-"""Regimes that a summary lists."""
-_PLACES = 3
-"""Groups of cells with undecided starts that a summary lists."""
-_FREQUENCIES = 81
-"""Frequencies at which the critical curves over a map begin."""
-_STEPS = 10_000
-"""Steps of the progress that two parts of a computation share."""
+_LISTED = 10  # Regimes that a summary lists
+_PLACES = 3  # Groups of cells with undecided starts that a summary lists
+_FREQUENCIES = 81  # Frequencies at which the critical curves over a map begin
+_STEPS = 10_000  # Steps of the progress that two parts of a computation share
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:

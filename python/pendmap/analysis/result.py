@@ -15,12 +15,9 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-OF_TIME: Final = "1/w0 or s"
-"""Unit of times: without dimensions or in SI, as the model is."""
-OF_RATE: Final = "1/tau or 1/s"
-"""Unit of exponents: without dimensions or in SI."""
-OF_VELOCITY: Final = "1 or rad/s"
-"""Unit of velocities: without dimensions or in SI."""
+OF_TIME: Final = "1/w0 or s"  # Unit of times: without dimensions or in SI, as the model is
+OF_RATE: Final = "1/tau or 1/s"  # Unit of exponents: without dimensions or in SI
+OF_VELOCITY: Final = "1 or rad/s"  # Unit of velocities: without dimensions or in SI
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,8 +151,7 @@ OWN: Final = (
     Field("own_omega", "1", "frequency of the model itself", json=False),
 )
 RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
-UNSAID: Final = (VERSION.hidden, FORMAT.hidden)
-"""Versions as attributes alone."""
+UNSAID: Final = (VERSION.hidden, FORMAT.hidden)  # Versions as attributes alone
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")
 )

@@ -24,32 +24,22 @@ if TYPE_CHECKING:
 
 Times = npt.NDArray[np.int64]
 
-LEAST: Final = 100
-"""Least number of captures for a tail."""
+LEAST: Final = 100  # Least number of captures for a tail
 
-LEVEL: Final = 0.05
-"""Level of the tests of a tail: a lower chance rejects the exponential."""
+LEVEL: Final = 0.05  # Level of the tests of a tail: a lower chance rejects the exponential
 
-_BINS: Final = 8
-"""Stretches of the tail, of equal expected captures, whose rates are compared."""
+_BINS: Final = 8  # Stretches of the tail, of equal expected captures, whose rates are compared
 
-_GROWTH: Final = 1.1
-"""Ratio of successive beginnings that are tried."""
+_GROWTH: Final = 1.1  # Ratio of successive beginnings that are tried
 
-_AGREEING: Final = 3
-"""Beginnings in a row that must be exponential."""
-_FOLLOWED: Final = 400
-"""Largest number of trajectories along which deviations are followed."""
-_LONGEST: Final = 400
-"""Largest number of periods of these trajectories."""
-_LEAST_FOLLOWED: Final = 20
-"""Least number of trajectories for an estimate of growth."""
+_AGREEING: Final = 3  # Beginnings in a row that must be exponential
+_FOLLOWED: Final = 400  # Largest number of trajectories along which deviations are followed
+_LONGEST: Final = 400  # Largest number of periods of these trajectories
+_LEAST_FOLLOWED: Final = 20  # Least number of trajectories for an estimate of growth
 _SETTLING: Final = 4.0
 """Power of e by which a trajectory nears an attractor before it counts as captured."""
-_LEAST_SETTLING, _MOST_SETTLING = 10, 500
-"""Bounds of the settling time, periods."""
-_ALIGNED: Final = 5
-"""Periods in which a deviation turns into the direction of growth."""
+_LEAST_SETTLING, _MOST_SETTLING = 10, 500  # Bounds of the settling time, periods
+_ALIGNED: Final = 5  # Periods in which a deviation turns into the direction of growth
 
 
 @dataclass(frozen=True)

@@ -210,14 +210,11 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
-STARTS = 9
-"""Initial conditions of a cell where no number is given."""
-_SPREAD = 1000
-"""Cells on each side of the default box; they decide nothing."""
+STARTS = 9  # Initial conditions of a cell where no number is given
+_SPREAD = 1000  # Cells on each side of the default box; they decide nothing
 _PLASTIC = 1.324717957244746
 """Plastic number, whose powers make the recurrence in two dimensions even."""
-_CELLS = 61
-"""Cells after which initial conditions come again: a prime, so that columns differ too."""
+_CELLS = 61  # Cells after which initial conditions come again: a prime, so that columns differ too
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:

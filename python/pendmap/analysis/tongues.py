@@ -37,19 +37,13 @@ if TYPE_CHECKING:
 
 _Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
-OMEGA, P_MAX = (0.5, 3.0, 200), 6.0
-"""Frequencies and largest amplitude where none are given."""
-MOST_P = 100.0
-"""Largest amplitude that may be asked for."""
+OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Frequencies and largest amplitude where none are given
+MOST_P = 100.0  # Largest amplitude that may be asked for
 _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
-_NO_REST = _core.CriticalAmplitudes.no_rest()
-"""Result for a rest that is no solution."""
-_TIPS = 8
-"""Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping."""
-_STRIP = 1e-6
-"""Width in p of a strip of stability below which a summary leaves it out."""
-NEAR = 0.05
-"""Relative error below which an asymptotic curve is near the exact one."""
+_NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
+_TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
+_STRIP = 1e-6  # Width in p of a strip of stability below which a summary leaves it out
+NEAR = 0.05  # Relative error below which an asymptotic curve is near the exact one
 
 
 def _curves(dataset: xr.Dataset, prefix: str, fold: str = "") -> list[dict[str, Any]]:

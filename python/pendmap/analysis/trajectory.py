@@ -39,16 +39,13 @@ if TYPE_CHECKING:
     Live = Callable[[Floats, Floats, Floats], object]
 
 
-_SAMPLES = 64
-"""Default number of samples a period."""
-_APART = 0.1
-"""Angle between two samples, rad, that looks smooth in the phase plane."""
+_SAMPLES = 64  # Default number of samples a period
+_APART = 0.1  # Angle between two samples, rad, that looks smooth in the phase plane
 _SMOOTH_SAMPLES = 200_000
 """Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
 _MOST_SAMPLES = 2_000_000
 """Samples in all from which on a trajectory has fewer a period than ``_SAMPLES``."""
-_STRONGEST = 1e6
-"""Acceleration of the pivot over gravity up to which a trajectory takes seconds."""
+_STRONGEST = 1e6  # Acceleration of the pivot over gravity up to which a trajectory takes seconds
 _ALIGNMENT, _BATCHES = 0.1, 20
 """Part of a trajectory before the exponent is measured, and batches of it, as in the core."""
 FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 BYTES_OF_CELL = 64
 """Memory of a cell of a basin map while its figure and its recording are made, bytes."""
 
-BYTES_OF_VALUE = 16
-"""Memory of a value of any other dataset while its picture is made, bytes."""
+BYTES_OF_VALUE = 16  # Memory of a value of any other dataset while its picture is made, bytes
 
 VARIABLES = {
     "labels": "label",
@@ -38,10 +37,8 @@ VARIABLES = {
 }
 """Layers by the name a user types, and the variable that holds each."""
 
-SMALL: Final = 0.64
-"""Size of the panel of unreliable labels, relative to those that lead."""
-FLAT: Final = 0.55
-"""Height over width of panels under which they stand below one another."""
+SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to those that lead
+FLAT: Final = 0.55  # Height over width of panels under which they stand below one another
 _SHAPES: Final = {"oscillation": "sPXph8", "inverted_rest": "D"}
 """Markers by kind; the further ones where the colours begin again."""
 _COLOUR_MAPS: Final = {

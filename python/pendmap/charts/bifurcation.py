@@ -19,13 +19,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-MOST: Final = 16
-"""Families that a legend names; the rest are drawn in the grey of what has no name."""
+MOST: Final = 16  # Families that a legend names; the rest are drawn in the grey of what has no name
 _LAYERS: Final = ("theta", "velocity")
-_SIZE: Final = (7.4, 6.8)
-"""Inches of the figure."""
-_HEIGHTS: Final = (2.4, 0.42, 1.6)
-"""Heights of points, sweeps and exponents beside one another."""
+_SIZE: Final = (7.4, 6.8)  # Inches of the figure
+_HEIGHTS: Final = (2.4, 0.42, 1.6)  # Heights of points, sweeps and exponents beside one another
 _SWEEPS: Final = (("up", 0.025), ("down", 0.055))
 """Sweeps, and how far above the angles a recording has them, over the range of these."""
 

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     Pair = tuple[str, str]
     Compared = RunComparison | ForcedComparison
 
-ALL: Final = 3
-"""Runs up to which each has a row."""
+ALL: Final = 3  # Runs up to which each has a row
 CHOSEN: Final = 2
 """Rows where there are more: those held out first, then those that the model misses most."""
 WIDTH: Final = 11.6
@@ -43,22 +42,15 @@ higher than a screen is beside its width."""
 SPREAD: Final = 10.0
 """Ratio of the greatest to the least residual from which they are drawn logarithmically."""
 HELD: Final = "#d55e00"
-NAMED: Final = 40
-"""Runs that are named below a panel at most."""
-DOTS: Final = 6_000
-"""Readings of a decay that are drawn."""
-SAMPLES: Final = 20_000
-"""Samples of a curve that are drawn."""
-WELLS: Final = 14
-"""Wells up to which each has a band."""
+NAMED: Final = 40  # Runs that are named below a panel at most
+DOTS: Final = 6_000  # Readings of a decay that are drawn
+SAMPLES: Final = 20_000  # Samples of a curve that are drawn
+WELLS: Final = 14  # Wells up to which each has a band
 WELL, ENSEMBLE = "#f0f0f0", "#9ecae1"
 """Colours of every other well, and of an ensemble."""
-EVERY: Final = 3
-"""Samples of a measured cycle of which one is drawn."""
-BINS: Final = 24
-"""Bins of a histogram of an ensemble."""
-TALL: Final = 0.36
-"""Height of a histogram, over its row's."""
+EVERY: Final = 3  # Samples of a measured cycle of which one is drawn
+BINS: Final = 24  # Bins of a histogram of an ensemble
+TALL: Final = 0.36  # Height of a histogram, over its row's
 PAIR: Final = ("record", "model")
 OF_PAPER: Final = ("virtual rig", "identified model")
 """Names of what was measured and of the model: of a comparison, and in the paper's figures."""

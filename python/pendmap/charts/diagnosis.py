@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
 
-ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"
-"""Unit of a torque per moment of inertia."""
+ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"  # Unit of a torque per moment of inertia
 OVER_SAID: Final = {
     "angle": "angle (rad)",
     "velocity": "velocity (rad/s)",
@@ -35,18 +34,14 @@ OVER_SAID: Final = {
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 """Candidates that are not told apart from what was found, and all others."""
-RUNS: Final = 3
-"""Runs whose residuals are drawn: those that the baseline misses most."""
+RUNS: Final = 3  # Runs whose residuals are drawn: those that the baseline misses most
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged: what a model lacks is slower."""
 WIDE: Final = 8.0
 """Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
-CYCLES: Final = 3
-"""Free runs in figure 7: those held out first, then the longest."""
-RANKED: Final = 8
-"""Candidates in the ranking."""
-SIZE: Final = (8.6, 12.2)
-"""Width and height of the sheet in inches."""
+CYCLES: Final = 3  # Free runs in figure 7: those held out first, then the longest
+RANKED: Final = 8  # Candidates in the ranking
+SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
 
 
 def sheet(found: Discrepancy) -> Chart:

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.records import Run
 
-NEAR: Final = 6
-"""Half cycles of a near view."""
-POINTS: Final = 500
-"""Places of a near view at which the velocity is computed."""
-SPAN: Final = 0.2
-"""Half width of the stretch a cubic is fitted to, over the length of a half cycle."""
+NEAR: Final = 6  # Half cycles of a near view
+POINTS: Final = 500  # Places of a near view at which the velocity is computed
+SPAN: Final = 0.2  # Half width of the stretch a cubic is fitted to, over the length of a half cycle
 
 
 @dataclasses.dataclass(frozen=True)

@@ -30,22 +30,14 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.records import Run
 
-WIDTH: Final = 8.6
-"""Inches across a column."""
-NEAR: Final = 5
-"""Half cycles of the near views."""
-SAMPLES: Final = 64
-"""Samples of a simulation in a swing."""
-MOST: Final = 6_000
-"""Residuals that are drawn."""
-DOTS: Final = 150
-"""Readings of a near view that are drawn."""
-LINE: Final = 0.2
-"""Inches of a row of the table."""
-LETTERS: Final = 110
-"""Letters of a line below the table."""
-RESTS: Final = "at rest"
-"""Entry of an error where a simulation has come to rest before."""
+WIDTH: Final = 8.6  # Inches across a column
+NEAR: Final = 5  # Half cycles of the near views
+SAMPLES: Final = 64  # Samples of a simulation in a swing
+MOST: Final = 6_000  # Residuals that are drawn
+DOTS: Final = 150  # Readings of a near view that are drawn
+LINE: Final = 0.2  # Inches of a row of the table
+LETTERS: Final = 110  # Letters of a line below the table
+RESTS: Final = "at rest"  # Entry of an error where a simulation has come to rest before
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
 QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s\u00b2)"}
 """Estimates in the table, and the heads of their columns."""

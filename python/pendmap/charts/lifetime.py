@@ -20,17 +20,14 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-SIGMAS: Final = 2.0
-"""Standard errors on each side that a band covers."""
+SIGMAS: Final = 2.0  # Standard errors on each side that a band covers
 FEW: Final = 0.01
 """Share of starts given up at the bound above which curves of single attractors would end there."""
 _FIT, _BAND = "#d55e00", "#f4c3a0"
 _DASHES: Final[tuple[Dash, ...]] = ("-", (5, 1.5), (1.2, 1.2), (5, 1.5, 1.2, 1.5))
 """Dashes of the curves: those of twins lie on one another."""
-_LEAST_SIGNIFICANT: Final = 0.05
-"""Level at which a tail is not exponential."""
-_MARK: Final = (2.0, 2.0)
-"""Dash of the line where the tail begins."""
+_LEAST_SIGNIFICANT: Final = 0.05  # Level at which a tail is not exponential
+_MARK: Final = (2.0, 2.0)  # Dash of the line where the tail begins
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,9 @@ if TYPE_CHECKING:
 
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
-_BINS: Final = 60
-"""Bins of the distribution."""
-_SIGMAS: Final = 2
-"""Standard errors on each side that the band covers."""
-_WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}
-"""Inches of a figure by its number of panels."""
+_BINS: Final = 60  # Bins of the distribution
+_SIGMAS: Final = 2  # Standard errors on each side that the band covers
+_WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Inches of a figure by its number of panels
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:

@@ -23,8 +23,7 @@ Ends = tuple[float, float]
 
 INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
 """Colours of text and axes, of what is secondary, and of warnings."""
-DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)
-"""Dashes: lengths of lines and gaps, in widths of the line."""
+DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)  # Dashes: lengths of lines and gaps, in widths of the line
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

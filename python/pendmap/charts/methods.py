@@ -20,10 +20,8 @@ MEASURED: Final = "#222222"
 NOISE: Final = "#d9d9d9"
 NOISE_SAID: Final = "95 % of the readings' noise"
 """Colour and name of the band that the noise of the readings explains."""
-MINUS: Final = "\N{MINUS SIGN}"
-"""Sign of negative numbers in pictures."""
-Z95: Final = 1.959963984540054
-"""Half the width of a 95 % interval, in standard errors."""
+MINUS: Final = "\N{MINUS SIGN}"  # Sign of negative numbers in pictures
+Z95: Final = 1.959963984540054  # Half the width of a 95 % interval, in standard errors
 
 
 @dataclasses.dataclass(frozen=True)

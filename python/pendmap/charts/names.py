@@ -23,18 +23,13 @@ if TYPE_CHECKING:
 _TAU: Final = "\N{GREEK SMALL LETTER TAU}"
 _THETA: Final = "\N{GREEK SMALL LETTER THETA}"
 
-ANGLE: Final = f"{_THETA} (rad)"
-"""The angle, with its unit."""
-TIME: Final = "t (s)"
-"""Time in SI, with its unit."""
-_TURN: Final = 2.0
-"""Range of angles from which multiples of pi are their labels, rad."""
-_LONG: Final = 5
-"""Characters of a label beyond which an axis is in thousandths of its unit."""
+ANGLE: Final = f"{_THETA} (rad)"  # The angle, with its unit
+TIME: Final = "t (s)"  # Time in SI, with its unit
+_TURN: Final = 2.0  # Range of angles from which multiples of pi are their labels, rad
+_LONG: Final = 5  # Characters of a label beyond which an axis is in thousandths of its unit
 _MOSTLY: Final = 95
 """Percent of the curve nearest to 0 in the straight part of a signed logarithmic axis."""
-_NEAR: Final = 12.0
-"""Reach of an axis, over its straight part, up to which it is not logarithmic."""
+_NEAR: Final = 12.0  # Reach of an axis, over its straight part, up to which it is not logarithmic
 _BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
 _SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
 """Parameters of a model without dimensions and of one in SI, in the order of a subtitle."""

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-MOST: Final = 16
-"""Orbits that are named: of more the legend says how many there are."""
+MOST: Final = 16  # Orbits that are named: of more the legend says how many there are
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:

@@ -32,12 +32,9 @@ LAYERS = {
 
 _RECORDED: Final = ("exponent", "attractors", "undecided")
 """Layers that a recording has beside those that lead."""
-_STRIPES: Final = 100
-"""Stripes across a picture."""
-_LEAST_HALF: Final = 0.05
-"""Least part of the other one that a half of the exponents' scale reaches."""
-_MOST_COUNT: Final = 8
-"""Largest number that has its own colour."""
+_STRIPES: Final = 100  # Stripes across a picture
+_LEAST_HALF: Final = 0.05  # Least part of the other one that a half of the exponents' scale reaches
+_MOST_COUNT: Final = 8  # Largest number that has its own colour
 _MOST, _LEAST = 13, 0.002
 """Greatest number of kinds that are named, and least share of the cells that they have."""
 

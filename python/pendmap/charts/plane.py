@@ -17,23 +17,18 @@ if TYPE_CHECKING:
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
 
-FEWEST, MOST = 2.0, 6.5
-"""Steps between ticks that a range of angles may have."""
+FEWEST, MOST = 2.0, 6.5  # Steps between ticks that a range of angles may have
 
-FURTHEST = 1000
-"""Multiples of pi beyond which angles are labelled with plain numbers."""
+FURTHEST = 1000  # Multiples of pi beyond which angles are labelled with plain numbers
 
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, under which its ticks have an offset."""
 
-_FINE = 8
-"""Pixels of the narrowest cell where cells are not equally wide."""
+_FINE = 8  # Pixels of the narrowest cell where cells are not equally wide
 
-LOG_TICKS = 4
-"""Ticks that a logarithmic colour bar has at least, where its range allows."""
+LOG_TICKS = 4  # Ticks that a logarithmic colour bar has at least, where its range allows
 
-MOST_COPIES = 100
-"""Copies of a point, 2 pi apart, that are told apart in a window."""
+MOST_COPIES = 100  # Copies of a point, 2 pi apart, that are told apart in a window
 
 
 def edges(dataset: xr.Dataset, name: str) -> Floats:

@@ -26,20 +26,13 @@ USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"
 FALSE: Final = "#d55e00"
 _BAND: Final = "#ececec"
-MOST_POINTS: Final = 20_000
-"""Residuals that are drawn; more only make a figure large."""
-MOST_LINES: Final = 14
-"""Lines of findings below the panels."""
-MOST_RUNS: Final = 12
-"""Strips of one figure; the text of ``look`` has every run."""
-FEW: Final = 400
-"""Samples under which each is drawn as a dot."""
-APART: Final = 0.22
-"""Inches between numbers in one row."""
-SHORT: Final = 2e-3
-"""Share of the record under which a finding is a point, not a span."""
-WIDTH: Final = 8.6
-"""Inches across a figure."""
+MOST_POINTS: Final = 20_000  # Residuals that are drawn; more only make a figure large
+MOST_LINES: Final = 14  # Lines of findings below the panels
+MOST_RUNS: Final = 12  # Strips of one figure; the text of ``look`` has every run
+FEW: Final = 400  # Samples under which each is drawn as a dot
+APART: Final = 0.22  # Inches between numbers in one row
+SHORT: Final = 2e-3  # Share of the record under which a finding is a point, not a span
+WIDTH: Final = 8.6  # Inches across a figure
 
 
 def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:

@@ -25,8 +25,7 @@ class Builder(Protocol):
         """Return the chart."""
 
 
-BUILDERS: Final[dict[str, Builder]] = {}
-"""Builders of kinds that have no module here."""
+BUILDERS: Final[dict[str, Builder]] = {}  # Builders of kinds that have no module here
 
 
 def kinds() -> list[str]:

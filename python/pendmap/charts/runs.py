@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-COLUMNS: Final = 20
-"""Runs up to which there are two columns; of more there are three."""
+COLUMNS: Final = 20  # Runs up to which there are two columns; of more there are three
 BINS: Final = 10_000
 """Pieces of a panel of which least and greatest angle are drawn, where there are more samples."""
 LOST: Final = 1.5

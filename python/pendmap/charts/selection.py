@@ -50,8 +50,7 @@ _CELLS = {
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
 """Beginnings of the names of attributes that hold for a whole map alone."""
 
-_BLOCK = 1_000_000
-"""Cells that are counted at a time, so that a large map is never converted whole."""
+_BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is never converted whole
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:

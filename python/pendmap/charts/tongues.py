@@ -31,8 +31,7 @@ the drive's period, -1 of twice that."""
 _STABLE, _INVERTED, _FOLD = "#e3ecd8", "#9a6fb0", "#009e73"
 _ROOTS: Final = {"omega-p": ("tongues", ""), "e-alpha2": ("paper", "")}
 """Where a recording has the planes."""
-_DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}
-"""Parameters that vary."""
+_DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}  # Parameters that vary
 
 _SQUARED = "\N{SUPERSCRIPT TWO}"
 _NAMES = {
@@ -46,11 +45,9 @@ _NAMES = {
     ),
 }
 
-_PARTED = 0.3
-"""Asymptotic curves that err more are not drawn: they say nothing there."""
+_PARTED = 0.3  # Asymptotic curves that err more are not drawn: they say nothing there
 
-_TIP = 0.6
-"""An undamped tongue goes down to its tip from below this amplitude."""
+_TIP = 0.6  # An undamped tongue goes down to its tip from below this amplitude
 
 _JUMP = 0.6
 """Lines are joined over a change of p, between two frequencies, of at most this part of the mean

@@ -21,18 +21,15 @@ if TYPE_CHECKING:
 
 LATE: Final = 0.2
 """The last share of a trajectory, drawn dark, so that what it settles to stands out."""
-FLAT: Final = 0.1
-"""Range in rad under which a history counts as a straight line."""
+FLAT: Final = 0.1  # Range in rad under which a history counts as a straight line
 SIZES: Final = ((500, 2.6), (20_000, 1.3), (math.inf, 0.6))
 """Sizes of the points of a section by the number of points up to which they hold."""
-UPSIDE_DOWN: Final = 2.0
-"""Energy over m g l of a pendulum that rests upside down."""
+UPSIDE_DOWN: Final = 2.0  # Energy over m g l of a pendulum that rests upside down
 MOST_DRAWN: Final = 20_000
 """Bins of a curve against time that is drawn by its lowest and highest values."""
 MOST_PERIODS: Final = 200
 """Periods of which the phase curve is drawn whole; of more, the last half of this number."""
-_SIZES: Final = {"history": (8.6, 3.6), "energy": (8.6, 3.6)}
-"""Inches of a figure of one part."""
+_SIZES: Final = {"history": (8.6, 3.6), "energy": (8.6, 3.6)}  # Inches of a figure of one part
 _EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
 
 

@@ -26,8 +26,7 @@ _SIMD = "PENDMAP_SIMD"
 """Environment variable of the instruction set, which every call of the core reads."""
 
 
-RESULTS = (".nc", ".zarr")
-"""Suffixes of files that a dataset is written to."""
+RESULTS = (".nc", ".zarr")  # Suffixes of files that a dataset is written to
 
 
 def option(

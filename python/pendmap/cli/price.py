@@ -14,14 +14,10 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-_TYPICAL: Final = 20
-"""Bound over typical settling time: 60 to 8 for gamma 0.01 to 0.0003."""
-_BESIDE: Final = 5000
-"""Cost of the search for attractors and of the checks, in starts."""
-_SAMPLE: Final = 960
-"""Starts of the measurement of speed."""
-_LEAST_SECONDS: Final = 0.05
-"""Least time of a measurement of speed, s."""
+_TYPICAL: Final = 20  # Bound over typical settling time: 60 to 8 for gamma 0.01 to 0.0003
+_BESIDE: Final = 5000  # Cost of the search for attractors and of the checks, in starts
+_SAMPLE: Final = 960  # Starts of the measurement of speed
+_LEAST_SECONDS: Final = 0.05  # Least time of a measurement of speed, s
 
 
 def say(model: Pendulum | Rig, count: int, given: Mapping[str, Any], *, quiet: bool) -> None:

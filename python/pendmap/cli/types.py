@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-PICTURES = (".png", ".svg", ".pdf")
-"""Suffixes of figures."""
+PICTURES = (".png", ".svg", ".pdf")  # Suffixes of figures
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 

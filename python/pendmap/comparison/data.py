@@ -24,14 +24,11 @@ if TYPE_CHECKING:
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Parts of a run held back where no whole run is: a fifth, at large and at small swings."""
 
-FEWEST_FORCED: Final = 2
-"""Forced runs of which one is held back whole."""
+FEWEST_FORCED: Final = 2  # Forced runs of which one is held back whole
 
-FEWEST_FREE: Final = 3
-"""Free runs of which one is held back whole."""
+FEWEST_FREE: Final = 3  # Free runs of which one is held back whole
 
-FEWEST: Final = 20
-"""Fewest samples of a stretch held back; two of them determine its initial state."""
+FEWEST: Final = 20  # Fewest samples of a stretch held back; two of them determine its initial state
 
 LEAST: Final = round(FEWEST / (HELD[0][1] - HELD[0][0])) + 1
 """Fewest samples of a run of which stretches can be held back."""
@@ -48,11 +45,9 @@ BLOCKS: Final = 50
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps take the time."""
 
-LEAST_OF_BLOCK: Final = 3
-"""Fewest readings of a block."""
+LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
 
-NEIGHBOURS: Final = 2
-"""Blocks on either side through which a parabola is fitted."""
+NEIGHBOURS: Final = 2  # Blocks on either side through which a parabola is fitted
 
 
 @dataclasses.dataclass(frozen=True)

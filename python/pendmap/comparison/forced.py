@@ -41,12 +41,9 @@ if TYPE_CHECKING:
     Simulated = Callable[[Floats, Floats, Floats], Floats]
 
 
-_AT_ONCE: Final = 4_000_000
-"""Samples held in memory at once."""
-_FOLLOWED: Final = 100
-"""Members that are followed until they settle."""
-FEWEST: Final = 32
-"""Samples without which neither the noise nor a start is known."""
+_AT_ONCE: Final = 4_000_000  # Samples held in memory at once
+_FOLLOWED: Final = 100  # Members that are followed until they settle
+FEWEST: Final = 32  # Samples without which neither the noise nor a start is known
 _UNLIKELY: Final = 0.01
 """Chance below which a statistic is reported: of a true model, one of five in 5 % of runs."""
 _STATISTICS: Final = (
@@ -57,10 +54,8 @@ _STATISTICS: Final = (
     ("greatest velocity", "rad/s", "fastest"),
 )
 """Name, unit and field of :class:`Itineraries` of each statistic."""
-_EXACTNESS: Final = 1e-9
-"""Integrator's error allowed a step."""
-_EVEN: Final = (2.5, 97.5)
-"""Ends of the middle 95 %, percent."""
+_EXACTNESS: Final = 1e-9  # Integrator's error allowed a step
+_EVEN: Final = (2.5, 97.5)  # Ends of the middle 95 %, percent
 
 
 @dataclasses.dataclass(frozen=True)

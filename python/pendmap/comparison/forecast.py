@@ -41,27 +41,21 @@ if TYPE_CHECKING:
 REACH: Final = 2 / 3
 """Length of a forecast over that of its stretch; it may start anywhere in the rest."""
 
-STARTS: Final = 12
-"""Most starts in a stretch, at least half a swing apart."""
+STARTS: Final = 12  # Most starts in a stretch, at least half a swing apart
 
-BINS: Final = 40
-"""Most bins of the horizon, each at least a tenth of a swing."""
+BINS: Final = 40  # Most bins of the horizon, each at least a tenth of a swing
 
-FEWEST: Final = 8
-"""Fewest readings to which an initial state is fitted."""
+FEWEST: Final = 8  # Fewest readings to which an initial state is fitted
 
-BEGIN: Final = 0.15
-"""Part of a swing over which a parabola gives the first guess of a state."""
+BEGIN: Final = 0.15  # Part of a swing over which a parabola gives the first guess of a state
 
 BEFORE: Final = "before"
-AFTER: Final = "after"
-"""Names of the baseline and of the better model."""
+AFTER: Final = "after"  # Names of the baseline and of the better model
 
 PER_SWING: Final = 200
 """Instants of a swing between which cubics interpolate a peak, to 1e-7 of the swing."""
 
-FEWEST_PEAKS: Final = 3
-"""Peaks of one full cycle."""
+FEWEST_PEAKS: Final = 3  # Peaks of one full cycle
 
 
 @dataclasses.dataclass(frozen=True)

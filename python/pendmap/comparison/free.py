@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-MODEL = "model"
-"""Name of the model in table 1."""
+MODEL = "model"  # Name of the model in table 1
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

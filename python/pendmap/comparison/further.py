@@ -13,8 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-Reasons = dict[str, str]
-"""Why a part was not computed, by its field in the JSON object."""
+Reasons = dict[str, str]  # Why a part was not computed, by its field in the JSON object
 
 Part = TypeVar("Part")
 

@@ -21,21 +21,17 @@ if TYPE_CHECKING:
     Whole = NDArray[np.int64]
 
 
-LONGEST: Final = 8
-"""Longest cycle that is looked for, forcing periods."""
+LONGEST: Final = 8  # Longest cycle that is looked for, forcing periods
 
 _MARGIN: Final = 0.1
 """Angle below both tops from which a path is in a well, rad: noise at the top is no escape."""
 _REPEATED: Final = 0.05
 """Distance within which readings repeat themselves, rad, if six times the noise is less."""
-_NOISES: Final = 6.0
-"""Distance within which readings repeat themselves, in noises."""
-_HELD: Final = 5
-"""Periods for which a motion must repeat itself to have settled."""
+_NOISES: Final = 6.0  # Distance within which readings repeat themselves, in noises
+_HELD: Final = 5  # Periods for which a motion must repeat itself to have settled
 _SWING: Final = 0.06
 """Half window of the local polynomials that give velocities, over a small swing."""
-_DEGREE: Final = 3
-"""Degree of these polynomials."""
+_DEGREE: Final = 3  # Degree of these polynomials
 
 
 @dataclasses.dataclass(frozen=True)

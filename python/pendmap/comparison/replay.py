@@ -26,11 +26,9 @@ if TYPE_CHECKING:
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")
 """Parameters kept beside the model: fitted damping may be negative, which no model allows."""
 
-STATE_STEPS: Final = 12
-"""Most steps of the least-squares search for initial states."""
+STATE_STEPS: Final = 12  # Most steps of the least-squares search for initial states
 
-INSTANTS: Final = 150
-"""Instants of the records at which the torque of an effect is evaluated."""
+INSTANTS: Final = 150  # Instants of the records at which the torque of an effect is evaluated
 
 STEP: Final = 1e-3
 """Length of the run from each instant, in small swings: the motion hardly changes in it."""

@@ -20,24 +20,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-SAMPLES: Final = 64
-"""Samples of a cycle in a forcing period."""
-_HARMONICS: Final = 12
-"""Harmonics of the drive that a cycle has: higher ones are noise."""
-_CYCLES: Final = 50
-"""Cycles at the end of a record that are averaged, at most."""
-_STEADY: Final = 0.01
-"""Cycles are averaged from where their halves differ by less, rad rms."""
-_AT_REST: Final = 0.05
-"""Amplitude below which a cycle is rest, rad."""
+SAMPLES: Final = 64  # Samples of a cycle in a forcing period
+_HARMONICS: Final = 12  # Harmonics of the drive that a cycle has: higher ones are noise
+_CYCLES: Final = 50  # Cycles at the end of a record that are averaged, at most
+_STEADY: Final = 0.01  # Cycles are averaged from where their halves differ by less, rad rms
+_AT_REST: Final = 0.05  # Amplitude below which a cycle is rest, rad
 _DECAY: Final = 10.0
 """Power of e by which viscous damping shrinks a transient before cycles are looked for."""
-_FOLLOWED: Final = (100, 2000)
-"""Least and greatest number of periods of that."""
-_CLOSED: Final = 1e-3
-"""Distance within which a motion must close to be on a cycle, rad."""
-_ONE: Final = 0.02
-"""Distance below which two cycles are one, rad."""
+_FOLLOWED: Final = (100, 2000)  # Least and greatest number of periods of that
+_CLOSED: Final = 1e-3  # Distance within which a motion must close to be on a cycle, rad
+_ONE: Final = 0.02  # Distance below which two cycles are one, rad
 
 
 @dataclasses.dataclass(frozen=True)

@@ -39,11 +39,9 @@ equal parts where that includes 0."""
 SOUGHT: Final = 1000
 """Values of a frequency or an instant among which the residuals choose those that are scored."""
 
-MODES: Final = 3
-"""Scored values of a mode's frequency; a fast mode needs short steps."""
+MODES: Final = 3  # Scored values of a mode's frequency; a fast mode needs short steps
 
-PLACES: Final = 9
-"""Scored places on the circle, in equal steps."""
+PLACES: Final = 9  # Scored places on the circle, in equal steps
 
 FAINT: Final = 1e-12
 """Nondimensional size at which an effect with a phase is scored: not 0, and far below what any

@@ -29,38 +29,29 @@ Windows = tuple[tuple[int, int, int, float, float], ...]
 Given = ParamSpec("Given")
 Found = TypeVar("Found")
 
-MOST_STEPS: Final = 40
-"""Most steps of a fit."""
+MOST_STEPS: Final = 40  # Most steps of a fit
 
-QUICK: Final = 4.0
-"""Growth of windows from stage to stage of a fit."""
+QUICK: Final = 4.0  # Growth of windows from stage to stage of a fit
 
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one reading's, below which a fit ends."""
 
-LEAST_LEVEL: Final = 0.5
-"""Least variance of noise over the stated variance of its readings."""
+LEAST_LEVEL: Final = 0.5  # Least variance of noise over the stated variance of its readings
 
 EXACT: Final = 1e-3
 """Promised fall of the sum of squares, over one reading's, below which a fit has converged."""
 
-FEW_STEPS: Final = 12
-"""Most steps of a candidate's fit; the right candidate needs about five."""
+FEW_STEPS: Final = 12  # Most steps of a candidate's fit; the right candidate needs about five
 
-SIZED_STEPS: Final = 5
-"""Most steps of the fit of a size before its shape is fitted."""
+SIZED_STEPS: Final = 5  # Most steps of the fit of a size before its shape is fitted
 
-NEAR_STEPS: Final = 6
-"""Most steps of a fit after an exponent was moved."""
+NEAR_STEPS: Final = 6  # Most steps of a fit after an exponent was moved
 
-OPPOSING: Final = ("c_over_m", "Tr")
-"""Coefficients that oppose the motion and are at least 0."""
+OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 
-ERRORS: Final = 3.0
-"""Standard errors by which an estimate may exceed a physical limit."""
+ERRORS: Final = 3.0  # Standard errors by which an estimate may exceed a physical limit
 
-STRETCH: Final = 2.0
-"""Factor by which a width may leave its typical range."""
+STRETCH: Final = 2.0  # Factor by which a width may leave its typical range
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel, Windows
     from pendmap.identification.runs import FitRun
 
-FOLDS: Final = 5
-"""Folds of stretches left out in turn; two fixed stretches alone depend on chance."""
+FOLDS: Final = 5  # Folds of stretches left out in turn; two fixed stretches alone depend on chance
 
 
 @dataclasses.dataclass(frozen=True)

@@ -30,14 +30,11 @@ and a phase needs a size above 0."""
 FAINT: Final = 5.0
 """Size of an effect, in standard errors, up to which the covariance gives the fit without it."""
 
-MIRROR_STEPS: Final = 6
-"""Most steps of a fit from a mirrored place that must be better."""
+MIRROR_STEPS: Final = 6  # Most steps of a fit from a mirrored place that must be better
 
-EQUIVALENT_STEPS: Final = 25
-"""Most steps of a fit from another shape that must be as good."""
+EQUIVALENT_STEPS: Final = 25  # Most steps of a fit from another shape that must be as good
 
-Z95: Final = 1.959963984540054
-"""The 97.5 % point of the standard normal distribution."""
+Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
 
 Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 

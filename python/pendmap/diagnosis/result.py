@@ -48,17 +48,13 @@ PLACES: Final[dict[str, str]] = {
 }
 """Words before the place of a missing torque."""
 
-TORQUE: Final = unit_of("torque")
-"""Unit of a torque per moment of inertia."""
+TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 
-WHERE: Final = 3
-"""Number of places of a residual torque in the summary."""
+WHERE: Final = 3  # Number of places of a residual torque in the summary
 
-RANKED: Final = 8
-"""Number of candidates in the table of scores."""
+RANKED: Final = 8  # Number of candidates in the table of scores
 
-MOST_EFFECTS: Final = 3
-"""Default of the most effects that are added."""
+MOST_EFFECTS: Final = 3  # Default of the most effects that are added
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PASS: Final = 16
-"""Directions of derivatives that one pass of the integrator computes."""
+PASS: Final = 16  # Directions of derivatives that one pass of the integrator computes
 
 CONTAINS: Final = 0.99
 """Cosine between the responses to two effects from which the one with more parameters has the other

@@ -23,11 +23,9 @@ if TYPE_CHECKING:
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
-SEVERAL: Final = 1.0
-"""Standard errors by which the greatest excess of several runs is reduced."""
+SEVERAL: Final = 1.0  # Standard errors by which the greatest excess of several runs is reduced
 
-THIRDS: Final = 3
-"""Parts of a single run; a name must be better without any one of them."""
+THIRDS: Final = 3  # Parts of a single run; a name must be better without any one of them
 
 COEFFICIENTS: Final = (1.94, 0.13, -1.65, 0.74, 0.8)
 """``b0`` to ``b4`` of the probability of a name, from 163 names, of which 111 were right: 227
@@ -36,8 +34,7 @@ experiments of the seed 8401, 67 of them with disturbances that no effect descri
 LEAST_CHANCE: Final = 1e-6
 """Probability by noise alone below which the probability of a name no longer falls."""
 
-GAINS: Final = (10.0, 1e5)
-"""Range to which gains are clipped for the probability of a name."""
+GAINS: Final = (10.0, 1e5)  # Range to which gains are clipped for the probability of a name
 
 
 @dataclasses.dataclass(frozen=True)

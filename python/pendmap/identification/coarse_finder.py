@@ -33,18 +33,15 @@ if TYPE_CHECKING:
 COARSE: Final = 20.0
 """Samples a period of small swings below which nine of them, which a quartic needs, reach too
 far."""
-_FINE: Final = 32
-"""Points a period of the curve through the samples in which turns are looked for."""
-_GAP: Final = 2.5
-"""Pause in samples that is a gap."""
+_FINE: Final = 32  # Points a period of the curve through the samples in which turns are looked for
+_GAP: Final = 2.5  # Pause in samples that is a gap
 _CLEAR: Final = 0.02
 """Noise over the range of the angle, assumed until it is known: only large swings count."""
 _LONGEST: Final = 0.8
 """Greatest half width of a turn's window, half swings: friction changes its sign at the next."""
 _LEAST: Final = 3.2
 """Half width of a turn's window, samples, where that is more than a quarter swing."""
-_BESIDE: Final = 0.95
-"""Half width of a crossing's window, quarter swings."""
+_BESIDE: Final = 0.95  # Half width of a crossing's window, quarter swings
 
 
 def is_coarse(time: Floats, theta: Floats) -> bool:

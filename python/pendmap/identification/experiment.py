@@ -38,8 +38,7 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 
-MISSES: Final = 1.2
-"""Residual over noise above which quadratic drag is tried."""
+MISSES: Final = 1.2  # Residual over noise above which quadratic drag is tried
 
 
 def decay_of(experiment: Experiment) -> Run:

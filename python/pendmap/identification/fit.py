@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
 
 
-LEVEL: Final = 3.841458820694124
-"""95 % point of chi-squared with one degree of freedom."""
+LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of freedom
 
 
 @dataclasses.dataclass(frozen=True)

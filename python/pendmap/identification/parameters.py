@@ -36,8 +36,7 @@ PLACES: Final[Mapping[str, tuple[str, float]]] = {
 SENSOR: Final = ("bias", "tilt")
 """Parameters of a sensor on the rod, run by run: they are always fitted."""
 
-PER_RUN: Final = ("p", "Omega", "phi")
-"""Parameters of the drive of one run."""
+PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run
 
 
 @dataclasses.dataclass(frozen=True)

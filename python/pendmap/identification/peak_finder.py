@@ -25,16 +25,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_BIAS: Final = 0.25
-"""Bias allowed in a peak's amplitude, in standard errors."""
+_BIAS: Final = 0.25  # Bias allowed in a peak's amplitude, in standard errors
 _WIDEST: Final = 1.3
 """Greatest half width of a peak's window, radians of phase w0 t: a quarter swing is 1.57."""
-_SHOW: Final = 6
-"""Peaks from which friction is estimated."""
-_CROSSING: Final = 0.6
-"""Half width of a crossing's window, radians of phase w0 t."""
-_FEWEST: Final = 8
-"""Samples of a peak's window."""
+_SHOW: Final = 6  # Peaks from which friction is estimated
+_CROSSING: Final = 0.6  # Half width of a crossing's window, radians of phase w0 t
+_FEWEST: Final = 8  # Samples of a peak's window
 
 
 class Finder:

@@ -73,8 +73,7 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
     return Frequency(w0, math.sqrt(float(covariance[0, 0])) * w0**2 * root, misfit)
 
 
-_ROUNDS = 4
-"""Iterations of each half cycle's energy balance."""
+_ROUNDS = 4  # Iterations of each half cycle's energy balance
 
 
 def viscous_work(amplitude: Floats) -> Floats:

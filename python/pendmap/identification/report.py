@@ -34,14 +34,11 @@ COLUMNS: Final = {
 }
 """Columns of the table of methods and their heads; effects' parameters follow."""
 
-STILL: Final = "in which nothing moves"
-"""Description of a run without motion."""
+STILL: Final = "in which nothing moves"  # Description of a run without motion
 
-PEAKS: Final = "of peaks alone"
-"""Description of a run of turning points."""
+PEAKS: Final = "of peaks alone"  # Description of a run of turning points
 
-COPY: Final = "that copies another"
-"""Description of a run whose readings count in another one."""
+COPY: Final = "that copies another"  # Description of a run whose readings count in another one
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

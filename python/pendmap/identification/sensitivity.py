@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-STATE: Final = 2
-"""Columns of an initial state."""
+STATE: Final = 2  # Columns of an initial state
 
 FOLLOWED: Final = 1e-6
 """Part of a column below which its remainder after the projection is rounding: set to 0."""

@@ -18,16 +18,11 @@ if TYPE_CHECKING:
 
 BLOCK: Final = 12
 """Turns in a row that share their form: ``w0^2``, both dampings and the rest position."""
-_ROUNDS: Final = 12
-"""Most Gauss-Newton steps."""
-_SETTLED: Final = 6
-"""Rounds after which no more samples are left out."""
-_LOSS: Final = 4
-"""Turns from which the loss of a swing is estimated."""
-_OUTLIER: Final = 5.0
-"""Standard deviations beyond which a sample is left out."""
-_DOUBT: Final = 3.0
-"""Standard errors of a block's noise beyond which its misfit is the form's."""
+_ROUNDS: Final = 12  # Most Gauss-Newton steps
+_SETTLED: Final = 6  # Rounds after which no more samples are left out
+_LOSS: Final = 4  # Turns from which the loss of a swing is estimated
+_OUTLIER: Final = 5.0  # Standard deviations beyond which a sample is left out
+_DOUBT: Final = 3.0  # Standard errors of a block's noise beyond which its misfit is the form's
 _NORMAL_MAD: Final = 0.674489750196
 
 

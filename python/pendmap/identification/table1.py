@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s; the shortest one of a slower rig stands for the first."""
-PEAKS: Final = (1.2, 2.53)
-"""Peaks of the paper's table, rad."""
+PEAKS: Final = (1.2, 2.53)  # Peaks of the paper's table, rad
 
 ROUGH: Final = (
     "no errors of periods and peaks: the angle is made of an acceleration, too roughly to judge a "
@@ -34,8 +33,7 @@ ROUGH: Final = (
 )
 """Why a record of an acceleration alone has no table."""
 
-_SAME: Final = 1e-9
-"""Interval below which events are one, s."""
+_SAME: Final = 1e-9  # Interval below which events are one, s
 
 
 @dataclasses.dataclass(frozen=True)

@@ -21,14 +21,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_SMOOTHING: Final = 0.1
-"""Half width of the running mean over the period."""
-_SURE: Final = 6.0
-"""Standard errors by which the angle must come back for a turn to count."""
-_FEWEST: Final = 8
-"""Samples that a record must have."""
-_GAP: Final = 10.0
-"""Pause in samples that is a gap, before the period is known."""
+_SMOOTHING: Final = 0.1  # Half width of the running mean over the period
+_SURE: Final = 6.0  # Standard errors by which the angle must come back for a turn to count
+_FEWEST: Final = 8  # Samples that a record must have
+_GAP: Final = 10.0  # Pause in samples that is a gap, before the period is known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,14 +132,12 @@ def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[
     return np.array(kept, np.intp)
 
 
-_RESOLVED: Final = 8.0
-"""Standard errors by which a peak must differ from the one before."""
+_RESOLVED: Final = 8.0  # Standard errors by which a peak must differ from the one before
 _SURE_END: Final = 4.0
 """Standard errors by which a velocity at the release, or a way to the stop, is seen."""
 _LATENESS: Final = 5 / 32
 """Slope at 0 of the quartic fitted to ``s abs(s)``, over 2 and over the window."""
-_DOUBT: Final = 0.2
-"""Part of the lateness by friction that counts as error."""
+_DOUBT: Final = 0.2  # Part of the lateness by friction that counts as error
 _STILL: Final = 1e-3
 """Velocity over amplitude and w0 that counts as 0: the error of the even form itself."""
 
@@ -266,10 +260,8 @@ def _joined(
     return End(at, float(coefficients[0]), min(error, half), level_error, kind)
 
 
-FEWEST_SWINGS: Final = 2
-"""Half swings that a start needs."""
-QUIET: Final = 10.0
-"""Standard errors within which readings at rest lie."""
+FEWEST_SWINGS: Final = 2  # Half swings that a start needs
+QUIET: Final = 10.0  # Standard errors within which readings at rest lie
 
 
 def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:

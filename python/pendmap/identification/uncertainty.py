@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-Z95: Final = 1.959963984540054
-"""97.5 % point of the standard normal distribution."""
+Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
 
 
 def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats) -> Floats:

@@ -23,26 +23,19 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
-STAGES: Final = 8
-"""Most exponents tried."""
+STAGES: Final = 8  # Most exponents tried
 
-REACH: Final = 0.2
-"""Longest step of an exponent: less than the spacing of the scan."""
+REACH: Final = 0.2  # Longest step of an exponent: less than the spacing of the scan
 
-FARTHEST: Final = 3.0
-"""Largest change of the logarithm of a size in one step."""
+FARTHEST: Final = 3.0  # Largest change of the logarithm of a size in one step
 
-SHORTER: Final = 0.25
-"""Factor on the reach after a step that made the fit worse."""
+SHORTER: Final = 0.25  # Factor on the reach after a step that made the fit worse
 
-SHORTEST: Final = 0.01
-"""Least reach: the search ends below it."""
+SHORTEST: Final = 0.01  # Least reach: the search ends below it
 
-PROMISED: Final = 0.01
-"""Expected gain in the sum of squares below which the search ends."""
+PROMISED: Final = 0.01  # Expected gain in the sum of squares below which the search ends
 
-HOPE: Final = 3.0
-"""Upper bound on the gain of a step, as a multiple of the expected gain."""
+HOPE: Final = 3.0  # Upper bound on the gain of a step, as a multiple of the expected gain
 
 
 def nearer(  # noqa: PLR0913 (what to fit, and how)

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MISSES: Final = 1.5
-"""Residual over noise above which a model misses its record."""
+MISSES: Final = 1.5  # Residual over noise above which a model misses its record
 _ROUNDING: Final = 1e-9
 """Largest negative eigenvalue of a correlation per parameter that is rounding."""
 

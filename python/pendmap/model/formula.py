@@ -27,8 +27,7 @@ FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
 _EXAMPLES: Final = {"name": '"cubic"', "term": '"-k*v^3"', "parameters": "{ k = -1 }"}
 """Keys that a formula needs, with examples for messages."""
-_TYPICAL: Final = (1e-4, 0.3)
-"""Default values of interest: those of the library's sizes."""
+_TYPICAL: Final = (1e-4, 0.3)  # Default values of interest: those of the library's sizes
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
 

@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-GRAVITY: Final = 9.81
-"""Acceleration of gravity where none is given, m/s^2."""
+GRAVITY: Final = 9.81  # Acceleration of gravity where none is given, m/s^2
 
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
     "w0": ("w0", "length_m"),
@@ -28,8 +27,7 @@ OPTIONAL: Final = ("Tr", "torque", "phi", "lab_time_s", "gravity")
 _POSITIVE: Final = ("length_m", "gravity", "Omega", "frequency_hz")
 _W0: Final = (1e-6, 1e6)
 _NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Y", "stroke_mm")
-_AGREE: Final = 1e-3
-"""Largest relative difference of two numbers for one quantity: rounded digits."""
+_AGREE: Final = 1e-3  # Largest relative difference of two numbers for one quantity: rounded digits
 
 
 def check(name: str, value: object) -> float:

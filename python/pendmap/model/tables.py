@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable
 
-FORMAT: Final = 1
-"""Version of the layout of model files, in their key ``format_version``."""
+FORMAT: Final = 1  # Version of the layout of model files, in their key ``format_version``
 TOP: Final = ("pendulum", "formula", "effect", "covariance", "provenance", "format_version")
 NOTES: Final = ("covariance", "provenance")
 EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")

@@ -33,8 +33,7 @@ FIGURES: Final = {
     TABLE: "Damping by each method, and what its simulation misses (%)",
 }
 """Titles of the figures, by the names a user types."""
-_TRANSIENT: Final = 500
-"""Forcing periods before figure 2 begins."""
+_TRANSIENT: Final = 500  # Forcing periods before figure 2 begins
 _RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s\u00b2"
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
@@ -46,12 +45,9 @@ PRINTED: Final = {
 """The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
 
-_SQUARES: Final = (0.05, 1.6)
-"""Range of alpha^2 of figure 1."""
-_HIGHEST: Final = 2.6
-"""Largest e of figure 1."""
-_COLUMNS: Final = 120
-"""Number of frequencies of figure 1."""
+_SQUARES: Final = (0.05, 1.6)  # Range of alpha^2 of figure 1
+_HIGHEST: Final = 2.6  # Largest e of figure 1
+_COLUMNS: Final = 120  # Number of frequencies of figure 1
 
 
 def wanted(name: str) -> list[str]:

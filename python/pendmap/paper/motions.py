@@ -24,20 +24,14 @@ STEADY: Final = (
 kind, period, turns."""
 TUMBLING: Final = ((0.6, 2.0, 2.0, 6.0), (0.4, 2.0, 2.0, 6.0))
 """``p``, ``Omega / 6.2 rad/s``, angle (rad) and velocity (rad/s) of the start."""
-SECONDS = 2500.0
-"""Time after which the paper takes its steady states, s."""
+SECONDS = 2500.0  # Time after which the paper takes its steady states, s
 TUMBLED = 300.0
 """Length of a run that tumbles, s: all but a fiftieth of the ensembles beside it settle in it."""
-_W0: Final = 6.2
-"""Natural frequency of the paper's rig, rad/s."""
-_CELLS: Final = 100
-"""Cells a side of the basin map in which starts are chosen."""
-_FASTEST: Final = 18.0
-"""Largest velocity of that map, rad/s."""
-_RATE: Final = 50.0
-"""Samples a second of the long runs."""
-_MEMBERS: Final = 40
-"""Starts of the ensemble beside a run of 2500 s."""
+_W0: Final = 6.2  # Natural frequency of the paper's rig, rad/s
+_CELLS: Final = 100  # Cells a side of the basin map in which starts are chosen
+_FASTEST: Final = 18.0  # Largest velocity of that map, rad/s
+_RATE: Final = 50.0  # Samples a second of the long runs
+_MEMBERS: Final = 40  # Starts of the ensemble beside a run of 2500 s
 
 
 def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:

@@ -16,12 +16,9 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
 
 TITLE: Final = "The parametric pendulum"
-SIZE: Final = (6.0, 5.6)
-"""Inches."""
-HEAD: Final = 0.95
-"""Inches of title, subtitle and margins."""
-THETA: Final = math.radians(38.0)
-"""Angle of the pendulum."""
+SIZE: Final = (6.0, 5.6)  # Inches
+HEAD: Final = 0.95  # Inches of title, subtitle and margins
+THETA: Final = math.radians(38.0)  # Angle of the pendulum
 LENGTH: Final = 3.0
 BOB: Final = 0.3
 ASIDE: Final = 0.5

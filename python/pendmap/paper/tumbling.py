@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-HISTORY, CURVE = 60, 100
-"""Periods of the time history and of the phase curve, the first ones."""
+HISTORY, CURVE = 60, 100  # Periods of the time history and of the phase curve, the first ones
 
 _INK = "#1d3557"
 

@@ -37,10 +37,8 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 """Inches across a panel: of several side by side, of the only one, of those below one another."""
 BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
 """Inches that names and labels take beside a panel, a bar, those below it, a row of a legend."""
-LEAST: Final = 0.5
-"""Inches that a panel needs."""
-HEADING: Final = 0.32
-"""Inches of the heading of a chart on a sheet."""
+LEAST: Final = 0.5  # Inches that a panel needs
+HEADING: Final = 0.32  # Inches of the heading of a chart on a sheet
 SMALLEST: Final = (0.88, 0.72)
 """Width and height over their own with which a sheet remains readable."""
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"

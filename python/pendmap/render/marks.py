@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Mark
 
-TABLE, APART = 8.0, 0.14
-"""Size of a table's letters, and inches between its columns at least."""
-MANY: Final = 2000
-"""Points from which on they are drawn as pixels also in a file of vectors."""
+TABLE, APART = 8.0, 0.14  # Size of a table's letters, and inches between its columns at least
+MANY: Final = 2000  # Points from which on they are drawn as pixels also in a file of vectors
 
 
 def draw(axes: Axes, mark: Mark) -> None:

@@ -22,11 +22,9 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
     from pendmap.report.document import Document
 
-SUFFIXES: Final = (".html", ".md")
-"""The kinds of file that a report is."""
+SUFFIXES: Final = (".html", ".md")  # The kinds of file that a report is
 
-DPI: Final = 110.0
-"""Pixels per inch: sharp on a screen, and the file stays under a megabyte."""
+DPI: Final = 110.0  # Pixels per inch: sharp on a screen, and the file stays under a megabyte
 
 
 def figures(found: Discrepancy) -> dict[str, Figure]:

@@ -50,11 +50,9 @@ RC: dict[Any, Any] = {
     "agg.path.chunksize": 20000,
 }
 
-MOST, PIXELS = 100.0, 20000
-"""Inches and pixels that a side of a figure may have."""
+MOST, PIXELS = 100.0, 20000  # Inches and pixels that a side of a figure may have
 
-DPI = (20, 1200)
-"""Pixels per inch that may be chosen."""
+DPI = (20, 1200)  # Pixels per inch that may be chosen
 
 
 @functools.lru_cache(maxsize=4096)

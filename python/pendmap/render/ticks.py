@@ -18,12 +18,9 @@ if TYPE_CHECKING:
 
     from pendmap.charts.chart import Axis
 
-LINE: Final = 0.16
-"""Inches between labels above one another."""
-CLOSE: Final = 5.0
-"""Ratio of its ends under which a logarithmic axis has equally spaced labels."""
-LONGEST, BEGINNING = 11, 3
-"""Letters of a name that is turned, and of its part before the dots."""
+LINE: Final = 0.16  # Inches between labels above one another
+CLOSE: Final = 5.0  # Ratio of its ends under which a logarithmic axis has equally spaced labels
+LONGEST, BEGINNING = 11, 3  # Letters of a name that is turned, and of its part before the dots
 NARROW: Final = 20.0
 """Ratio of its ends under which a logarithmic axis has labels between powers of ten."""
 

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.chart import Chart, Sheet
 
-SUFFIXES = (".png", ".svg", ".pdf")
-"""The kinds of file that can be drawn."""
+SUFFIXES = (".png", ".svg", ".pdf")  # The kinds of file that can be drawn
 
 
 def save(

@@ -41,8 +41,7 @@ SI: Final = "rad/s\N{SUPERSCRIPT TWO}"
 EQUATION: Final = "theta'' + (c/m) v + w0^2 (1 + a(t)) sin(theta) = -Tr sign(v)"
 """The baseline, as in the paper, with the velocity named as in effects."""
 
-ALTERNATIVES: Final = 4
-"""Number of alternatives of an effect in its table."""
+ALTERNATIVES: Final = 4  # Number of alternatives of an effect in its table
 
 
 def diagnosis(found: Discrepancy) -> Document:

@@ -41,14 +41,12 @@ PROBABILITY: Final = (
     "weaker the effect is beside the strongest."
 )
 
-RARE: Final = 1e-9
-"""Least probability that is given."""
+RARE: Final = 1e-9  # Least probability that is given
 
 UNEVEN: Final = 1.5
 """Ratio of the noise at high speed to that at low speed from which it is mentioned."""
 
-LIKE: Final = 1.3
-"""Root mean square over the noise up to which both look alike."""
+LIKE: Final = 1.3  # Root mean square over the noise up to which both look alike
 
 QUIET: Final = 20
 """Percentage of the readings, those with the least noise, for which residuals are compared."""

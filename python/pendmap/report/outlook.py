@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.next_experiment.limits import Limit
     from pendmap.diagnosis.next_experiment.power import Outlook
 
-ROWS: Final = 8
-"""Number of rows in the table of proposals."""
+ROWS: Final = 8  # Number of rows in the table of proposals
 
 LIMITS: Final = (
     "effect",

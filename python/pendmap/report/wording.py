@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 SMALL, LARGE = -4, 6
 """Powers of ten, from the first and below the second, of numbers without an exponent."""
 
-FAINT: Final = 1e-7
-"""Least standard error without an exponent."""
+FAINT: Final = 1e-7  # Least standard error without an exponent
 
 RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.residuals.noise import ResidualNoise
 
-CHANCE: Final = 1e-3
-"""Probability by noise alone below which a parameter differs between runs."""
+CHANCE: Final = 1e-3  # Probability by noise alone below which a parameter differs between runs
 
 BLIND: Final = 1e-9
 """Information, over the greatest of a run, below which a direction is not determined."""

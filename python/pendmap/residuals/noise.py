@@ -49,14 +49,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-CERTAIN: Final = 1e9
-"""Number of amplitudes that stands for a known noise level."""
+CERTAIN: Final = 1e9  # Number of amplitudes that stands for a known noise level
 
 ARITHMETIC: Final = 1e-4
 """Mean squared residual, in standard errors squared, below which residuals are rounding errors."""
 
-BINS: Final = 256
-"""Bins of frequency from 0 to half the sampling rate."""
+BINS: Final = 256  # Bins of frequency from 0 to half the sampling rate
 
 PHASES: Final = np.pi * (np.arange(BINS) + 0.5) / BINS
 """Phase from sample to sample, rad, at the middle of each bin."""
@@ -67,32 +65,24 @@ HARMONICS: Final = 4.0
 GAP: Final = 1.5
 """Frequency from which noise is read, over the frequency up to which errors of a model show."""
 
-WIDEST: Final = 0.4
-"""Greatest part of all frequencies that counts as slow."""
+WIDEST: Final = 0.4  # Greatest part of all frequencies that counts as slow
 
-STATES: Final = 2
-"""Fitted numbers of each window: angle and velocity at its start."""
+STATES: Final = 2  # Fitted numbers of each window: angle and velocity at its start
 
-LEAST: Final = 8
-"""Fewest samples of a window with a spectrum."""
+LEAST: Final = 8  # Fewest samples of a window with a spectrum
 
-COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))
-"""Correlations ``rho`` of the laws."""
+COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))  # Correlations ``rho`` of the laws
 
-FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])
-"""Ratios ``phi`` of the laws."""
+FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])  # Ratios ``phi`` of the laws
 
-RARE: Final = 0.0025
-"""Prior odds of all coloured laws together against white noise."""
+RARE: Final = 0.0025  # Prior odds of all coloured laws together against white noise
 
 FAINT: Final = 1e-6
 """Probability of a law, over that of the most probable one, below which it is left out."""
 
-COUNTED: Final = 10.0
-"""Prior odds of a white part of rounding alone against any other."""
+COUNTED: Final = 10.0  # Prior odds of a white part of rounding alone against any other
 
-OWN: Final = 50
-"""Fewest amplitudes from which the noise of one run is read by itself."""
+OWN: Final = 50  # Fewest amplitudes from which the noise of one run is read by itself
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,23 +25,18 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-KEPT: Final = 4
-"""Number of frequencies, or instants, that are kept; fewest readings of a window."""
+KEPT: Final = 4  # Number of frequencies, or instants, that are kept; fewest readings of a window
 
-FINE: Final = 4
-"""Frequencies tried within one over the duration of the records."""
+FINE: Final = 4  # Frequencies tried within one over the duration of the records
 
-MOST: Final = 1 << 18
-"""Most frequencies tried."""
+MOST: Final = 1 << 18  # Most frequencies tried
 
 GROWTH: Final = 30.0
 """Growth of a change of the start, over the least of all windows, up to which motion is calm."""
 
-LOOKED_AT: Final = 4
-"""Frequencies whose exact gain is computed, over the number kept."""
+LOOKED_AT: Final = 4  # Frequencies whose exact gain is computed, over the number kept
 
-DRAWS: Final = 32
-"""Draws of noise from which the variance of the products is estimated."""
+DRAWS: Final = 32  # Draws of noise from which the variance of the products is estimated
 
 
 @dataclasses.dataclass(frozen=True)

@@ -47,17 +47,14 @@ OVER: Final = {
 ALONG: Final = ("amplitude", "lab_time")
 """Quantities over which the torque along the motion is given, positive where it drives."""
 
-BINS: Final = 10
-"""Number of bins, with equally many samples."""
+BINS: Final = 10  # Number of bins, with equally many samples
 
-STANDS_OUT: Final = 4.0
-"""Standard errors from which a bin stands out; none of fifty does by chance."""
+STANDS_OUT: Final = 4.0  # Standard errors from which a bin stands out; none of fifty does by chance
 
 BLIND: Final = 1e-5
 """Information of a combination of bins, over the greatest, below which it is not determined."""
 
-LOST: Final = 1e-6
-"""``W`` over its greatest below which the motion no longer depends on its start."""
+LOST: Final = 1e-6  # ``W`` over its greatest below which the motion no longer depends on its start
 
 
 @dataclasses.dataclass(frozen=True)

@@ -55,8 +55,7 @@ __all__ = [
     "record_identification",
 ]
 
-SUFFIXES = (".rrd",)
-"""The kind of file a recording is."""
+SUFFIXES = (".rrd",)  # The kind of file a recording is
 
 CELLS = 4096
 """Rows and columns of an image at most: graphics processors take no larger ones for sure."""

@@ -21,12 +21,10 @@ if TYPE_CHECKING:
 CELLS = 4096
 """Rows and columns of an image at most: graphics processors take no larger ones for sure."""
 
-SAMPLE = 1000
-"""Rows and columns of the sample from which the limits of a colour scale are taken."""
+SAMPLE = 1000  # Rows and columns of the sample from which the limits of a colour scale are taken
 
 _SAME = {name: name for name in ("turns", "exponent", "probability", "entropy")}
-ROOTS = {"labels": "basin", "settle": "settle"} | _SAME
-"""Where each layer is logged."""
+ROOTS = {"labels": "basin", "settle": "settle"} | _SAME  # Where each layer is logged
 
 _LEAF = {"labels": "labels", "settle": "steps"} | _SAME
 _COLOUR_MAPS = {"settle": "viridis", "exponent": "magma"}

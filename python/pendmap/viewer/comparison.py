@@ -24,11 +24,9 @@ INSTANTS = 20000
 """Instants of a run that are drawn; of a longer one every k-th, unless that leaves too few of each
 swing."""
 
-PER_SWING = 24
-"""Instants of a swing that are kept."""
+PER_SWING = 24  # Instants of a swing that are kept
 
-GAP = 8.0
-"""Intervals, over the usual one, from which on nothing is drawn across a gap."""
+GAP = 8.0  # Intervals, over the usual one, from which on nothing is drawn across a gap
 
 SLOPE = 0.05
 """Part of a swing over which the record's velocity is a difference: a longer one cuts its peaks

@@ -26,20 +26,17 @@ if TYPE_CHECKING:
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
 
-RATIO: Final = 0.56
-"""Height of a panel over its width."""
+RATIO: Final = 0.56  # Height of a panel over its width
 RECORD: Final = Series("record", (128, 128, 128), 1.0)
 BEFORE: Final = Series("before", (213, 94, 0), 1.6)
 AFTER: Final = Series("after", (0, 114, 178), 1.6)
-APART: Final = 2.5
-"""Lengths of the arm between two pivots."""
+APART: Final = 2.5  # Lengths of the arm between two pivots
 THIN, BROAD = (0.8, 4.0, 3.0), (3.0, 10.0, 1.0)
 """Radii of arm and bob, in points of the screen, and which lies on top: the greater one."""
 SEEN: Final = 0.3
 """Angle by which the old model's pendulum stands off where it is off by three times its residual's
 root mean square, rad."""
-MOST: Final = 1000.0
-"""Greatest magnification of the deviations that are drawn."""
+MOST: Final = 1000.0  # Greatest magnification of the deviations that are drawn
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-INK = (150, 150, 150)
-"""Lines and labels in a mid tone: the background may be light or dark."""
+INK = (150, 150, 150)  # Lines and labels in a mid tone: the background may be light or dark
 
-SIDE = 1000.0
-"""Width of a frame on the screen, in the view's own units."""
+SIDE = 1000.0  # Width of a frame on the screen, in the view's own units
 
-SHORT = 8
-"""Letters of a name that has room beside the ticks."""
+SHORT = 8  # Letters of a name that has room beside the ticks
 
 TIMELINE = "sim_time"
 

@@ -37,14 +37,11 @@ RESIDUAL: Final = Series("record less model", (0, 158, 115))
 LEFT_OUT: Final = Series("not for fitting", (204, 121, 167))
 THIN, BROAD = (1.5, 7.0, 3.0), (4.5, 13.0, 1.0)
 """Radii of arm and bob, in points of the screen, and order, of the record and of the model."""
-CLOSE: Final = 4.0
-"""Swings that the close view shows on either side of the cursor."""
+CLOSE: Final = 4.0  # Swings that the close view shows on either side of the cursor
 SMALL, MARGIN = 2.0, 1.15
 """Swings under the first, rad, get a phase plane that is wider than they are by the second."""
-REACH: Final = 1.15
-"""Half the width of the view of the pendulums, in lengths of the arm."""
-COMPARED: Final = ("w0", "c_over_m", "Tr")
-"""Parameters by which all methods are compared."""
+REACH: Final = 1.15  # Half the width of the view of the pendulums, in lengths of the arm
+COMPARED: Final = ("w0", "c_over_m", "Tr")  # Parameters by which all methods are compared
 
 
 def record_identification(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:

@@ -20,11 +20,9 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
     from pendmap.model import Pendulum, Rig
 
-ADDRESS: Final = "127.0.0.1:9876"
-"""Where a viewer listens unless it is told otherwise."""
+ADDRESS: Final = "127.0.0.1:9876"  # Where a viewer listens unless it is told otherwise
 
-BLOCK: Final = 1000
-"""Samples that are sent at a time, at least."""
+BLOCK: Final = 1000  # Samples that are sent at a time, at least
 _PROBE: Final = 2.0
 _FLUSH: Final = 20.0
 _MOVING: Final = 200_000

@@ -24,12 +24,9 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
 
 MINUS, SIGMA = "\N{MINUS SIGN}", "\N{GREEK SMALL LETTER SIGMA}"
-BAND: Final = 2.0
-"""Half the width of the band that noise alone would fill, in standard deviations."""
-MILLI: Final = 1e3
-"""Residuals are in mrad: the axis would have too many digits otherwise."""
-LEGEND: Final = rrb.Corner2D.RightTop
-"""Corner of a legend: a decay leaves room there."""
+BAND: Final = 2.0  # Half the width of the band that noise alone would fill, in standard deviations
+MILLI: Final = 1e3  # Residuals are in mrad: the axis would have too many digits otherwise
+LEGEND: Final = rrb.Corner2D.RightTop  # Corner of a legend: a decay leaves room there
 
 
 @dataclass(frozen=True)

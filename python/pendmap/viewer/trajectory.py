@@ -34,20 +34,17 @@ LINE = (120, 150, 190)
 PIVOT = (0, 158, 115)
 TRAIL = (230, 159, 0)
 
-TRAIL_POINTS = 48
-"""Points of the bob's trail, which is one forcing period long."""
+TRAIL_POINTS = 48  # Points of the bob's trail, which is one forcing period long
 
 TRAILS = 20000
 """Trails that are logged at most; the trail of a longer trajectory moves on in larger steps."""
 
-MANY = 1000
-"""Points of a section above which they are drawn smaller."""
+MANY = 1000  # Points of a section above which they are drawn smaller
 
 MOVING = 100_000
 """Samples at the beginning and at the end of a long trajectory at which everything moves."""
 
-BINS = 100_000
-"""Bins of a long series, which is logged by its lowest and highest values."""
+BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
 
 CURVE, CURVE_PERIODS = 200_000, 100
 """Samples and periods of the phase curve that are drawn at most, the last ones."""

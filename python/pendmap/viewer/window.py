@@ -14,11 +14,9 @@ from pathlib import Path
 
 from pendmap.errors import InputError
 
-MAGIC = b"RRF2"
-"""First bytes of a recording."""
+MAGIC = b"RRF2"  # First bytes of a recording
 
-PATIENCE = 2.0
-"""Seconds in which a viewer that cannot start is expected to say so."""
+PATIENCE = 2.0  # Seconds in which a viewer that cannot start is expected to say so
 
 
 _NO_DISPLAY = "there is no display (DISPLAY is not set)"

@@ -21,10 +21,8 @@ EFFECTS: Final[dict[str, type[Effect]]] = {
 }
 """Every effect with a formula, by name and variant, in the order of the files."""
 
-ANY: Final = "any"
-"""Asks for an effect that the seed chooses."""
-NONE: Final = "none"
-"""Asks for a rig without hidden effects."""
+ANY: Final = "any"  # Asks for an effect that the seed chooses
+NONE: Final = "none"  # Asks for a rig without hidden effects
 
 
 def describe() -> list[dict[str, str]]:

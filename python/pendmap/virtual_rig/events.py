@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 _TINY: Final = 1e-4
 """Where a velocity that starts at zero is evaluated first, as a share of a sixteenth step."""
-_ROUNDING: Final = 1e-12
-"""Velocity that may be rounding, rad/s."""
+_ROUNDING: Final = 1e-12  # Velocity that may be rounding, rad/s
 
 PLACES: Final[Floats] = np.arange(17) / 16
 """Places within a step where signs are evaluated, shape (17,)."""

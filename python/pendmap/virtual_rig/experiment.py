@@ -23,14 +23,11 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.path import Floats, Path
 
-WINDOW: Final = 1.0
-"""Length of the pieces over which the gap is measured, s: chaos stays small."""
-_AFTER_REST: Final = 3.0
-"""Length of a record after the pendulum has come to rest, s."""
+WINDOW: Final = 1.0  # Length of the pieces over which the gap is measured, s: chaos stays small
+_AFTER_REST: Final = 3.0  # Length of a record after the pendulum has come to rest, s
 _MOST_SAMPLES: Final = 10_000_000
 """Largest number of samples of all runs; their records take 250 megabytes."""
-_RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)
-"""Streams of random numbers."""
+_RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)  # Streams of random numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -361,13 +358,10 @@ PARAMETERS: Final = Parameters(w0=6.2, c_over_m=2 * 0.004 * 6.2, friction=0.08)
 
 The paper gives no numbers; these have periods and a length of the decay like its figures.
 """
-RELEASE: Final = 3.0
-"""Angle of the release at rest, rad."""
-SECONDS: Final = 86.0
-"""Length of the record, s: the pendulum comes to rest before."""
+RELEASE: Final = 3.0  # Angle of the release at rest, rad
+SECONDS: Final = 86.0  # Length of the record, s: the pendulum comes to rest before
 SENSOR: Final = Sensor(rate=100.0, counts=4096, noise=math.radians(0.1))
-OFFSET: Final = math.radians(0.05)
-"""Reading of the encoder at rest, rad."""
+OFFSET: Final = math.radians(0.05)  # Reading of the encoder at rest, rad
 
 
 def paper_decay(seed: int = 0) -> tuple[Floats, Floats]:

@@ -17,19 +17,16 @@ if TYPE_CHECKING:
 
 Indices = NDArray[np.intp]
 
-_FIRST: Final = 0.25
-"""Length of the first step over the longest."""
+_FIRST: Final = 0.25  # Length of the first step over the longest
 
 TOLERANCE: Final = 1e-11
 """Largest last coefficients of a velocity's polynomial, rad/s; else a step is repeated."""
-_FIXED: Final = 3e-13
-"""Change of the velocity at which the iteration ends, rad/s."""
+_FIXED: Final = 3e-13  # Change of the velocity at which the iteration ends, rad/s
 _ITERATIONS: Final = 25
 """Most iterations of a step; one that needs more is repeated with a shorter length."""
 _SHORTEST: Final = 1e-9
 """A step that is taken whatever its error, s; corners of the equation end there."""
-_SMALLEST: Final = 1e-300
-"""Least error of a step, rad/s, that a division takes."""
+_SMALLEST: Final = 1e-300  # Least error of a step, rad/s, that a division takes
 
 
 @dataclasses.dataclass(frozen=True)

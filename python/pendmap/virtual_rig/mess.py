@@ -21,12 +21,9 @@ if TYPE_CHECKING:
 
     from pendmap.virtual_rig.sensor import Sensor
 
-ORDERS: Final = (2, 40)
-"""Orders per turn of a texture, the least and the greatest."""
-TERMS: Final = 8
-"""Terms of a texture, and of a drift."""
-TORQUE: Final = 0.1
-"""Torque of a texture, in units of w0^2, that moves readings by about 1 rad."""
+ORDERS: Final = (2, 40)  # Orders per turn of a texture, the least and the greatest
+TERMS: Final = 8  # Terms of a texture, and of a drift
+TORQUE: Final = 0.1  # Torque of a texture, in units of w0^2, that moves readings by about 1 rad
 FRICTION: Final = 0.005
 """Friction of a texture, in units of w0^2, that moves readings by about 1 rad."""
 

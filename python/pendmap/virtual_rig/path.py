@@ -22,13 +22,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-NODES: Final = 10
-"""Gauss points of a step."""
+NODES: Final = 10  # Gauss points of a step
 
 _X, _WEIGHTS = legendre.leggauss(NODES)
 
-POINTS: Final[Floats] = (_X + 1) / 2
-"""Gauss-Legendre points in (0, 1), shape (NODES,)."""
+POINTS: Final[Floats] = (_X + 1) / 2  # Gauss-Legendre points in (0, 1), shape (NODES,)
 
 COEFFICIENTS: Final[Floats] = (
     legendre.legvander(_X, NODES - 1).T * _WEIGHTS * (np.arange(NODES)[:, np.newaxis] + 0.5)

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from pendmap.virtual_rig.path import Floats
 
-_LONGEST_GAP: Final = 20
-"""Longest gap of a dropout, samples."""
+_LONGEST_GAP: Final = 20  # Longest gap of a dropout, samples
 
 
 def check_ranges(owner: object, **ranges: tuple[float, float, str]) -> None:

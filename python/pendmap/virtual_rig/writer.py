@@ -19,14 +19,11 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.experiment import Experiment, Run
 
-FORMAT_VERSION: Final = 1
-"""Version of the layout of the truth file."""
+FORMAT_VERSION: Final = 1  # Version of the layout of the truth file
 
-_FILES: Final = re.compile(r"experiment\.toml|run_\d+\.csv")
-"""Names of the files of an experiment."""
+_FILES: Final = re.compile(r"experiment\.toml|run_\d+\.csv")  # Names of the files of an experiment
 _GRAVITY: Final = 9.81
-_ENOUGH: Final = 3
-"""Least number of runs of a kind of which one is held out."""
+_ENOUGH: Final = 3  # Least number of runs of a kind of which one is held out
 
 
 @dataclasses.dataclass(frozen=True)

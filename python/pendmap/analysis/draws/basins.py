@@ -36,13 +36,11 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-SURE: Final = 0.95
-"""Probability of an end from which a cell counts as sure."""
+SURE: Final = 0.95  # Probability of an end from which a cell counts as sure
 
 _SHARES: Final = ("outcome", "share_mean", "share_low", "share_high", "exists")
 """Variables over the outcomes."""
-_UNKNOWN: Final = ("undecided", "failed")
-"""The ends of labels 0 and -1."""
+_UNKNOWN: Final = ("undecided", "failed")  # The ends of labels 0 and -1
 
 
 def basins_over(

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_APART = math.pi
-"""Distance from an attractor without points, rad."""
+_APART = math.pi  # Distance from an attractor without points, rad
 
 
 def plain(name: str) -> str:

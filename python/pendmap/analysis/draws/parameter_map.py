@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
 
 
-_LISTED = 10
-"""Regimes that a summary lists."""
+_LISTED = 10  # Regimes that a summary lists
 
 
 def regimes_over(

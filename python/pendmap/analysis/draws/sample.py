@@ -26,11 +26,9 @@ if TYPE_CHECKING:
     """Computes the result of a model, reporting to the keyword ``progress``."""
 
 
-_TRIES: Final = 1000
-"""Draws in a row that may all be outside the allowed values."""
+_TRIES: Final = 1000  # Draws in a row that may all be outside the allowed values
 
-_LEVELS: Final = (0.025, 0.975)
-"""Probabilities at the ends of a 95 % interval."""
+_LEVELS: Final = (0.025, 0.975)  # Probabilities at the ends of a 95 % interval
 
 
 @dataclasses.dataclass(frozen=True)

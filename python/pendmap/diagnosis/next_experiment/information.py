@@ -54,8 +54,7 @@ PER_SWING: Final = 25.0
 MOVING: Final = 1e-9
 """Velocity over ``w0`` below which a pendulum rests and its readings carry no information."""
 
-FEWEST: Final = 3
-"""Fewest readings of a run in a fit."""
+FEWEST: Final = 3  # Fewest readings of a run in a fit
 
 
 @dataclasses.dataclass(frozen=True)

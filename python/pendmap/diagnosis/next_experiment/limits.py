@@ -28,16 +28,13 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-SURELY: Final = 0.95
-"""Probability of finding an effect of the size of its limit."""
+SURELY: Final = 0.95  # Probability of finding an effect of the size of its limit
 
-HUGE: Final = 10.0
-"""Limit over the greatest typical size above which an effect is not visible."""
+HUGE: Final = 10.0  # Limit over the greatest typical size above which an effect is not visible
 
 NOTHING: Final = "No free decay or run under the drive adds to these records."
 
-MARGIN: Final = 1e-6
-"""Least probability that is given: no model is known better."""
+MARGIN: Final = 1e-6  # Least probability that is given: no model is known better
 
 
 @dataclasses.dataclass(frozen=True)

@@ -32,17 +32,14 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.diagnosis.verdict import Alternative, Identifiability
 
-CLEAR: Final = 25.0
-"""``s G`` from which a wrong name has a probability of at most 0.6 %."""
+CLEAR: Final = 25.0  # ``s G`` from which a wrong name has a probability of at most 0.6 %
 
 HALF: Final = 0.5
 """Interval, or detection limits, over the present ones, that a proposal should reach."""
 
-NOTHING: Final = 1.0
-"""``s G`` below which no experiment tells two names apart."""
+NOTHING: Final = 1.0  # ``s G`` below which no experiment tells two names apart
 
-MOST: Final = 3
-"""Number of effects, those whose limits fall most, that are named."""
+MOST: Final = 3  # Number of effects, those whose limits fall most, that are named
 
 Aim = Literal["separation", "interval", "limits"]
 

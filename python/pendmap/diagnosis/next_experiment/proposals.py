@@ -21,44 +21,32 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import DataSplit
 
-RELEASES: Final = (0.5, 1.2, 2.0, 2.8)
-"""Angles of release, rad, within the limits of the rig."""
+RELEASES: Final = (0.5, 1.2, 2.0, 2.8)  # Angles of release, rad, within the limits of the rig
 
-FLINGS: Final = (2.5, 3.5)
-"""Velocities at the bottom over ``w0``; above 2 the pendulum rotates."""
+FLINGS: Final = (2.5, 3.5)  # Velocities at the bottom over ``w0``; above 2 the pendulum rotates
 
-WAITS: Final = (600.0, 3600.0)
-"""Pauses in the laboratory, s, after which slow changes show."""
+WAITS: Final = (600.0, 3600.0)  # Pauses in the laboratory, s, after which slow changes show
 
-LATER: Final = (1.2, 2.8)
-"""Angles of release after such a pause, rad."""
+LATER: Final = (1.2, 2.8)  # Angles of release after such a pause, rad
 
-LENGTHS: Final = (0.5, 1.0, 2.0)
-"""Lengths of a run over those of the records."""
+LENGTHS: Final = (0.5, 1.0, 2.0)  # Lengths of a run over those of the records
 
-LONGEST_S: Final = 240.0
-"""Longest proposed run, s, unless the records are longer."""
+LONGEST_S: Final = 240.0  # Longest proposed run, s, unless the records are longer
 
-SHORTEST: Final = 5.0
-"""Shortest proposed run, swings."""
+SHORTEST: Final = 5.0  # Shortest proposed run, swings
 
-REPEATS: Final = (2, 4)
-"""Numbers of repetitions of a run."""
+REPEATS: Final = (2, 4)  # Numbers of repetitions of a run
 
-PAUSE_S: Final = 60.0
-"""Time from the end of one run to the next, s."""
+PAUSE_S: Final = 60.0  # Time from the end of one run to the next, s
 
 DRIVEN: Final = (1.0, 1.5, 2.0)
 """Drive frequencies over ``w0``: second resonance, between, first resonance."""
 
-BEYOND: Final = 1.25
-"""Limits of the rig over the greatest values in its records."""
+BEYOND: Final = 1.25  # Limits of the rig over the greatest values in its records
 
-FASTEST: Final = 0.98
-"""Quantile of the speeds between readings that noise does not exceed."""
+FASTEST: Final = 0.98  # Quantile of the speeds between readings that noise does not exceed
 
-SWINGING: Final = 1.0
-"""Angle at which a driven swing begins, rad."""
+SWINGING: Final = 1.0  # Angle at which a driven swing begins, rad
 
 
 @dataclasses.dataclass(frozen=True)

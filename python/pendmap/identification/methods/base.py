@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-MISFIT: Final = 2.0
-"""chi^2 per degree of freedom above which a method of peaks warns."""
+MISFIT: Final = 2.0  # chi^2 per degree of freedom above which a method of peaks warns
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -23,17 +23,14 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-Reading = Literal["all", "odd_ends", "odd_triplets"]
-"""Peaks that the printed method uses."""
+Reading = Literal["all", "odd_ends", "odd_triplets"]  # Peaks that the printed method uses
 
 CUT: Final = math.radians(12.0)
 """Peaks above this are dropped, rad: there the pendulum is not linear."""
 
-ENDS_ABOVE: Final = "the record ends above it"
-"""Reason why a record has no peaks below the cut."""
+ENDS_ABOVE: Final = "the record ends above it"  # Reason why a record has no peaks below the cut
 
-_FEWEST: Final = 4
-"""Peaks below the cut that are needed."""
+_FEWEST: Final = 4  # Peaks below the cut that are needed
 _USES: Final[dict[Reading, str]] = {
     "all": "of them the first two and the last two",
     "odd_ends": "of them the first two and the last two that begin at an odd peak",

@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 
 FAST: Final = (CUT, math.radians(90.0))
 """Amplitudes between which the decay is taken as exponential, rad."""
-SLOW: Final = (0.0, CUT)
-"""Amplitudes between which it is taken as linear, rad."""
-_FEWEST: Final = 3
-"""Peaks that each window needs."""
+SLOW: Final = (0.0, CUT)  # Amplitudes between which it is taken as linear, rad
+_FEWEST: Final = 3  # Peaks that each window needs
 
 
 def from_peaks(

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_FEWEST: Final = 5
-"""Peaks that are needed."""
+_FEWEST: Final = 5  # Peaks that are needed
 _LARGEST: Final = 2.0
 """Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
 _PHASE: Final = 0.5

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 
 Reading = Literal["ends", "line"]
-_FEWEST: Final = 3
-"""Peaks below the cut that are needed."""
+_FEWEST: Final = 3  # Peaks below the cut that are needed
 
 
 def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> Identification:

@@ -73,8 +73,7 @@ class Method:
         return dataclasses.replace(found, method=self.name)
 
 
-BEST: Final = "trajectory"
-"""The default method."""
+BEST: Final = "trajectory"  # The default method
 
 _ODD_ENDS = functools.partial(combined.from_peaks, reading="odd_ends")
 _ODD_TRIPLETS = functools.partial(combined.from_peaks, reading="odd_triplets")
@@ -183,8 +182,7 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
     return found
 
 
-FEWEST: Final = 16
-"""Values from which a scatter is estimated: eight differences, to about a third."""
+FEWEST: Final = 16  # Values from which a scatter is estimated: eight differences, to about a third
 
 _DIFFERENCE: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 """Fourth difference, which is 0 of a cubic."""

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_FEWEST: Final = 6
-"""Peaks below the cut that are needed."""
+_FEWEST: Final = 6  # Peaks below the cut that are needed
 
 
 def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:

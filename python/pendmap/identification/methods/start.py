@@ -22,16 +22,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_DAMPING: Final = (1e-5, 0.5)
-"""Range of ``c_over_m / w0`` that is searched."""
-_FRICTION: Final = (1e-6, 0.3)
-"""Range of ``Tr / w0^2`` that is searched, rad."""
-_ZERO: Final = 0.2
-"""Largest zero error that is searched, rad."""
+_DAMPING: Final = (1e-5, 0.5)  # Range of ``c_over_m / w0`` that is searched
+_FRICTION: Final = (1e-6, 0.3)  # Range of ``Tr / w0^2`` that is searched, rad
+_ZERO: Final = 0.2  # Largest zero error that is searched, rad
 _MISFIT: Final = 25.0
 """chi^2 per degree of freedom above which a method's values are not used as a start."""
-_MOST_PEAKS: Final = 80
-"""Peaks that the global search compares at most."""
+_MOST_PEAKS: Final = 80  # Peaks that the global search compares at most
 
 
 @dataclasses.dataclass(frozen=True)

@@ -40,10 +40,8 @@ if TYPE_CHECKING:
 
 TOO_GOOD: Final = 0.7
 """chi^2 per degree of freedom below which a warning says that sigma is too large."""
-OFFSET: Final = "encoder_offset"
-"""The effect that is the sensor's zero."""
-POOR: Final = 0.1
-"""Residual over the record's own scatter above which the search went astray."""
+OFFSET: Final = "encoder_offset"  # The effect that is the sensor's zero
+POOR: Final = 0.1  # Residual over the record's own scatter above which the search went astray
 LACKING: Final = 4.0
 """Widening above which readings count alike: by their law the slowest alone would decide."""
 

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 _reading: Final = functools.partial(effect, "distort", "reading")
 
-_FINE: Final = 1e-3
-"""Step of the lag's exact response to a cubic between two points, s."""
+_FINE: Final = 1e-3  # Step of the lag's exact response to a cubic between two points, s
 
 
 def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
