@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import gzip
 import io
 import math
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from recorded import COUNT, text
+from recorded import COUNT, clean, text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +21,23 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["DAMAGES", "DESCRIPTIONS", "Damage"]
+__all__ = ["DAMAGES", "DESCRIPTIONS", "Damage", "one_line", "sound"]
+
+
+@functools.cache
+def sound() -> str:
+    """A clean record of 10 s."""
+    return text(clean(duration=10.0))
+
+
+def one_line(message: str) -> None:
+    """Assert that a message is one readable line."""
+    assert message
+    assert "\n" not in message
+    assert len(message) < 400
+    assert "Traceback" not in message
+    for nonsense in ("None", "nan", "array(", "dtype"):
+        assert nonsense not in message, message
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
 
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
@@ -41,3 +42,15 @@ def named(figure: Figure) -> list[str]:
 def written(figure: Figure) -> str:
     texts = (found.get_text() for found in figure.findobj(Text) if isinstance(found, Text))
     return " ".join(" ".join(texts).split())
+
+
+def shown(text: object) -> bool:
+    """Whether a text is visible and not empty."""
+    return isinstance(text, Text) and text.get_visible() and bool(text.get_text().strip())
+
+
+def overlap(one: Bbox, other: Bbox) -> bool:
+    """Whether two boxes share more than 1.5 pixels in both directions."""
+    wide = min(one.x1, other.x1) - max(one.x0, other.x0)
+    high = min(one.y1, other.y1) - max(one.y0, other.y0)
+    return bool(wide > 1.5 and high > 1.5)

@@ -148,6 +148,6 @@ def test_numbers_become_text_in_one_place() -> None:
 
 def test_tests_import_the_fronts_of_packages() -> None:
     fronts = {name_of(path) for path in MODULES if path.name == "__init__.py"}
-    tests = sorted((ROOT / "tests" / "python").glob("*.py"))
+    tests = sorted((ROOT / "tests" / "python").rglob("*.py"))
     inner = {module for path in tests for module in imported(path) if module not in fronts}
     assert len(inner) <= INTERNAL, sorted(inner)

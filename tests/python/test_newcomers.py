@@ -42,7 +42,7 @@ def how_to(title: str) -> str:
 )
 def test_the_files_that_a_how_to_names_exist(title: str, example: str) -> None:
     for path in re.findall(r"`((?:src|python|tests)/\S+)`", how_to(title)):
-        name = "exponents" if path == "tests/python/test_NAME.py" else example
+        name = "exponents" if path == "tests/python/analysis/test_NAME.py" else example
         assert (ROOT / path.replace("NAME", name)).exists(), path
 
 
@@ -220,9 +220,9 @@ def test_an_analysis_is_five_files(tmp_path: Path) -> None:
         "python/pendmap/cli/swing.py": COMMAND,
         "python/pendmap/__init__.py": front.replace("ANALYSES = {", TABLE),
         "python/pendmap/charts/swing.py": CHART,
-        "tests/python/test_swing.py": TEST,
+        "tests/python/analysis/test_swing.py": TEST,
     }
-    (tmp_path / "tests" / "python").mkdir(parents=True)
+    (tmp_path / "tests" / "python" / "analysis").mkdir(parents=True)
     for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     asked = {
@@ -264,8 +264,16 @@ def test_an_analysis_is_five_files(tmp_path: Path) -> None:
     found = json.loads(run("pendmap", "swing", "--json"))
     assert found["largest"] == 3.0
     # The tests that hold every analysis take the new one in without a line of their own.
-    schema = str(ROOT / "tests" / "python" / "test_schema.py")
-    run("pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", "tests/python/test_swing.py")
+    schema = str(ROOT / "tests" / "python" / "analysis" / "test_schema.py")
+    run(
+        "pytest",
+        "-q",
+        "-p",
+        "no:xdist",
+        "-p",
+        "no:cacheprovider",
+        "tests/python/analysis/test_swing.py",
+    )
     assert "1 passed" in run(
         "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", "-k", "swing", schema
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 from typing import TYPE_CHECKING
 
@@ -12,26 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pendmap
-from damages import DAMAGES, DESCRIPTIONS
-from recorded import clean, text
+from damages import DAMAGES, DESCRIPTIONS, one_line, sound
+from recorded import text
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-
-@functools.cache
-def sound() -> str:
-    """A clean record of 10 s."""
-    return text(clean(duration=10.0))
-
-
-def one_line(message: str) -> None:
-    assert message
-    assert "\n" not in message
-    assert len(message) < 400
-    assert "Traceback" not in message
-    for nonsense in ("None", "nan", "array(", "dtype"):
-        assert nonsense not in message, message
 
 
 def consistent(run: pendmap.Run) -> None:

@@ -11,14 +11,13 @@ from matplotlib import rc_context
 from matplotlib.text import Text
 
 from decays import decay, record
-from drawn import written
+from drawn import overlap, shown, written
 from pendmap import Rig, virtual_rig
 from pendmap.charts import comparison
 from pendmap.comparison import Comparison, Ensemble, compare
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.render import drawing, style
 from pendmap.virtual_rig import RunPlan
-from test_figure_overlap import overlap, shown
 
 MODEL = Rig(w0=6.2, c_over_m=0.0496, Tr=0.08)
 

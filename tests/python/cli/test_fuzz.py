@@ -9,7 +9,7 @@ from pathlib import Path
 
 import fuzz_cases
 
-FUZZ = Path(__file__).with_name("fuzz.py")
+FUZZ = Path(__file__).parents[1] / "fuzz.py"
 
 
 def test_what_is_drawn_ends_well(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import pytest
 from matplotlib.text import Text
@@ -12,10 +11,7 @@ from matplotlib.text import Text
 import motions
 import pendmap
 import synthetic
-from drawn import made
-
-if TYPE_CHECKING:
-    from matplotlib.transforms import Bbox
+from drawn import made, overlap, shown
 
 VARIANTS = {
     "usual": synthetic.painted(synthetic.USUAL[:4]),
@@ -58,13 +54,3 @@ def test_no_text_is_cut_or_covers_a_panel(variant: str) -> None:
     others = [text.get_window_extent() for text in figure.findobj(Text) if shown(text)]
     for one, other in itertools.combinations(others, 2):
         assert not overlap(one, other)
-
-
-def shown(text: object) -> bool:
-    return isinstance(text, Text) and text.get_visible() and bool(text.get_text().strip())
-
-
-def overlap(one: Bbox, other: Bbox) -> bool:
-    wide = min(one.x1, other.x1) - max(one.x0, other.x0)
-    high = min(one.y1, other.y1) - max(one.y0, other.y0)
-    return bool(wide > 1.5 and high > 1.5)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 import pendmap
-from damages import DAMAGES
+from damages import DAMAGES, one_line, sound
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.report import as_json, as_text, methods_table, table1_table
-from test_records_damaged import one_line, sound
 
 if TYPE_CHECKING:
     from pathlib import Path

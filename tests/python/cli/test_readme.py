@@ -18,7 +18,7 @@ from pendmap.records.description import read_description
 if TYPE_CHECKING:
     from conftest import Run
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PATIENCE = 120.0
 """Most processor time of a command, s."""

@@ -38,7 +38,7 @@ FAINT = 1e-5
 @pytest.fixture(scope="module")
 def sindy() -> ModuleType:
     """``benchmarks/blind/sindy_features.py``."""
-    sys.path.insert(0, str(Path(__file__).parents[2]))
+    sys.path.insert(0, str(Path(__file__).parents[3]))
     return importlib.import_module("benchmarks.blind.sindy_features")
 
 
