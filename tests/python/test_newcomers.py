@@ -181,7 +181,8 @@ def command(**given):
 CHART = '''
 """Period of free swings against their amplitude."""
 
-from pendmap.charts.chart import Axis, Chart, Line, Panel
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import Line
 
 
 def chart(dataset, *, layer=None, cells=0):
