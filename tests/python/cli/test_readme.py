@@ -25,6 +25,11 @@ PATIENCE = 120.0
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
+def marks(page: Path) -> list[pytest.MarkDecorator]:
+    """Commands and snippets of the pages in docs are thorough tests, those of README.md are not."""
+    return [] if page.name == "README.md" else [pytest.mark.thorough]
+
+
 def blocks(language: str, text: str = README) -> list[str]:
     """All code blocks in a language."""
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
@@ -36,8 +41,11 @@ def commands(text: str = README) -> list[list[str]]:
     return [shlex.split(line, comments=True) for line in lines]
 
 
-SNIPPETS = [code for page in PAGES for code in blocks("python", page.read_text(encoding="utf-8"))]
-
+SNIPPETS = [
+    pytest.param(code, id=f"{page.name} {k}", marks=marks(page))
+    for page in PAGES
+    for k, code in enumerate(blocks("python", page.read_text(encoding="utf-8")))
+]
 
 PROMISED = {
     page: [line for line in commands(page.read_text(encoding="utf-8")) if line[0] == "pendmap"]
@@ -80,7 +88,9 @@ def together(lines: list[list[str]]) -> list[list[int]]:
 @pytest.mark.parametrize(
     ("page", "places"),
     [
-        pytest.param(page, places, id=f"{page.name} {places[-1]} {lines[places[-1]][1]}")
+        pytest.param(
+            page, places, id=f"{page.name} {places[-1]} {lines[places[-1]][1]}", marks=marks(page)
+        )
         for page, lines in PROMISED.items()
         for places in together(lines)
     ],
