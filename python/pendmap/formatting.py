@@ -102,7 +102,7 @@ def _html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def interval(estimate: Estimate) -> str:
-    """Return the 95 % interval to the digits of the error, ``[6.2022, 6.2071]``, else an empty text."""
+    """Return the 95 % interval to the digits of the error, ``[6.2022, 6.2071]``, or no text."""
     if estimate.ci95 is None:
         return ""
     low, high = estimate.ci95

@@ -68,8 +68,8 @@ class Rig:
     Raises
     ------
     InputError
-        If a value is not finite or outside its range, ``p`` has no frequency, an effect is there
-        twice, or one is given that is a parameter here.
+        If a value is not finite or outside its range, ``p`` has no frequency, an effect occurs
+        twice, or one duplicates a parameter.
 
     References
     ----------
@@ -123,7 +123,7 @@ class Rig:
         notes: Mapping[str, Any] | None = None,
         **given: float,
     ) -> Rig:
-        """Return the rig that these quantities describe.
+        """Return a rig from quantities in any of their notations.
 
         Parameters
         ----------
@@ -251,5 +251,5 @@ def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
 
 
 def _kept(notes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the notes that hold in other units too."""
+    """Return the notes that do not depend on units: all but the covariance."""
     return {name: table for name, table in notes.items() if name != "covariance"}

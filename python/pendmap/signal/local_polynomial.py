@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 
 POINTS: Final = 9  # Number of samples in a window
-_EVEN: Final = (
-    1e-3  # Offset of a sample from even spacing, in intervals, above which a window is uneven
-)
+_EVEN: Final = 1e-3  # Offset from even spacing, in intervals, above which a window is uneven
 _BLOCK: Final = 20_000  # Number of uneven windows solved at a time
 _NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
 _OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
