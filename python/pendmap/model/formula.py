@@ -45,9 +45,9 @@ class Formula:
     term : str
         The torque per moment of inertia on the right of ``th'' = ...``: numbers, ``pi``, ``+ - * /
         ^`` and brackets; ``theta`` (rad, not wrapped), ``v`` (velocity), ``phase`` (of the harmonic
-        drive, rad), ``t`` (time in the laboratory, fixed in maps), ``w0``, ``a`` (the pivot's upward
-        acceleration over gravity) and the parameters; ``sqrt exp log sin cos tanh abs sign min
-        max`` and ``wrap``, which subtracts whole turns from an angle. It is valid in SI and
+        drive, rad), ``t`` (time in the laboratory, fixed in maps), ``w0``, ``a`` (the pivot's
+        upward acceleration over gravity) and the parameters; ``sqrt exp log sin cos tanh abs sign
+        min max`` and ``wrap``, which subtracts whole turns from an angle. It is valid in SI and
         without dimensions, where ``w0`` is 1.
     parameters : mapping
         For each parameter, one to three, its power of ``w0`` or a mapping of

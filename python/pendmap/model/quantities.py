@@ -27,9 +27,7 @@ OPTIONAL: Final = ("Tr", "torque", "phi", "lab_time_s", "gravity")
 _POSITIVE: Final = ("length_m", "gravity", "Omega", "frequency_hz")
 _W0: Final = (1e-6, 1e6)
 _NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Y", "stroke_mm")
-_AGREE: Final = (
-    1e-3  # Largest relative difference of two values of one quantity, for rounded digits
-)
+_AGREE: Final = 1e-3  # Largest relative difference of two values of one quantity: rounded digits
 
 
 def check(name: str, value: object) -> float:
