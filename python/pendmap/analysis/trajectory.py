@@ -140,7 +140,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         standard error from the spread of 20 batches, the first tenth left out (from the time
         ``exponent_from`` to ``exponent_to``). It is the exponent of an attractor only if the
         trajectory was on it all that time: a chaotic transient has a positive one, wherever it
-        ends. :func:`pendmap.lyapunov` computes that of the attractor. With sticking it may be nan.
+        ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may give none.
     live : callable, optional
         Called with times, angles and velocities, three arrays of one length in the units of the
         result, of the samples that are new since the last call: about every 50 ms while it
