@@ -145,9 +145,9 @@ class Estimate:
     value : float
         In SI.
     stderr : float or None
-        Its standard error, where the method gives one.
+        Its standard error, if the method gives one.
     ci95 : tuple of float or None
-        Its 95 % interval, where the method gives one; it need not be symmetric.
+        Its 95 % interval, if the method gives one; it need not be symmetric.
     """
 
     value: float

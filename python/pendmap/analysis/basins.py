@@ -161,7 +161,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         Periods of the finite-time layers; by default what an exponent needs to stretch one cell to
         the size of the plane.
     threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
+        Number of threads; by default one per processor. The result does not depend on it.
     seed : int
         Shifts the samples of starts.
     check : bool

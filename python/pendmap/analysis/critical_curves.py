@@ -29,7 +29,8 @@ Floats: TypeAlias = NDArray[np.float64]
 _BENT = 2e-3  # Largest distance of a drawn line from its curve, fraction of the figure's height
 
 _APART = 4e-3
-"""Distance of two branches of a curve below which they meet, fraction of the figure's height."""
+"""Distance of two branches, or of a curve and the end of the search, below which the curve ends
+there, fraction of the figure's height."""
 
 _STRIP = 1e-6
 """Width of a stable strip, fraction of the figure's height, below which it is a line and rounding

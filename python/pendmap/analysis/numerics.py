@@ -25,7 +25,7 @@ TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
 class Choices(TypedDict):
-    """Numerical choices as passed to the core; 0 threads mean one a processor."""
+    """Numerical choices as passed to the core; 0 threads mean one per processor."""
 
     tol: float
     max_periods: int | None
@@ -65,7 +65,7 @@ class Numerics:
 
     @property
     def workers(self) -> int:
-        """Number of threads as passed to the core: 0 for one a processor."""
+        """Number of threads as passed to the core: 0 for one per processor."""
         return self.threads or 0
 
     @property

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 
-_NEARLY_CHANCE = 0.15
-_STILL = 1e-12
+_NEARLY_CHANCE = 0.15  # Agreement of neighbours above chance, below which it is hardly better
+_STILL = 1e-12  # Sine of the angle below which a start hangs or is upright
 
 
 def of_model(model: Pendulum | Rig, what: str) -> list[str]:

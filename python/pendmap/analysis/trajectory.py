@@ -133,7 +133,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         reached, ``end_error`` the difference at the end.
     samples : int, optional
         Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
-        picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
+        curve needs, up to 200,000 in all; fewer than 64 where that would be more than two
         million. The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a

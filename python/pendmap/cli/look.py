@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @json_option()
 @quiet_option
 def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
-    """Say what a record holds and what is odd about it, before anything is fitted.
+    """Describe the contents and faults of a record, before anything is fitted.
 
     A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
     experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,

@@ -101,7 +101,7 @@ def seed_option(what: str) -> Decorator:
 
 
 def max_periods_option(what: str) -> Decorator:
-    """Return the option of the bound on periods that does ``what``."""
+    """Return the option --max-periods with the help ``what``."""
     return click.option("--max-periods", type=Whole(1, MOST_PERIODS), help=what)
 
 

@@ -51,7 +51,7 @@ def command(  # noqa: PLR0913 (an option each)
     pendulum, its symbols and its equation. The others are made on a virtual rig like the paper's:
     4 a decay with its half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the
     errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
-    Writes figure_1.png to figure_9.png and table_1.csv, those that are asked for.
+    Writes figure_1.png to figure_9.png and table_1.csv, as requested.
     """
     from pendmap.paper import figures
 

@@ -45,8 +45,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If it is not a result of pendmap, the suffix is not known, or .zarr is asked for and zarr is
-        not installed.
+        If it is not a result of pendmap, the suffix is not known, or it is .zarr and zarr is not
+        installed.
     OSError
         If the file cannot be written.
 

@@ -1,4 +1,4 @@
-"""Reading of TOML up to a largest size, and writing with one key a line."""
+"""Reading of TOML up to a largest size, and writing with one key per line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def toml_text(content: Mapping[str, Any]) -> str:
-    """Return TOML with lists of tables as ``[[name]]`` and one key a line.
+    """Return TOML with lists of tables as ``[[name]]`` and one key per line.
 
     Raises TypeError or ValueError for values that TOML does not have.
     """
