@@ -71,10 +71,9 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     """Compute the stroboscopic points of the attractors against one parameter.
 
     At every value all attractors are searched as by :func:`pendmap.parameter_map`, from several
-    starts and from the attractors at neighbouring values. In addition, one motion is
-    followed as the parameter rises in steps, and one as it falls: at each value it continues from
-    its last state, displaced by 1e-6, until it is on an attractor. Where the two differ there is
-    hysteresis.
+    starts and from the attractors at neighbouring values. In addition, one motion is followed as
+    the parameter rises in steps, and one as it falls: at each value it continues from its last
+    state, displaced by 1e-6, until it is on an attractor. Where the two differ there is hysteresis.
 
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.

@@ -120,10 +120,10 @@ def uncertainty_exponent(
     labels on a grid the distances are 1, 2, 3, 4, 6, ... cells, along both axes at once, from every
     cell; filaments thinner than a cell are not resolved.
 
-    The law is fitted by its binomial likelihood to the smallest distances, up to where it breaks (a
+    The law is fitted by its binomial likelihood to the smallest distances, up to where it fails (a
     misfit less likely than 1 %), and the interval is widened by the remaining misfit. On a grid
-    neighbouring cells are no independent starts: their effective number follows from the spread
-    between strips of the plane; beyond an edge that is not periodic lies the plane's mirror image.
+    neighbouring cells are not independent: their effective number follows from the spread between
+    strips of the plane; at an edge that is not periodic the plane is continued by reflection.
     Starts with an unknown end nearby, undecided or failed, are left out. Attractors that are mirror
     images of one another count as two.
 

@@ -112,13 +112,13 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     Starts drawn from a window run until an attractor captures them. Transient chaos is a chaotic
     saddle: the number of trajectories still on it after ``t`` periods decays as ``exp(-t / mean)``.
-    The mean is the maximum of the likelihood, the sum of all times beyond ``from_period``, those
-    cut off at the bound included, over the number of captures; its standard error is ``mean /
+    The mean is the maximum-likelihood estimate, the sum of all times beyond ``from_period``,
+    censored ones included, over the number of captures; its standard error is ``mean /
     sqrt(captured)``.
 
-    An exponential tail alone is no chaos: starts near the edge of a smooth basin leave the saddle
-    on it at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a
-    chaotic saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
+    An exponential tail does not prove chaos: starts near a smooth basin boundary leave its saddle
+    at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a chaotic
+    saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
     entropy (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories
     before their capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
 

@@ -93,16 +93,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     """Compute the largest Lyapunov exponent of the attractor that a start reaches.
 
     ``lambda = lim ln(|dx(tau)| / |dx(0)|) / tau``, ``dx`` a small deviation. The start is followed
-    until an attractor has captured it. Of a closed orbit the exponent is exact, from the
-    multipliers of ``P^n``: ``ln |mu| / (n T)``. Of chaos it is the mean over 256 trajectories on
+    until an attractor has captured it. For a closed orbit the exponent is exact, from the
+    multipliers of ``P^n``: ``ln |mu| / (n T)``. For chaos it is the mean over 256 trajectories on
     the attractor, the first periods of each dropped, with the standard error of their spread; they
-    go on until that is ``precision`` times the exponent. A trajectory that is chaotic for long and
+    continue until that is ``precision`` times the exponent. A trajectory that is chaotic for long and
     then captured has the exponent of its attractor; ``transient_periods`` is the time of capture.
 
-    Friction: a turn multiplies the deviation's velocity by the ratio of the accelerations after and
-    before it; a stick sets its velocity to 0 and leaves its angle. A motion that sticks has a
-    finite largest exponent, and its second one is minus infinity. A pendulum that friction holds
-    permanently has none: deviations neither grow nor shrink.
+    With friction, a turning point multiplies the deviation's velocity by the ratio of the
+    accelerations after and before it; sticking sets its velocity to 0 and keeps its angle. A motion
+    that sticks has a finite largest exponent, and its second one is minus infinity. A pendulum that
+    friction holds permanently has none: deviations neither grow nor shrink.
 
     Parameters
     ----------

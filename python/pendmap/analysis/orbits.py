@@ -89,13 +89,13 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
     displacement is compared with its linear part on every cell of the grid; cells in which it
-    cannot vanish are discarded, the others quartered, four times. Newton's method begins in those that
-    remain, first by differences, then on the precise map, and beside orbits near their birth with
-    the known ones divided out. Orbits that close to 1e-12, or to rounding where
-    the multipliers are large, are kept, with the Floquet multipliers, the eigenvalues of the
-    derivative of ``P^n``, also where friction stops the pendulum on its way. An orbit whose
-    neighbours in the plane lie nearer than a cell may be missed; a finer grid finds it. Rest states
-    that friction holds form a continuum and are not listed.
+    cannot vanish are discarded, the others quartered, four times. Newton's method begins in those
+    that remain, first by differences, then on the precise map, and beside orbits near their birth
+    with the known ones divided out. Orbits that close to 1e-12, or to rounding where the
+    multipliers are large, are kept, with the Floquet multipliers, the eigenvalues of the derivative
+    of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
+    plane lie nearer than a cell may be missed; a finer grid finds it. Rest states that friction
+    holds form a continuum and are not listed.
 
     Parameters
     ----------

@@ -87,20 +87,20 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
 ) -> xr.Dataset:
     """Find the set of attractors in every cell of a plane of two parameters.
 
-    Every cell is searched from a few initial conditions, other ones than its neighbours', and from
-    points of its neighbours' attractors: grids become finer from every eighth cell to all, each
-    cell beginning also from the attractors of its neighbours on the coarser grid; then, in six
-    passes, from the attractors that cells at distances from eight to one have and it lacks. In this
-    way branches that coexist are followed, and nothing depends on the order of the work.
+    Every cell is searched from a few initial conditions, different from its neighbours', and from
+    points of its neighbours' attractors: grids are refined from every eighth cell to all, each cell
+    starting also from the attractors of its neighbours on the coarser grid; then, in six passes,
+    from the attractors that cells at distances from eight to one have and it lacks. In this way
+    coexisting branches are followed, and the result does not depend on the order of the work.
 
-    Trajectories run until a stable orbit, found by Newton's method, has captured them. Those that
-    nothing captures are watched four times as long again, in four windows. Windows that turn alike
-    in regions that meet form a group; a set of groups that no trajectory leaves, with an exponent
-    that is positive by four standard errors, is chaos of its kind, unless it holds a stable orbit
-    of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that captures it. A
-    run goes on while its last group leads nowhere known, and a set of fewer than 16 runs gets 16
-    more from its own points. If the cell has another attractor, which could end chaos, none of 16
-    runs may end within 5000 periods. All other starts are undecided.
+    Trajectories run until a stable orbit, found by Newton's method, has captured them. Those not
+    captured are followed four times as long again, in four windows. Windows of equal senses of
+    rotation whose regions meet form a group; a set of groups that no trajectory leaves, with an
+    exponent that is positive by four standard errors, is chaos of its kind, unless it contains a
+    stable orbit of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that
+    captures it. A run continues while its last group has no known successor, and a set of fewer
+    than 16 runs gets 16 more from its points. If the cell has another attractor, which could end
+    chaos, none of 16 runs may end within 5000 periods. All other starts are undecided.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         As for :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
         with the period and the drive's pull.
     max_periods : int, optional
-        Periods after which trajectories begin to be watched; by default until damping would have
-        shrunk a free motion by exp(-40), 64 at least.
+        Periods before the four windows of trajectories not captured; by default those in which
+        damping shrinks a free motion by exp(-40), at least 64.
     seed : int
         Shifts the initial conditions, and draws the models of ``draws``.
     curves : bool

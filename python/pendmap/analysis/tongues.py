@@ -118,11 +118,11 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     are found, and moved onto the map itself. In the plane of eq. 1.4 a point is ``(e, alpha^2) =
     (p/omega^2, 1/omega^2)``.
 
-    A constant torque makes of rest an orbit of the drive's period. Where rest is stable without the
-    torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, both ways,
-    by Newton's method. It is stable between critical amplitudes as rest is; it ceases at a fold,
-    which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
-    makes one of them the continuation of rest, without a critical amplitude.
+    A constant torque turns rest into an orbit of the drive's period. Where rest is stable without
+    the torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, in
+    both directions, by Newton's method. It is stable between critical amplitudes as rest is; it
+    ceases at a fold, the one with multiplier +1. Where two oscillations of period 1 branch from
+    rest, a torque makes one of them the continuation of rest, without a critical amplitude.
 
     Without a torque, where hanging rest first loses its stability an oscillation is born, with
     period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its

@@ -133,8 +133,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         reached, ``end_error`` the difference at the end.
     samples : int, optional
         Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
-        curve needs, up to 200,000 in all; fewer than 64 where that would be more than two
-        million. The motion does not depend on them, the batches of an exponent do.
+        curve needs, up to 200,000 in all; fewer than 64 where that would be more than two million.
+        The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
         standard error from the spread of 20 batches, the first tenth left out (from the time

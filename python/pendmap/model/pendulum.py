@@ -57,8 +57,8 @@ class Pendulum:
     ------
     InputError
         If a value is not finite or outside its range, an effect occurs twice, or one duplicates a
-        parameter: ``viscous_damping`` beside ``gamma``,
-        ``coulomb_friction`` beside ``theta_r``, ``bias_torque`` beside ``torque``.
+        parameter: ``viscous_damping`` beside ``gamma``, ``coulomb_friction`` beside ``theta_r``,
+        ``bias_torque`` beside ``torque``.
 
     References
     ----------

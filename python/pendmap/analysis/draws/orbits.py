@@ -28,13 +28,12 @@ def orbits_over(
     """Return K closed orbits with statistics of the orbits of D draws.
 
     Orbits are matched by name, and among those of one name by their points. Of each the point and
-    the multipliers nearest to those of the model's orbit are taken. Adds
-    ``drawn_theta``, ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D),
-    nan where a draw has no such orbit; ``theta_spread``, ``velocity_spread`` and
-    ``multipliers_spread``, their standard deviations over the draws; ``exists`` and
-    ``stable_share``, the shares of the draws in which it exists, and exists and is stable;
-    ``drawn`` (D, parameter). Attribute ``drawn_others``: mean number of orbits of a draw that the
-    model itself lacks.
+    the multipliers nearest to those of the model's orbit are taken. Adds ``drawn_theta``,
+    ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
+    has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
+    standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
+    which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
+    mean number of orbits of a draw that the model itself lacks.
     """
     names, points = names_of(dataset, "orbit"), points_of(dataset, "orbit")
     count, total = len(names), len(draws)

@@ -28,10 +28,10 @@ def tongues_over(
     """Return K critical amplitudes with their 95 % bands over D draws.
 
     At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
-    lowest, and matched by this number. Adds ``drawn_p`` (K, D), nan where a draw has no
-    such amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the
-    share of the draws that have it; the same for inverted rest with the prefix ``inverted_``;
-    ``drawn`` (D, parameter).
+    lowest, and matched by this number. Adds ``drawn_p`` (K, D), nan where a draw has no such
+    amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the share
+    of the draws that have it; the same for inverted rest with the prefix ``inverted_``; ``drawn``
+    (D, parameter).
     """
     columns: dict[str, list[Floats]] = {table: [] for table, _ in _TABLES}
     for one in draws.each(run, progress):
