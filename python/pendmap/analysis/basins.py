@@ -158,8 +158,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ``theta_r`` adds to ``gamma``. Where chaos coexists with other attractors ten times the
         longest settling time seen.
     layer_periods : int, optional
-        Periods of the finite-time layers; by default those in which an exponent stretches one cell to
-        the size of the plane.
+        Periods of the finite-time layers; by default those in which an exponent stretches one cell
+        to the size of the plane.
     threads : int, optional
         Number of threads; by default one per processor. The result does not depend on it.
     seed : int

@@ -118,9 +118,9 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     An exponential tail does not prove chaos: starts near a smooth basin boundary leave its saddle
     at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a chaotic
-    saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
-    entropy (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories
-    before their capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
+    saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its entropy
+    (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories before their
+    capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
 
     Parameters
     ----------

@@ -96,8 +96,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     until an attractor has captured it. For a closed orbit the exponent is exact, from the
     multipliers of ``P^n``: ``ln |mu| / (n T)``. For chaos it is the mean over 256 trajectories on
     the attractor, the first periods of each dropped, with the standard error of their spread; they
-    continue until that is ``precision`` times the exponent. A trajectory that is chaotic for long and
-    then captured has the exponent of its attractor; ``transient_periods`` is the time of capture.
+    continue until that is ``precision`` times the exponent. A trajectory that is chaotic for long
+    and then captured has the exponent of its attractor; ``transient_periods`` is the time of
+    capture.
 
     With friction, a turning point multiplies the deviation's velocity by the ratio of the
     accelerations after and before it; sticking sets its velocity to 0 and keeps its angle. A motion
