@@ -17,8 +17,7 @@ MOST: Final = 500  # Largest length of a message, characters
 def one_line(text: str) -> str:
     """Return a text on one line of 500 characters at most, control characters as escapes.
 
-    The text may contain file names, values and messages of libraries; the middle of a longer text
-    is left out.
+    It may contain file names, values and messages of libraries; a longer text lacks its middle.
     """
     line = " ".join(text[: 100 * MOST].split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)

@@ -33,8 +33,7 @@ _APART = 4e-3
 there, fraction of the figure's height."""
 
 _STRIP = 1e-6
-"""Width of a stable strip, fraction of the figure's height, below which it is a line and rounding
-determines whether its edges are found."""
+"""Height of a stable strip, fraction of the figure's, below which rounding hides its edges."""
 
 _STEP = 1 / 1000
 """Width of an interval below which bends are not resolved, fraction of the figure's width."""
@@ -192,13 +191,13 @@ def in_picture(
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
-    """Return ``p`` of the first tongue to first order; nan nearer to the second tongue."""
+    """Return critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
     a, c = 1 - omega**2 / 4, gamma * omega / 2
     return np.where(omega > 1.0, 2 * np.hypot(a, c), np.nan)
 
 
 def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
-    """Return ``p`` of the first tongue to second order; nan where the expansion has none."""
+    """Return critical ``p`` of the first tongue to second order; nan if there is none."""
     a, c = 1 - omega**2 / 4, gamma * omega / 2
     with np.errstate(divide="ignore", invalid="ignore"):
         k = 1 / (9 * omega**2 - 4)
@@ -211,7 +210,7 @@ def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
 
 
 def second_tongue(omega: Floats, gamma: float) -> Floats:
-    """Return ``p`` of the second tongue to second order; nan where the expansion has none."""
+    """Return critical ``p`` of the second tongue to second order; nan if there is none."""
     a, c = 1 - omega**2, gamma * omega
     with np.errstate(divide="ignore", invalid="ignore"):
         s = 1 / (4 * (4 * omega**2 - 1))

@@ -96,9 +96,8 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     until an attractor has captured it. For a closed orbit the exponent is exact, from the
     multipliers of ``P^n``: ``ln |mu| / (n T)``. For chaos it is the mean over 256 trajectories on
     the attractor, the first periods of each dropped, with the standard error of their spread; they
-    continue until that is ``precision`` times the exponent. A trajectory that is chaotic for long
-    and then captured has the exponent of its attractor; ``transient_periods`` is the time of
-    capture.
+    continue until that is ``precision`` times the exponent. A long chaotic transient has the
+    exponent of the attractor that captures it; ``transient_periods`` is the time of capture.
 
     With friction, a turning point multiplies the deviation's velocity by the ratio of the
     accelerations after and before it; sticking sets its velocity to 0 and keeps its angle. A motion
@@ -204,8 +203,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
 def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
     """Return the exponent per unit of tau, its standard error, and the one of regular motion.
 
-    The last is the exponent of undamped motion whose deviations grow as tau. Missing values are
-    nan.
+    The last is that of undamped motion whose deviations grow as tau. Missing values are nan.
     """
     if raw.attractor is not None:
         return raw.attractor.exponent, raw.attractor.exponent_stderr, math.nan

@@ -124,8 +124,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     ceases at a fold, the one with multiplier +1. Where two oscillations of period 1 branch from
     rest, a torque makes one of them the continuation of rest, without a critical amplitude.
 
-    Without a torque, where hanging rest first loses its stability an oscillation is born, with
-    period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its
+    Without a torque, an oscillation branches off where hanging rest first loses its stability, with
+    period 1 (multiplier +1) or 2 (-1). If it branches toward smaller ``p`` it is followed to its
     fold: between fold and critical curve it coexists with a stable rest.
 
     Parameters

@@ -135,7 +135,7 @@ def begin(given: dict[str, Any], name: str) -> tuple[Pendulum | Rig, Outputs]:
 
 
 def rig_from(path: Path) -> Rig:
-    """Read a model file that must be in SI; the message of a refusal says what it lacks."""
+    """Read a model file that must be in SI; otherwise raise an error that names what it lacks."""
     model = load_model(path)
     if not isinstance(model, Rig):
         raise InputError(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def own_name(effect: str) -> str | None:
-    """Return the parameter of a :class:`Rig` that is the same term as an effect, if any."""
+    """Return the parameter of a :class:`Rig` with the same term as an effect, if any."""
     if effect not in library():
         return None
     entries = definition(effect)["parameters"]
@@ -180,7 +180,7 @@ class Rig:
 
     @functools.cached_property
     def pendulum(self) -> Pendulum:
-        """The pendulum without dimensions; ``omega`` is 1 where nothing is driven."""
+        """The pendulum without dimensions; ``omega`` is 1 without drive."""
         units = self.units
         numbers = {
             bare: units.bare(getattr(self, si), power) for bare, (si, power) in COUNTERPARTS.items()
