@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # importing typing takes most of the time that this file takes
+TYPE_CHECKING = False  # importing typing would take most of this file's import time
 if TYPE_CHECKING:
     from typing import Any
 
@@ -98,7 +98,7 @@ ANALYSES = {
         "Compute the homoclinic threshold by Melnikov's criterion.",
     ),
 }
-"""Kind of result, the name of its module too: command, functions that return it, what it does."""
+"""Kind of result (also its module's name): command, functions that return it, description."""
 
 _OTHERS = {
     "analysis.fractality": [
@@ -140,7 +140,7 @@ __all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
-    """Import what needs numpy and xarray when it is first used: the command answers sooner."""
+    """Import a public name on first use: numpy and xarray are loaded only when needed."""
     if name == "__version__":
         from importlib.metadata import version
 

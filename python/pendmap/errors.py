@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-MOST: Final = 500  # Characters of a message
+MOST: Final = 500  # Largest length of a message, characters
 
 
 def one_line(text: str) -> str:
     """Return a text on one line of 500 characters at most, control characters as escapes.
 
-    File names, values and messages of libraries may stand in it; its middle is left out if it is
-    long.
+    It may contain file names, values and messages of libraries; a longer text lacks its middle.
     """
     line = " ".join(text[: 100 * MOST].split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
@@ -28,23 +27,23 @@ def one_line(text: str) -> str:
 
 
 class InputError(ValueError):
-    """A value that was given is not allowed; the message names it and what it must be."""
+    """An argument has a value that is not allowed; the message names it and the allowed values."""
 
     def __init__(self, message: object = "") -> None:
         super().__init__(one_line(str(message)))
 
 
 class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the caller)
-    """A fit is lost: its motion leaves the range of numbers, or its values are no model's."""
+    """A fit diverged: its trajectory overflowed, or its values are outside a model's range."""
 
 
 class NotWrittenError(OSError):
-    """Results were computed that could not be written; the message names them and what was."""
+    """Computed results could not be written; the message names them and the files written."""
 
 
 @contextlib.contextmanager
 def core_errors(lost: type[Exception] = InputError) -> Iterator[None]:
-    """Raise what the core refuses as InputError, and as ``lost`` where a motion diverges."""
+    """Convert the core's ValueError to InputError, and to ``lost`` if a trajectory diverges."""
     try:
         yield
     except ValueError as error:
@@ -59,13 +58,13 @@ MOST_DRAWS: Final = 10_000
 MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1
-MOST_THREADS: Final = 256  # Greatest values of arguments
+MOST_THREADS: Final = 256  # Largest allowed values of arguments
 
-_LONGEST: Final = 60  # Characters of a value in a message
+_LONGEST: Final = 60  # Largest length of a value in a message, characters
 
 
 def short_repr(value: object) -> str:
-    """Return a value as messages name it: on one line, cut where it is long."""
+    """Return the repr of a value for a message: on one line, cut after 60 characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of more digits than Python writes
@@ -74,7 +73,7 @@ def short_repr(value: object) -> str:
 
 
 def _bare(value: Any) -> Any:  # noqa: ANN401 (whatever was given)
-    """Take a number out of numpy's scalars and arrays without dimensions."""
+    """Return numpy scalars and 0-dimensional arrays as Python numbers, others unchanged."""
     return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
 
 
@@ -124,13 +123,13 @@ def check_flag(name: str, value: object) -> bool:
 
 
 def check_callable(name: str, value: object, of: str = "two numbers, done and in all") -> None:
-    """Refuse anything that is neither ``None`` nor a function ``of`` something."""
+    """Raise InputError unless a value is ``None`` or callable; ``of`` names its arguments."""
     if value is not None and not callable(value):
         raise InputError(f"{name} must be a function of {of}, got {short_repr(value)}")
 
 
 def check_type(name: str, value: object, kind: type, example: str) -> None:
-    """Refuse anything not of a type; ``example`` shows how one is made."""
+    """Raise InputError unless a value is of a type; the message quotes a valid ``example``."""
     if not isinstance(value, kind):
         article = ("an " if kind.__name__[0] in "AEIOU" else "a ") + kind.__name__
         raise InputError(f"{name} must be {article}, like {example}, got {short_repr(value)}")

@@ -1,4 +1,4 @@
-"""Numbers, counts and tables as text: the only place where numbers with errors become words."""
+"""Text of numbers, counts and tables: the only module that formats numbers with errors."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 
-DIGITS: Final = 5  # Digits of a number whose uncertainty is not known
+DIGITS: Final = 5  # Significant digits of a number of unknown uncertainty
 
-PLACES: Final = 10  # Most decimal places of a number
+PLACES: Final = 10  # Largest number of decimal places of a number
 
-ERROR_DIGITS: Final = 2  # Digits of a standard error
+ERROR_DIGITS: Final = 2  # Significant digits of a standard error
 
-MOST_PLACES: Final = 15  # Most decimal places of an estimate
+MOST_PLACES: Final = 15  # Largest number of decimal places of an estimate
 
-LONG_AGO: Final = 1e3  # Time from which six digits are coarser than milliseconds, s
+LONG_AGO: Final = 1e3  # Time from which six digits are coarser than 1 ms, s
 
 
 def counted(count: int, noun: str, several: str = "") -> str:
@@ -31,22 +31,22 @@ def counted(count: int, noun: str, several: str = "") -> str:
 
 
 def listed(texts: Sequence[str], most: int) -> str:
-    """Return the first ``most`` of some texts, ``1, 2, 3, ...`` where there are more."""
+    """Return the first ``most`` texts joined by commas, with ``, ...`` if there are more."""
     return ", ".join(texts[:most]) + (", ..." if len(texts) > most else "")
 
 
 def percent(value: float) -> str:
-    """Return ``0.123 %``; empty where a value is not finite."""
+    """Return ``0.123 %``; empty if the value is not finite."""
     return f"{value:.3g} %" if math.isfinite(value) else ""
 
 
 def moment(time: float) -> str:
-    """Return a time in s to six digits, and to a millisecond where that takes more."""
+    """Return a time in s to six digits, from 1000 s on to a millisecond."""
     return f"{time:.6g}" if abs(time) < LONG_AGO else f"{round(time, 3):.15g}"
 
 
 def written(value: float, width: float) -> str:
-    """Return a number with two digits of its uncertainty; five where that is 0, unknown."""
+    """Return a number to two digits of its uncertainty, or five digits if that is 0 (unknown)."""
     if not (math.isfinite(value) and math.isfinite(width)):
         return f"{value:g}"
     if not width:
@@ -59,21 +59,21 @@ def written(value: float, width: float) -> str:
 
 
 def with_error(value: float, error: float, sign: str = "+-") -> str:
-    """Return ``0.2736 +- 0.0013``; the number with five digits where its error is 0 or unknown."""
+    """Return ``0.2736 +- 0.0013``; the number to five digits if its error is 0 or unknown."""
     if not (math.isfinite(error) and error > 0):
         return written(value, 0.0)
     return f"{written(value, error)} {sign} {written(error, error)}"
 
 
 class Readable(abc.ABC):
-    """A result with ``print(result)`` and a notebook's cell as its command prints it.
+    """Base of results whose text and HTML are what their command prints.
 
-    A dataclass that is one has ``repr=False`` and a ``__repr__`` of one line, without its arrays.
+    A dataclass of this type has ``repr=False`` and a ``__repr__`` of one line, without arrays.
     """
 
     @abc.abstractmethod
     def said(self) -> tuple[Sequence[Table], Iterable[str]]:
-        """Return tables, each a head and rows, and the lines below them."""
+        """Return tables, each a header and rows, and the lines below them."""
 
     def __str__(self) -> str:
         tables, lines = self.said()
@@ -86,7 +86,7 @@ class Readable(abc.ABC):
 
 
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in columns as wide as they need, its head first, and an empty line."""
+    """Return a table as text with aligned columns: header, rows, a final newline."""
     lines = [head, *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(head))]
     padded = ("  ".join(map(str.ljust, line, wide)) for line in lines)
@@ -102,7 +102,7 @@ def _html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def interval(estimate: Estimate) -> str:
-    """Return the 95 % interval to the digits of the error: ``[6.2022, 6.2071]``; empty without."""
+    """Return the 95 % interval to the digits of the error, ``[6.2022, 6.2071]``, or no text."""
     if estimate.ci95 is None:
         return ""
     low, high = estimate.ci95
@@ -118,7 +118,7 @@ def interval(estimate: Estimate) -> str:
 def estimate_text(estimate: Estimate, *, minus: str = "-") -> str:
     """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012.
 
-    Pictures use another ``minus``.
+    Figures pass a typographic ``minus``.
     """
     value, error = estimate.value, estimate.stderr
     text = f"{value:.{DIGITS}g}"
@@ -132,7 +132,7 @@ def estimate_text(estimate: Estimate, *, minus: str = "-") -> str:
 
 
 def _places(error: float) -> int:
-    """Return the decimal places of a number with this error."""
+    """Return the number of decimal places that shows two digits of an error."""
     return ERROR_DIGITS - 1 - math.floor(math.log10(error))
 
 
@@ -145,9 +145,9 @@ class Estimate:
     value : float
         In SI.
     stderr : float or None
-        Its standard error, where the method gives one.
+        Its standard error, if the method gives one.
     ci95 : tuple of float or None
-        Its 95 % interval, where the method gives one; it need not be symmetric.
+        Its 95 % interval, if the method gives one; it need not be symmetric.
     """
 
     value: float

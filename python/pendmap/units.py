@@ -25,11 +25,11 @@ class Units:
     si: bool = False  # whether results are in SI
 
     def given(self, value: Any, power: float) -> Any:  # noqa: ANN401 (a number, or an array)
-        """Return a nondimensional number or array in these units."""
+        """Convert a nondimensional number or array to these units."""
         return value * self.w0**power
 
     def bare(self, value: Any, power: float) -> Any:  # noqa: ANN401 (likewise)
-        """Return a number or array in these units as nondimensional."""
+        """Convert a number or array in these units to a nondimensional one."""
         return value / self.w0**power
 
     @property
@@ -49,12 +49,12 @@ class Units:
 
     @property
     def of_rate(self) -> str:
-        """Unit of exponents."""
+        """Unit of rates, such as Lyapunov exponents."""
         return "1/s" if self.si else "1 per tau"
 
     @property
     def derivative(self) -> str:
-        """The velocity as a derivative."""
+        """Symbol of the velocity as a derivative."""
         return "dtheta/dt" if self.si else "dtheta/dtau"
 
     @property
@@ -63,7 +63,7 @@ class Units:
         return "t" if self.si else "tau"
 
     def spoken(self, velocity: str) -> str:
-        """Return the text of a velocity with its unit, where it has one."""
+        """Return the text of a velocity with its unit, if it has one."""
         return f"{velocity} rad/s" if self.si else velocity
 
     def at(self, time: str) -> str:
@@ -71,7 +71,7 @@ class Units:
         return f"{self.clock} = {self.seconds(time)}"
 
     def seconds(self, time: str) -> str:
-        """Return the text of a time with its unit, where it has one."""
+        """Return the text of a time with its unit, if it has one."""
         return f"{time} s" if self.si else time
 
     @property
@@ -81,7 +81,7 @@ class Units:
 
     @property
     def own_period(self) -> str:
-        """Period without a drive: that of small swings."""
+        """Text of the period of small oscillations, used without drive."""
         return "2 pi / w0" if self.si else "2 pi"
 
     @property

@@ -134,10 +134,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
 ) -> xr.Dataset:
     """Compute the basins of attraction: the attractor on which each initial condition ends.
 
-    Attractors are found from a coarse set of starts, polished by Newton's method to 1e-12 and
+    Attractors are found from a coarse set of starts, refined by Newton's method to 1e-12 and
     classified by their period ``n`` (in forcing periods) and winding ``w`` (net turns over it).
-    Then every cell runs until an attractor has captured it; cells that meet none begin new
-    searches. Without damping, or where one chaotic attractor takes everything, labels have no
+    Then every cell runs until an attractor has captured it; cells that reach none begin new
+    searches. Without damping, or if one chaotic attractor captures all starts, labels have no
     meaning: net turns and the finite-time exponent after ``layer_periods`` are given instead.
 
     Parameters
@@ -158,10 +158,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ``theta_r`` adds to ``gamma``. Where chaos coexists with other attractors ten times the
         longest settling time seen.
     layer_periods : int, optional
-        Periods of the finite-time layers; by default what an exponent needs to stretch one cell to
-        the size of the plane.
+        Periods of the finite-time layers; by default those in which an exponent stretches one cell
+        to the size of the plane.
     threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
+        Number of threads; by default one per processor. The result does not depend on it.
     seed : int
         Shifts the samples of starts.
     check : bool
@@ -169,10 +169,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         share of starts whose label changes nearby.
     draws : int, optional
         Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
-        the probability of each end in each cell, and the doubt that the parameters cause
+        the probability of each outcome in each cell, and the uncertainty due to the parameters
         (:mod:`pendmap.analysis.draws.basins`).
     progress : callable, optional
-        Called now and then with the number of units of work done, and in all.
+        Called repeatedly with the units of work done and in total.
 
     Returns
     -------
@@ -209,7 +209,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
 
     See Also
     --------
-    basins_of : the same for a list of starts.
+    basins_of : Attractors reached by a list of starts.
 
     Examples
     --------
@@ -347,7 +347,7 @@ def _cells(
 
 
 def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
-    """Return counts of starts whose label changes nearby; none without a boundary."""
+    """Return the counts of starts whose label changes nearby; none without a boundary."""
     if not raw.uncertainty_eps.size:
         return {}
     what = "distance in sides of the window"
@@ -400,7 +400,7 @@ def _complete(
 
 
 def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
-    """Return the measures of the boundary, none without a boundary."""
+    """Return the measures of the boundary as attributes, None without a boundary."""
     found: dict[str, float | None] = {}
     if raw.texture.boundary_boxes:
         entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: attractors along one parameter, all of them, and followed up and down."""
+"""Bifurcation diagrams: all attractors along one parameter, and sweeps up and down."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-_SAME = 1e-4  # Distance, in rad and in units of velocity, below which points of orbits are one
-_NEAR = 0.3  # Distance, likewise, below which neighbouring attractors may belong to one branch
-_LISTED = 12  # Branches that a summary lists
+_SAME = 1e-4  # Distance, rad and units of velocity, below which points of orbits are equal
+_NEAR = 0.3  # Distance, same units, below which neighbouring attractors may belong to one branch
+_LISTED = 12  # Largest number of branches in a summary
 
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -71,9 +71,9 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     """Compute the stroboscopic points of the attractors against one parameter.
 
     At every value all attractors are searched as by :func:`pendmap.parameter_map`, from several
-    starts and from the attractors at neighbouring values. Besides, one motion is followed as the
-    parameter slowly grows, and one as it falls: at each value it goes on from where it was, moved
-    by 1e-6, until it has arrived on an attractor. Where the two differ there is hysteresis.
+    starts and from the attractors at neighbouring values. In addition, one motion is followed as
+    the parameter rises in steps, and one as it falls: at each value it continues from its last
+    state, displaced by 1e-6, until it is on an attractor. Where the two differ there is hysteresis.
 
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.
@@ -224,7 +224,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
-    """Return lines on where the two sweeps are on different attractors."""
+    """Return summary lines on the values at which the sweeps are on different attractors."""
     up, down = dataset["up"].values, dataset["down"].values
     kind = np.append(dataset["entry_kind"].values, -1)
     differ = kind[up] != kind[down]
@@ -242,7 +242,7 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
 
 
 def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
-    """Return the widest ranges of values."""
+    """Return the three widest ranges of the marked values, as text."""
     every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
     spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
     said = ", ".join(
@@ -253,13 +253,13 @@ def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
 
 
 def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
-    """Whether two attractors are mirror images: orbits by a point, chaos by its sense."""
+    """Return whether two attractors are mirror images: orbits by a point, chaos by its sense."""
     n, w = dataset["entry_n"].values, dataset["entry_w"].values
     if n[one] != n[other] or w[one] != -w[other]:
         return False
     if n[one] == 0:
         return bool(w[one] != 0)
-    # The points stand in the order of their attractors.
+    # Points are sorted by attractor.
     owner = dataset["point_entry"].values
     first, there = (slice(*np.searchsorted(owner, (k, k + 1))) for k in (one, other))
     theta, velocity = dataset["point_theta"].values, dataset["point_velocity"].values
@@ -303,7 +303,7 @@ def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], lis
 def _apart(
     plane: NDArray[np.float64], first: NDArray[np.intp], a: int, b: int, *, closed: bool
 ) -> float:
-    """Return how far the first point of ``a`` is from the nearest of ``b``; 0 for chaos."""
+    """Return the distance from the first point of ``a`` to the nearest of ``b``; 0 for chaos."""
     if not closed:
         return 0.0
     gap = plane[first[b] : first[b + 1]] - plane[first[a]]

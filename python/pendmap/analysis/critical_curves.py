@@ -1,4 +1,4 @@
-"""Critical curves of rest: more frequencies where they need them, and curves by perturbation.
+"""Critical curves of rest: refinement of their frequencies, and curves by perturbation.
 
 For the damped Mathieu equation ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` a periodic
 solution is written with few harmonics, and those that are not resonant are eliminated, their
@@ -26,28 +26,29 @@ if TYPE_CHECKING:
 
 Floats: TypeAlias = NDArray[np.float64]
 
-_BENT = 2e-3  # Largest distance of a drawn line from its curve, in parts of the picture's height
+_BENT = 2e-3  # Largest distance of a drawn line from its curve, fraction of the figure's height
 
 _APART = 4e-3
-"""Distance of the two sides of a curve below which the curve ends there, in parts of the height."""
+"""Distance of two branches, or of a curve and the end of the search, below which the curve ends
+there, fraction of the figure's height."""
 
 _STRIP = 1e-6
-"""A stable strip narrower than this is a line, and rounding decides whether its edges are found."""
+"""Height of a stable strip, fraction of the figure's, below which rounding hides its edges."""
 
 _STEP = 1 / 1000
-"""Width of an interval, in parts of the picture's, below which bends are not resolved further."""
+"""Width of an interval below which bends are not resolved, fraction of the figure's width."""
 
 _NOSE = 1e-6
-"""Width of an interval in which a curve turns back, below which it is not divided, in parts of the
-picture's width. Beside such a turn the height varies as the square root of the distance."""
+"""Width of an interval in which a curve turns back, below which it is not halved, fraction of the
+figure's width. Near such a turn the height varies as the square root of the distance."""
 
 _GRADED = 4.5  # Largest ratio of an interval to its neighbours
 
-_ROUNDS = 24  # Halvings of an interval at most
-_IN_VIEW = 1.05  # Height, in parts of the picture's, up to which curves matter
+_ROUNDS = 24  # Largest number of halvings of an interval
+_IN_VIEW = 1.05  # Height up to which curves are refined, fraction of the figure's height
 PLANES = ("omega-p", "e-alpha2")
 """Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
-_HIGHEST = 2.6  # Largest ``e`` of a picture in the plane of eq. 1.4, if it was computed.
+_HIGHEST = 2.6  # Largest ``e`` of a figure in the plane of eq. 1.4, if it was computed
 
 
 def denser(
@@ -57,11 +58,11 @@ def denser(
     curves: Callable[[Any], list[tuple[Floats, Floats]]],
     views: Sequence[Callable[[Floats, Floats], tuple[Floats, Floats]]],
 ) -> tuple[Floats, list[Any]]:
-    """Return frequencies with more where curves end, turn or bend in view, and what is found there.
+    """Return frequencies refined where curves end, turn or bend in view, and the results there.
 
-    ``solve`` returns what is found at further frequencies; ``curves`` takes what was found at one
-    to amplitudes, ascending, the last the largest looked for, and multipliers, for each model;
-    ``views`` take frequencies and amplitudes into a picture that is [0, 1] wide and high.
+    ``solve`` returns the results at further frequencies; ``curves`` maps the result at one to
+    amplitudes, ascending, the last the end of the search, and multipliers, for each model;
+    ``views`` map frequencies and amplitudes to a figure that is [0, 1] wide and high.
     """
     found = list(found)
     for _ in range(_ROUNDS):
@@ -88,16 +89,16 @@ def denser(
 
 @dataclass(frozen=True)
 class _Column:
-    """Critical points at one frequency, in parts of the picture's height."""
+    """Critical points at one frequency, as fractions of the figure's height."""
 
     heights: Floats
     multiplier: Floats
     end: float
-    """The height of the largest amplitude that was looked for."""
+    """Height of the largest amplitude of the search."""
 
     @classmethod
     def of(cls, heights: Floats, multiplier: Floats) -> Self:
-        """Leave out those on both sides of a stable strip that is only a line."""
+        """Return a column without the two edges of a stable strip that is only a line."""
         kept: list[int] = []
         for k, height in enumerate(heights[:-1]):
             other = kept and multiplier[kept[-1]] == -multiplier[k]
@@ -109,7 +110,7 @@ class _Column:
 
 
 def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
-    """Return which intervals are to be halved for the curves of one model."""
+    """Return which intervals must be halved for the curves of one model."""
     widths = np.abs(np.diff(x))
     wanted = np.zeros(widths.size, dtype=bool)
     for k, (a, b) in enumerate(pairwise(columns)):
@@ -128,7 +129,7 @@ def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
 
 
 def _seen_to_end(a: _Column, b: _Column) -> bool:
-    """Return whether curves missing in one of two columns visibly end: they turn or leave."""
+    """Return whether a curve in only one of two columns ends in view, without turning back."""
     short, long = sorted((a, b), key=lambda one: one.heights.size)
     extra = long.heights.size - short.heights.size
 
@@ -147,7 +148,7 @@ def _seen_to_end(a: _Column, b: _Column) -> bool:
 
 
 def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the places of intervals to halve, those much longer than their neighbours too."""
+    """Return indices of intervals to halve, including those much longer than a neighbour."""
     while True:
         after = np.where(wanted, widths / 2, widths)
         longer = np.zeros_like(wanted)
@@ -160,7 +161,7 @@ def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
-    """Return points given by frequency and amplitude in one of :data:`PLANES`."""
+    """Convert frequencies and amplitudes to coordinates in one of :data:`PLANES`."""
     if plane == PLANES[0]:
         return omega, p
     square = 1 / np.asarray(omega) ** 2
@@ -168,7 +169,7 @@ def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
 
 
 def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float], float]:
-    """Return the ends of a picture's abscissa, and its height above 0."""
+    """Return the ends of a figure's abscissa, and its height above 0."""
     low, high = float(omega[0]), float(omega[-1])
     if plane == PLANES[0]:
         aside = 0.0 if low < high else 0.05 * low
@@ -179,7 +180,7 @@ def window(omega: Floats, p_max: float, plane: str) -> tuple[tuple[float, float]
 def in_picture(
     omega: Floats, p_max: float, plane: str
 ) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
-    """Return the map from frequency and amplitude into a picture [0, 1] wide and high."""
+    """Return the map from frequency and amplitude to a figure [0, 1] wide and high."""
     (left, right), top = window(omega, p_max, plane)
 
     def to(at: Floats, p: Floats) -> tuple[Floats, Floats]:
@@ -190,17 +191,17 @@ def in_picture(
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
-    """Critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
+    """Return critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
     a, c = 1 - omega**2 / 4, gamma * omega / 2
     return np.where(omega > 1.0, 2 * np.hypot(a, c), np.nan)
 
 
 def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
-    """Critical ``p`` of the first tongue to second order; nan where the expansion has none."""
+    """Return critical ``p`` of the first tongue to second order; nan if there is none."""
     a, c = 1 - omega**2 / 4, gamma * omega / 2
     with np.errstate(divide="ignore", invalid="ignore"):
         k = 1 / (9 * omega**2 - 4)
-        # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is not far away.
+        # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is finite for k = 0.
         half = 1 / 8 - a * k
         square = (a**2 + c**2) / (half + np.sqrt(half**2 - k**2 * (a**2 + c**2)))
         found = np.sqrt(square)
@@ -209,7 +210,7 @@ def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
 
 
 def second_tongue(omega: Floats, gamma: float) -> Floats:
-    """Critical ``p`` of the second tongue to second order; nan where the expansion has none."""
+    """Return critical ``p`` of the second tongue to second order; nan if there is none."""
     a, c = 1 - omega**2, gamma * omega
     with np.errstate(divide="ignore", invalid="ignore"):
         s = 1 / (4 * (4 * omega**2 - 1))

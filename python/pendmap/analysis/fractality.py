@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     Labels = npt.NDArray[np.int16]
 
 
-_LEAST_SCALES: Final = 3  # Least number of distances that a power law is fitted to
+_LEAST_SCALES: Final = 3  # Smallest number of distances for a fit of the power law
 _TELLING: Final = 5.0
-"""Variance of a count above which its deviation is normal enough to judge the law by."""
+"""Variance of a count from which its deviation is nearly normal and included in the misfit."""
 _UNLIKELY: Final = 0.01
-"""Chance of a misfit below which the greatest distance is left out: there the law ends."""
-_PART: Final = 16  # Distances on a grid reach up to this part of its shorter side
+"""p-value of a misfit up to which the largest distance is left out, beyond the power law."""
+_PART: Final = 16  # Shorter side of a grid over the largest distance
 _STRIPS: Final = 16  # Strips of a grid that the jackknife leaves out one by one
-_ROUNDS: Final = 100  # Steps of Fisher's scoring at most
-_TIMES: Final = 1.96  # Standard errors in half a 95 % interval
+_ROUNDS: Final = 100  # Largest number of steps of Fisher scoring
+_TIMES: Final = 1.96  # Half width of a 95 % interval, standard errors
 _EPS: Final = 1e-12  # Change of the exponent at which its fit has converged; least share
 BOX: Final = 5  # Side of a box of the basin entropy in cells, as in the core
-_MOST_LABELS: Final = 32_767  # Labels that a map may have
+_MOST_LABELS: Final = 32_767  # Largest number of labels of a map
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -48,11 +48,11 @@ class UncertaintyExponent(Readable):
     value, stderr : float
         The exponent and its standard error.
     ci95 : (float, float)
-        Its interval.
+        Its 95 % interval.
     dimension, dimension_ci95 : float, (float, float)
         Box-counting dimension ``2 - value`` of the boundary.
     eps : ndarray, shape (N,)
-        Distances, rising, in ``unit``.
+        Distances, ascending, in ``unit``.
     uncertain, tried : ndarray of int, shape (N,)
         Starts whose label changes within ``eps``, and starts.
     unit : str
@@ -77,7 +77,7 @@ class UncertaintyExponent(Readable):
 
     @property
     def dimension_ci95(self) -> tuple[float, float]:
-        """Its interval."""
+        """95 % interval of the dimension."""
         return 2.0 - self.ci95[1], 2.0 - self.ci95[0]
 
     @property
@@ -120,10 +120,10 @@ def uncertainty_exponent(
     labels on a grid the distances are 1, 2, 3, 4, 6, ... cells, along both axes at once, from every
     cell; filaments thinner than a cell are not resolved.
 
-    The law is fitted by its binomial likelihood to the smallest distances, up to where it breaks (a
+    The law is fitted by its binomial likelihood to the smallest distances, up to where it fails (a
     misfit less likely than 1 %), and the interval is widened by the remaining misfit. On a grid
-    neighbouring cells are no independent starts: their effective number follows from the spread
-    between strips of the plane; beyond an edge that is not periodic lies the plane's mirror image.
+    neighbouring cells are not independent: their effective number follows from the spread between
+    strips of the plane; at an edge that is not periodic the plane is continued by reflection.
     Starts with an unknown end nearby, undecided or failed, are left out. Attractors that are mirror
     images of one another count as two.
 
@@ -133,8 +133,8 @@ def uncertainty_exponent(
         Numbers of attractors from 1; 0 and below where the end is not known. Or a map of
         :func:`pendmap.basins`.
     periodic : (bool, bool)
-        Whether the last row has the first one as its neighbour, and the last column likewise. Of a
-        dataset not needed.
+        Whether the last row has the first one as its neighbour, and the last column likewise.
+        Ignored for a dataset.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def uncertainty_exponent(
     cells, _ = numbered(labels)
     eps, uncertain, tried = _on_grid(cells, periodic)
     hit, all_ = uncertain.sum(axis=(1, 2)), tried.sum(axis=(1, 2))
-    # Neighbouring cells tell much the same: they count for as many as their spread would have.
+    # Neighbouring cells are correlated: their effective number follows from the spread.
     fewer = np.maximum.reduce(
         [_spread(uncertain.sum(axis=axis), tried.sum(axis=axis)) for axis in (1, 2)]
     )
@@ -207,7 +207,7 @@ def fitted(
 
 
 def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, int]:
-    """Return exponent, error, Pearson's misfit, degrees of freedom by maximum likelihood."""
+    """Return maximum-likelihood exponent, error, Pearson's chi squared, degrees of freedom."""
     log = np.log(eps)
     terms = np.stack([np.ones_like(log), log - log.mean()], axis=1)
     weight = np.sqrt(hit + 0.25)
@@ -229,7 +229,7 @@ def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, 
 
 
 def _spread(hit: Floats, tried: Floats) -> Floats:
-    """Return the jackknife variance of shares over the binomial one, 1 at least."""
+    """Return the ratio of the jackknife to the binomial variance of shares, at least 1."""
     count = hit.shape[1]
     whole = np.maximum(tried.sum(axis=1), 1.0)
     share = hit.sum(axis=1) / whole
@@ -250,7 +250,7 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
     strips = [np.linspace(0, side, min(_STRIPS, side) + 1)[:-1].astype(int) for side in cells.shape]
     counts: list[list[Floats]] = [[], []]
     far, (height, width) = int(steps[-1]), cells.shape
-    # Beyond an edge lies the other one, or the plane's mirror image: its boundary is as dense.
+    # Beyond an edge the plane is continued, periodic or mirrored: the boundary is as dense.
     wider = cells
     for axis in (0, 1):
         beyond = [(far, far) if k == axis else (0, 0) for k in (0, 1)]
@@ -269,7 +269,7 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
 
 
 def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
-    """Return the law of a map that has counts; None where they are too few."""
+    """Return the uncertainty exponent of a map with counts; None if they are too few."""
     eps, uncertain, tried = (
         dataset[name].values for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
     )
@@ -307,7 +307,7 @@ class BasinEntropy:
     boundary_stderr : float
         Its standard error, from the spread over those boxes; infinite with fewer than two.
     boxes, boundary_boxes : int
-        Their numbers.
+        Numbers of all boxes, and of those with more than one label.
     """
 
     value: float
@@ -376,12 +376,12 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
 
 
 def passes_log2(boundary: float, stderr: float) -> bool:
-    """Whether a boundary basin entropy is above ln 2 by more than twice its standard error."""
+    """Return whether a boundary basin entropy exceeds ln 2 by more than two standard errors."""
     return boundary - _TIMES * stderr > math.log(2)
 
 
 def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
-    """Return labels of a plane as numbers from 1, 0 where unknown; and what they were."""
+    """Return labels of a plane renumbered from 1, 0 where unknown, and the original ones."""
     given = np.asarray(labels)
     if given.ndim != 2 or not given.size:  # noqa: PLR2004 (a plane)
         raise InputError(f"labels must have the shape (M, N), both above 0, got {given.shape}")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-FASTEST: Final = 3.0  # The greatest velocity of the default window, over ``w0`` with a rig
+FASTEST: Final = 3.0  # Largest velocity of the default window, in units of ``w0`` with a rig
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Grid:
     Parameters
     ----------
     theta : Axis
-        Angle, rad; ``(low, high, count)`` does as well.
+        Angle, rad; or ``(low, high, count)``.
     velocity : Axis
         Velocity ``d theta / d tau``, in rad/s for a :class:`pendmap.Rig`; likewise.
 

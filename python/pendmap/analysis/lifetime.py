@@ -1,4 +1,4 @@
-"""Transient chaos: the time that it lives before an attractor captures it."""
+"""Lifetime of transient chaos: the time until an attractor captures a trajectory."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _STARTS: Final = 40_000  # Default number of starts
 _MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
-"""Standard errors by which the exponent must exceed the rate of escape for transient chaos."""
+"""Excess of the exponent over the escape rate that shows transient chaos, standard errors."""
 _DRAWN: Final = 4000  # Largest number of periods of a stored survival curve
 
 
@@ -112,15 +112,15 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     Starts drawn from a window run until an attractor captures them. Transient chaos is a chaotic
     saddle: the number of trajectories still on it after ``t`` periods decays as ``exp(-t / mean)``.
-    The mean is the maximum of the likelihood, the sum of all times beyond ``from_period``, those
-    cut off at the bound included, over the number of captures; its standard error is ``mean /
+    The mean is the maximum-likelihood estimate, the sum of all times beyond ``from_period``,
+    censored ones included, over the number of captures; its standard error is ``mean /
     sqrt(captured)``.
 
-    An exponential tail alone is no chaos: starts near the edge of a smooth basin leave the saddle
-    on it at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a
-    chaotic saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its
-    entropy (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories
-    before their capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
+    An exponential tail does not prove chaos: starts near a smooth basin boundary leave its saddle
+    at a rate ``kappa`` too. There ``kappa`` equals the saddle's exponent ``lambda``; on a chaotic
+    saddle deviations grow faster than trajectories leave, and ``lambda - kappa`` is its entropy
+    (Kantz & Grassberger 1985). The growth of deviations is measured along trajectories before their
+    capture; where ``lambda`` does not exceed ``kappa`` there is no transient chaos.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Starts at ``tau = 0``; by default drawn at random from [-pi, pi] x [-3, 3], with a rig from
         [-pi, pi] x [-3 w0, 3 w0].
     starts : int
-        How many are drawn; 100 to ten million.
+        Number of starts drawn; 100 to ten million.
     from_period : int, optional
         Beginning of the tail. By default twice the earliest period from which two tests (of a
         Weibull shape, and of a rate that changes) find it exponential.
@@ -284,7 +284,7 @@ def _measures(
     persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
     chaotic, rate = False, math.nan
     if fitted is not None:
-        # In a period the share 1/mean leaves.
+        # The fraction 1/mean leaves in each period.
         rate = -math.log1p(-1 / fitted.mean) if fitted.mean > 1 else math.inf
         chaotic = bool(growth - rate > _SURE * math.hypot(error, rate / math.sqrt(fitted.captured)))
     mean, stderr = (fitted.mean, fitted.stderr) if fitted and chaotic else (math.nan, math.nan)
@@ -351,7 +351,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
 
 
 def _shares(found: xr.Dataset) -> str:
-    """Return the attractors with the share of the starts that each takes."""
+    """Return the attractors with the share of the starts that each captures, as text."""
     rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
     return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)
 

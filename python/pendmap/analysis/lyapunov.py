@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
 
 _CLEAR = 3.0
-"""Without damping, multiple of the exponent of deviations that grow as tau below which motion is
-regular: the spread of trajectories is no error then."""
+"""Without damping, motion is regular if its exponent is below this multiple of that of deviations
+that grow as tau; the spread of trajectories is then no standard error."""
 
 _MOST_PRECISION = 0.5
-"""Largest relative standard error that may be asked for: it leaves the exponent's sign alone."""
+"""Largest allowed relative standard error, at which the exponent's sign is still certain."""
 
 _BY_ROUNDING = math.log(1e10)
-"""Growth of a deviation, as a logarithm, from which rounding decides the result."""
+"""Logarithm of a deviation's growth from which rounding determines the result."""
 
 
 def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
@@ -93,16 +93,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     """Compute the largest Lyapunov exponent of the attractor that a start reaches.
 
     ``lambda = lim ln(|dx(tau)| / |dx(0)|) / tau``, ``dx`` a small deviation. The start is followed
-    until an attractor has captured it. Of a closed orbit the exponent is exact, from the
-    multipliers of ``P^n``: ``ln |mu| / (n T)``. Of chaos it is the mean over 256 trajectories on
+    until an attractor has captured it. For a closed orbit the exponent is exact, from the
+    multipliers of ``P^n``: ``ln |mu| / (n T)``. For chaos it is the mean over 256 trajectories on
     the attractor, the first periods of each dropped, with the standard error of their spread; they
-    go on until that is ``precision`` times the exponent. A trajectory that is chaotic for long and
-    then captured has the exponent of what captured it: ``transient_periods`` says when.
+    continue until that is ``precision`` times the exponent. A long chaotic transient has the
+    exponent of the attractor that captures it; ``transient_periods`` is the time of capture.
 
-    Friction: a turn multiplies the deviation's velocity by the ratio of the accelerations after and
-    before it; a stick sets its velocity to 0 and leaves its angle. A motion that sticks has a
-    finite largest exponent, and its second one is minus infinity. A pendulum that friction holds
-    for ever has none: deviations neither grow nor shrink.
+    With friction, a turning point multiplies the deviation's velocity by the ratio of the
+    accelerations after and before it; sticking sets its velocity to 0 and keeps its angle. A motion
+    that sticks has a finite largest exponent, and its second one is minus infinity. A pendulum that
+    friction holds permanently has none: deviations neither grow nor shrink.
 
     Parameters
     ----------
@@ -111,11 +111,11 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     theta, velocity : float
         State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
     precision : float
-        Standard error over exponent that chaos is averaged for; above 0, up to 0.5.
+        Ratio of standard error to exponent at which averaging of chaos ends; above 0, up to 0.5.
     max_periods : int, optional
         Periods within which an attractor must capture the start, by default as for
-        :func:`pendmap.basins`, and that each trajectory of an ensemble is followed for at the most,
-        20,000 (without damping 2000).
+        :func:`pendmap.basins`, and largest number for which each trajectory of an ensemble is
+        followed, by default 20,000 (without damping 2000).
     seed : int
         Chooses the trajectories on a chaotic attractor.
     tol, threads, progress
@@ -201,10 +201,9 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
-    """Return the exponent per unit of tau, its standard error, and that of regular motion.
+    """Return the exponent per unit of tau, its standard error, and the one of regular motion.
 
-    The latter is the exponent of undamped motion whose deviations grow as tau. All are nan where
-    there is none.
+    The last is that of undamped motion whose deviations grow as tau. Missing values are nan.
     """
     if raw.attractor is not None:
         return raw.attractor.exponent, raw.attractor.exponent_stderr, math.nan
@@ -219,7 +218,7 @@ def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
 def _second(
     raw: _core.Lyapunov, exponent: float, pendulum: Pendulum, units: Units
 ) -> dict[str, Any]:
-    """Return the other exponent, the sum of both, and the dimension that they give."""
+    """Return the second exponent, the sum of both, and the Kaplan-Yorke dimension."""
     own = raw.attractor
     if raw.ensemble is not None and raw.end in {"chaotic", "undamped"}:
         total, error = raw.ensemble.sum
@@ -243,7 +242,7 @@ def _second(
 
 
 def _growth(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
-    """Return the growth along the start's trajectory, running means and exponents of windows."""
+    """Return the growth along the start's trajectory, running means, finite-time exponents."""
     course = np.concatenate([[0.0], np.cumsum(raw.course)])
     growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     count, windows = growth.shape
@@ -313,7 +312,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _ended(dataset: xr.Dataset, name: str) -> list[str]:
-    """Return lines on what became of the start."""
+    """Return summary lines on how the start's trajectory ended."""
     a, units = dataset.attrs, Units.of(dataset.attrs)
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"

@@ -27,25 +27,25 @@ if TYPE_CHECKING:
 
 
 _PHASES, _FINE = (8, 16, 32, 64), 4096
-"""Phases of the drive at which its work is computed, until its Fourier series ends in rounding, and
-to which that series goes on."""
+"""Numbers of drive phases at which the work is computed, until its Fourier series has converged to
+rounding; number of phases at which that series is evaluated."""
 
 _FASTEST = 14.0
-"""A drive that is faster than this many times the orbit's rate at upright rest does less work than
-``exp(-pi/2 14)`` of its power: that is rounding."""
+"""Largest ratio of drive frequency to the orbit's rate at upright rest: above it the work is less
+than ``exp(-pi/2 14)`` of the power, which is rounding."""
 
-_RANGE = (0.2, 4.0, 191)  # Frequencies of the curve in the figure, where none are given
+_RANGE = (0.2, 4.0, 191)  # Default frequencies of the curve: first, last, number
 
-_ROUNDING = 1e-13  # Work, and torque, below which there is none
+_ROUNDING = 1e-13  # Work, and torque, up to which they are taken as 0
 _LINEAR = 1e-9  # Relative deviation above which the drive's work is not proportional to p
-_RESOLVED = 1e-9  # Part of the drive's absolute power above which its work is told from rounding
+_RESOLVED = 1e-9  # Work over the drive's absolute power above which it is not rounding
 _REACH, _SPACING = 42.0, 0.1
-"""Times along the separatrix: the trapezoidal rule on an analytic integrand without ends errs by
-``exp(-pi^2/spacing)``; friction's integrand falls as ``exp(-|t|)`` alone."""
-_NODES = 16  # Gauss's nodes on a panel of the loop
+"""Largest time along the separatrix, and step: the trapezoidal rule has the error
+``exp(-pi^2/spacing)`` for analytic integrands; friction's integrand falls only as ``exp(-|t|)``."""
+_NODES = 16  # Number of Gauss nodes on a panel of the loop
 _HALVED, _WIDTH, _END = 12, 0.5, 20.0
-"""Panels of the loop's parameter: halved so often toward the turning point, beside which a small
-torque leaves the other upright rest; then of this width; to where the angle is rounding."""
+"""Panels of the loop's parameter: halvings toward the turning point, near which a small torque
+leaves the other upright rest; width of further panels; end, where the angle is rounding."""
 
 
 SCHEMA = Schema(
@@ -87,13 +87,13 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     the torque. With damping it is the limit of a small torque. The loop has no limit: its two ways
     interfere with a phase that grows as ``omega ln(1/torque)``.
 
-    All integrals are computed from the model's own acceleration, so that effects count too. The
+    All integrals are computed from the model's own acceleration, so that effects are included. The
     true tangency differs at the second order in damping.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
-        The model; its ``omega`` is where the threshold is asked for.
+        The model; attributes give the threshold at its ``omega``.
     omega : array_like, optional
         Frequencies ``Omega/w0`` of the curve, by default 191 from 0.2 to 4.
 
@@ -101,7 +101,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     -------
     xarray.Dataset
         ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward, before them loop where the
-        torque keeps up a rotation); nan where the drive's work cannot be told from rounding. The
+        torque keeps up a rotation); nan where the drive's work is not above rounding. The
         attributes hold the values at the model's own frequency: ``p_forward``, ``p_backward``,
         ``p_loop`` (nan without a torque) and ``p_melnikov``, that of the loop where the torque
         keeps up a rotation, else the lower of the others. ``p_tangency`` is nan: to be computed by
@@ -181,7 +181,7 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
         name: float((_power(still, orbit, np.zeros(1)) @ orbit.weight)[0])
         for name, orbit in orbits.items()
     }
-    # A torque gives 2 pi times itself on one branch and takes it on the other.
+    # The work of a torque is 2 pi times the torque on one branch, its negative on the other.
     torque = (won["forward"] - won["backward"]) / (4 * math.pi)
     if abs(torque) >= 1 - _ROUNDING:
         raise InputError(
@@ -196,7 +196,7 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
 
 
 def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
-    """Return the power of all that the orbit's own equation lacks: a row for each phase."""
+    """Return the power of all terms that the orbit's equation lacks, one row for each phase."""
     theta, speed = (np.tile(column, at.size) for column in (orbit.theta, orbit.speed))
     tau = (orbit.time + at[:, None]).ravel()
     acceleration = _core.acceleration(pendulum, tau, theta, speed)
@@ -290,16 +290,16 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
 
 @dataclass(frozen=True)
 class Orbit:
-    """Places along an orbit of ``th'' + sin th = torque``, with weights that integrate."""
+    """Points along an orbit of ``th'' + sin th = torque``, with quadrature weights in time."""
 
     time: Floats
     theta: Floats
     speed: Floats
     weight: Floats
     torque: float = 0.0
-    """Of the equation that the orbit solves."""
+    """Torque in the equation that the orbit solves."""
     rate: float = 1.0
-    """Rate at which deviations from upright rest grow there."""
+    """Growth rate of deviations from upright rest."""
 
     def mirrored(self) -> Orbit:
         """Return the image under ``th -> -th``, an orbit of the opposite torque."""
@@ -331,7 +331,7 @@ def loop(torque: float) -> Orbit:
     half = np.diff(ends)[:, None] / 2
     y = ends[:-1, None] + half * (1 + x)
     u, beyond = turn / np.cosh(y) ** 2, turn * np.tanh(y) ** 2
-    # G from its zero at u = 0 on, or from that at the turning point, whichever is nearer.
+    # G is expanded about its nearer zero, u = 0 or the turning point.
     middle = turn - beyond / 2
     from_rest = 2 * c * np.sin(u / 2) ** 2 - torque * _less_sine(u)
     from_turn = torque * (
@@ -372,7 +372,7 @@ def _less_sine(x: Floats) -> Floats:
 
 
 def _integrals(x: Floats) -> Floats:
-    """Return the matrix that takes values at Gauss's nodes to integrals from -1 to each node."""
+    """Return the matrix from values at Gauss nodes to integrals from -1 to each node."""
     p = legendre.legvander(x, x.size)
     k = np.arange(1, x.size)
     of_each = np.concatenate([p[:, :1] + p[:, 1:2], (p[:, 2:] - p[:, :-2]) / (2 * k + 1)], axis=1)

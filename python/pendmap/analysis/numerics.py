@@ -19,13 +19,13 @@ from pendmap.errors import (
 )
 from pendmap.files.dataset import FORMAT_VERSION
 
-Progress = Callable[[int, int], object]  # Takes the number of units of work done, and in all
+Progress = Callable[[int, int], object]  # Called with units of work done and in total
 
-TOL = 1e-6  # Error of a state after 5 periods, where none is given; chooses the step
+TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
 class Choices(TypedDict):
-    """Numerical choices as the core takes them; 0 threads are one a processor."""
+    """Numerical choices as passed to the core; 0 threads mean one per processor."""
 
     tol: float
     max_periods: int | None
@@ -34,7 +34,7 @@ class Choices(TypedDict):
 
 
 class Options(TypedDict):
-    """Numerical choices as the analyses take them."""
+    """Numerical choices as keyword arguments of analyses."""
 
     tol: float
     max_periods: int | None
@@ -44,7 +44,7 @@ class Options(TypedDict):
 
 @dataclasses.dataclass(frozen=True)
 class Numerics:
-    """Numerical choices of an analysis, checked as they are made."""
+    """Numerical choices of an analysis, checked on construction."""
 
     tol: float = TOL
     max_periods: int | None = None
@@ -65,7 +65,7 @@ class Numerics:
 
     @property
     def workers(self) -> int:
-        """Number of threads as the core takes it: 0 for one a processor."""
+        """Number of threads as passed to the core: 0 for one per processor."""
         return self.threads or 0
 
     @property
@@ -80,11 +80,11 @@ class Numerics:
 
     @property
     def core(self) -> Choices:
-        """The choices as the core takes them."""
+        """The choices as passed to the core."""
         return {**self.options, "threads": self.workers}
 
     def provenance(self) -> dict[str, Any]:
-        """Return the attributes that say how a result was computed, from ``began`` until now."""
+        """Return attributes on how a result was computed, with the time since ``began``."""
         return {
             "tol": self.tol,
             "seconds": time.perf_counter() - self.began,
@@ -97,5 +97,5 @@ class Numerics:
 
 
 def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:
-    """Return a whole number between two bounds, or None where none is given."""
+    """Return a whole number between two bounds, or None if none is given."""
     return None if value is None else check_whole(name, value, least, most)

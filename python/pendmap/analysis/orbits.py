@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 
 LONGEST = 64  # Longest period of an orbit, in forcing periods
-_CELLS, _FINER = 200, 4  # Cells on each side of the box for each period, up to how many periods
-_SAMPLES = 128  # Samples in a forcing period of an orbit's path
-_TOLERANCE = 1e-9  # Error of a path after a period: it is a picture
-_LISTED = 12  # Orbits that a summary lists
+_CELLS, _FINER = 200, 4  # Cells a side of the box per period, largest number of periods counted
+_SAMPLES = 128  # Samples of an orbit's path in a forcing period
+_TOLERANCE = 1e-9  # Error of a path after a period, sufficient for figures
+_LISTED = 12  # Largest number of orbits in a summary
 
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -64,7 +64,8 @@ SCHEMA = Schema(
 def window(pendulum: Pendulum | Rig, n: int, w: int) -> Grid:
     """Return the default box: velocities to ``v = |w| omega / n + 2 sqrt(1 + |p|)``.
 
-    The mean speed of the turns, and that of a fall from the top under the drive's greatest pull.
+    The terms are the mean speed of the rotation and the speed after a fall from the top under the
+    drive's largest acceleration.
     """
     bare, units = without_dimensions(pendulum)
     fastest = abs(w) / n * 2 * math.pi / bare.period + 2 * math.sqrt(1 + abs(bare.p))
@@ -88,13 +89,13 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
     displacement is compared with its linear part on every cell of the grid; cells in which it
-    cannot vanish are left, the others quartered, four times. Newton's method begins in those that
-    remain, first by differences, then on the precise map, and beside orbits near their birth with
-    the known ones divided out. What closes to 1e-12, or as far as rounding lets it where the
-    multipliers are large, is kept, with the Floquet multipliers, the eigenvalues of the derivative
+    cannot vanish are discarded, the others quartered, four times. Newton's method begins in those
+    that remain, first by differences, then on the precise map, and beside orbits near their birth
+    with the known ones divided out. Orbits that close to 1e-12, or to rounding where the
+    multipliers are large, are kept, with the Floquet multipliers, the eigenvalues of the derivative
     of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
-    plane lie nearer than a cell may be missed; a finer grid finds it. States that friction holds
-    for ever are a set and are not listed.
+    plane lie nearer than a cell may be missed; a finer grid finds it. Rest states that friction
+    holds form a continuum and are not listed.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[str, Any]:
-    """The motion along each orbit, a piece from each of its points on: errors do not grow."""
+    """Return the motion along each orbit, integrated from each of its points to limit errors."""
     pieces = []
     for number, orbit in enumerate(found, start=1):
         period = orbit.period or pendulum.period

@@ -1,4 +1,4 @@
-"""Maps over two parameters: which attractors exist where."""
+"""Maps of the attractors that exist over two parameters."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ if TYPE_CHECKING:
 
 CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
 """Comment of the variable ``chaos_periods``."""
-_LISTED = 10  # Regimes that a summary lists
-_PLACES = 3  # Groups of cells with undecided starts that a summary lists
-_FREQUENCIES = 81  # Frequencies at which the critical curves over a map begin
-_STEPS = 10_000  # Steps of the progress that two parts of a computation share
+_LISTED = 10  # Largest number of regimes in a summary
+_PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
+_FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
+_STEPS = 10_000  # Number of progress steps that two parts of a computation share
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -87,20 +87,20 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
 ) -> xr.Dataset:
     """Find the set of attractors in every cell of a plane of two parameters.
 
-    Every cell is searched from a few initial conditions, other ones than its neighbours', and from
-    points of its neighbours' attractors: grids become finer from every eighth cell to all, each
-    cell beginning also from the attractors of its neighbours on the coarser grid; then, in six
-    passes, from the attractors that cells at distances from eight to one have and it lacks. In this
-    way branches that coexist are followed, and nothing depends on the order of the work.
+    Every cell is searched from a few initial conditions, different from its neighbours', and from
+    points of its neighbours' attractors: grids are refined from every eighth cell to all, each cell
+    starting also from the attractors of its neighbours on the coarser grid; then, in six passes,
+    from the attractors that cells at distances from eight to one have and it lacks. In this way
+    coexisting branches are followed, and the result does not depend on the order of the work.
 
-    Trajectories run until a stable orbit, found by Newton's method, has captured them. Those that
-    nothing captures are watched four times as long again, in four windows. Windows that turn alike
-    in regions that meet form a group; a set of groups that no trajectory leaves, with an exponent
-    that is positive by four standard errors, is chaos of its kind, unless it holds a stable orbit
-    of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that captures it. A
-    run goes on while its last group leads nowhere known, and a set of fewer than 16 runs gets 16
-    more from its own points. If the cell has another attractor, which could end chaos, none of 16
-    runs may end within 5000 periods. All other starts are undecided.
+    Trajectories run until a stable orbit, found by Newton's method, has captured them. Those not
+    captured are followed four times as long again, in four windows. Windows of equal senses of
+    rotation whose regions meet form a group; a set of groups that no trajectory leaves, with an
+    exponent that is positive by four standard errors, is chaos of its kind, unless it contains a
+    stable orbit of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that
+    captures it. A run continues while its last group has no known successor, and a set of fewer
+    than 16 runs gets 16 more from its points. If the cell has another attractor, which could end
+    chaos, none of 16 runs may end within 5000 periods. All other starts are undecided.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         As for :func:`pendmap.basins`, on 25 cells spread over the plane; the length of steps scales
         with the period and the drive's pull.
     max_periods : int, optional
-        Periods after which trajectories begin to be watched; by default until damping would have
-        shrunk a free motion by exp(-40), 64 at least.
+        Periods before the four windows of trajectories not captured; by default those in which
+        damping shrinks a free motion by exp(-40), at least 64.
     seed : int
         Shifts the initial conditions, and draws the models of ``draws``.
     curves : bool
@@ -223,7 +223,7 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     exponent = np.full(cells, np.nan)
     np.fmax.at(exponent, cell, raw.exponent)
     period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
-    # The kind that most starts end on; of equals the one that comes first.
+    # The kind on which most starts end, the first of equal ones.
     leading = share[which, cell]
     for k in np.lexsort((-np.arange(cell.size), leading)):
         period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
@@ -251,7 +251,7 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
 
 
 def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
-    """Return the progress of two halves of a computation; the first may begin again."""
+    """Return the progress of two halves of a computation; the first may be restarted."""
     if progress is None:
         return None, None
     furthest = 0.0
@@ -279,7 +279,7 @@ def _curves(
     omega, p = by_name["omega"], by_name["p"]
     if omega.values.size == 1 or p.bare[-1] <= 0:
         raise InputError("curves must have ranges of omega and of p above 0")
-    # A cell reaches half a spacing beyond its middle: the curves go to the edges of the picture.
+    # Cells extend half a spacing beyond their centres: curves go to the edges of the figure.
     half = np.diff(omega.bare)[0] / 2
     low, high = omega.bare[0] - half, omega.bare[-1] + half
     above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
@@ -315,7 +315,7 @@ def entries(raw: _core.ParameterMap, kind: NDArray[np.intp], units: Units) -> di
 
 
 def chaos(attributes: Mapping[str, Any]) -> list[str]:
-    """Return a line on how long chaos was watched, where there is any."""
+    """Return a summary line on how long chaos was followed, if there is any."""
     periods = attributes["chaos_periods"]
     if not periods:
         return []
@@ -327,7 +327,7 @@ def chaos(attributes: Mapping[str, Any]) -> list[str]:
 
 
 def undecided(attributes: Mapping[str, Any]) -> list[str]:
-    """Return lines on the shares of undecided and failed starts."""
+    """Return summary lines on the shares of undecided and failed starts."""
     return [
         f"{100 * attributes[key]:.3g} % of the starts {word}."
         for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
@@ -336,7 +336,7 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
 
 
 def _said(place: dict[str, Any]) -> str:
-    """Return the ranges of a group of cells, and its size, in words."""
+    """Return the ranges of a group of cells, and its size, as text."""
     spans = [
         f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
         for name, (low, high) in place["ranges"].items()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-UNDECIDED = "undecided"  # The kind of a cell in which no attractor was found
+UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
 
 _ORDER = (
     "rest",

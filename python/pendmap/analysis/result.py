@@ -28,20 +28,20 @@ class Field:
     unit: str
     meaning: str
     core: str | None = ""
-    """Place of the value in the core's result where it has another name: ``texture.chance``; None
-    where the value is never there."""
+    """Path of the value in the core's result if the name differs, like ``texture.chance``; None if
+    the core's result does not have it."""
     json: bool = True
-    """Whether the JSON object holds it."""
+    """Whether the JSON object has the key."""
     convert: Callable[[Any], Any] | None = None
-    """Makes the JSON value from the attribute."""
+    """Function that converts the attribute to the JSON value."""
     read: Callable[[xr.Dataset], Any] | None = None
-    """Makes the JSON value from the dataset, where the attribute does not hold it."""
+    """Function that computes the JSON value from the dataset, if no attribute holds it."""
     when: str = ""
     """Attribute that must be true for the JSON object to have the key."""
 
     @property
     def hidden(self) -> Field:
-        """The attribute alone, which the JSON object leaves out."""
+        """The field without its key in the JSON object."""
         return dataclasses.replace(self, json=False)
 
     def value(self, dataset: xr.Dataset) -> Any:  # noqa: ANN401 (any part of a JSON object)
@@ -86,7 +86,7 @@ class Schema:
 
 
 def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
-    """Set the summary of a dataset; effects on a reading leave ``what`` the motion's own."""
+    """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
     dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
 
 
@@ -97,19 +97,19 @@ def variable(
     long_name: str = "",
     comment: str = "",
 ) -> tuple[str | tuple[Hashable, ...], Any, dict[str, str]]:
-    """Return a variable of a dataset with the attributes that are given."""
+    """Return a variable of a dataset with the attributes that are not empty."""
     attributes = {"units": units, "long_name": long_name, "comment": comment}
     return dims, values, {key: text for key, text in attributes.items() if text}
 
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
-    """Return a JSON object for each place of a dimension, from variables by its keys."""
+    """Return a JSON object for each index of a dimension, from variables named by its keys."""
     columns = [dataset[name].values.tolist() for name in variables.values()]
     return [dict(zip(variables, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def none_below_0(value: float) -> float | None:
-    """Return a number, None where it is -1: an event that never happened."""
+    """Return a number, or None if it is negative: an event that did not happen."""
     return None if value < 0 else value
 
 
@@ -151,7 +151,7 @@ OWN: Final = (
     Field("own_omega", "1", "frequency of the model itself", json=False),
 )
 RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
-UNSAID: Final = (VERSION.hidden, FORMAT.hidden)  # Versions as attributes alone
+UNSAID: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")
 )

@@ -1,4 +1,4 @@
-"""Summary of a basin map, and lines that several summaries share."""
+"""Summary of a basin map, and lines common to several summaries."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 
-_NEARLY_CHANCE = 0.15
-_STILL = 1e-12
+_NEARLY_CHANCE = 0.15  # Agreement of neighbours above chance, below which it is hardly better
+_STILL = 1e-12  # Sine of the angle below which a start hangs or is upright
 
 
 def of_model(model: Pendulum | Rig, what: str) -> list[str]:
-    """Return lines on the model: it misses its record, or effects act on its reading alone."""
+    """Return summary lines on a model that misses its record or has effects on its reading."""
     ratio = misses(model.notes)
     lines = []
     if math.isfinite(ratio):
@@ -41,7 +41,7 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
-    """Return the findings of a basin map, whose attributes are set, a sentence a line."""
+    """Return the summary of a basin map whose attributes are set, one sentence a line."""
     a, plane = dataset.attrs, dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
@@ -59,7 +59,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         share = a[key]
         if share > 0 and plane != "conservative":
             bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
-            bound = bound.split(";")[0] if unlimited else bound  # no bound helps
+            bound = bound.split(";")[0] if unlimited else bound  # a larger bound does not help
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     if "theta" in dataset.dims:
         theta, velocity = (
@@ -84,7 +84,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
 
 
 def effort(a: Mapping[Any, Any]) -> str:
-    """Return how a result was computed: steps, error, time."""
+    """Return a summary line on how a result was computed: steps, error, time."""
     return (
         f"{counted(a['steps_per_period'], 'step')} a period, error reached "
         f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
@@ -93,10 +93,10 @@ def effort(a: Mapping[Any, Any]) -> str:
 
 
 def unlimited_rotation(pendulum: Pendulum) -> list[str]:
-    """Return lines where nothing limits the speed of a rotation, so that it never settles.
+    """Return summary lines if nothing limits the speed of a rotation, so that it never settles.
 
-    Over a fast turn gravity, drive and all torques that repeat every turn do no work. Without what
-    grows with the speed there remain the torque, 2 pi torque, and dry friction, -2 pi theta_r.
+    Over a fast turn gravity, drive and all torques periodic in the angle do no work. Without terms
+    that grow with speed, the work is 2 pi torque by the torque and -2 pi theta_r by dry friction.
     """
     friction, torque = _dry(pendulum)
     if torque == 0 or not 0 < friction <= abs(torque):
@@ -114,7 +114,7 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 
 
 def _dry(pendulum: Pendulum) -> tuple[float, float]:
-    """Return dry friction and torque; nan where other damping acts."""
+    """Return dry friction and torque; nan if other damping acts."""
     kinds = {effect.name for effect in pendulum.effects if effect.brakes}
     own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
     added = dict.fromkeys(own.values(), 0.0)
@@ -124,14 +124,14 @@ def _dry(pendulum: Pendulum) -> tuple[float, float]:
     gamma, friction, torque = (
         getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
     )
-    # Stribeck's part of friction is none at speed; all others may brake a rotation.
+    # Stribeck friction's extra part vanishes at speed; all other damping may brake a rotation.
     if gamma > 0 or kinds - {"coulomb_friction", "stribeck_friction", "viscous_damping"}:
         return math.nan, math.nan
     return friction, torque
 
 
 def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
-    """Return after how many periods a start is undecided, and what raises the bound."""
+    """Return the bound after which a start is undecided, as text, and what raises it."""
     undecided = dataset["label"] == 0
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
         return ": they stand exactly on an unstable rest, where nothing moves them"
@@ -142,7 +142,7 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
 
 
 def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
-    """Return which starts are at rest, hanging or inverted, whatever the drive."""
+    """Return which starts are at rest, hanging or inverted, for any drive."""
     of = "start_" if "start_theta" in dataset else ""
     hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
     alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
@@ -151,7 +151,7 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
-    """Return a window of starts in words, and whether it is the default one."""
+    """Return a window of starts as text, with a note if it is the default one."""
     usual = (math.pi, units.given(FASTEST, VELOCITY))
     default = all(
         np.allclose(span, (-reach, reach), rtol=1e-12)
@@ -164,7 +164,7 @@ def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Un
 
 
 def box_said(attrs: Mapping[Any, Any]) -> str:
-    """Return the box of the starts of a search over many pendulums in words."""
+    """Return the box of the starts of a search over many pendulums as text."""
     theta, velocity = (
         (float(attrs[f"low_{name}"]), float(attrs[f"high_{name}"]))
         for name in ("theta", "velocity")
@@ -225,7 +225,7 @@ def _settling(dataset: xr.Dataset) -> list[str]:
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
-    """Return lines on how fractal the boundary is."""
+    """Return summary lines on the fractality of the boundary."""
     lines = []
     if "boundary_basin_entropy" in attrs:
         value = attrs["boundary_basin_entropy"]
@@ -250,7 +250,7 @@ def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
 def _texture(dataset: xr.Dataset) -> list[str]:
     a = dataset.attrs
     if not (dataset["label"] > 0).any():
-        return []  # nothing is decided: agreement of the undecided says nothing
+        return []  # no label is decided: agreement has no meaning
     lines = []
     if "theta" in dataset.dims and a["cells"] > 1:
         agree, chance = a["neighbours_agree"], a["neighbours_chance"]

@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 
 Times = npt.NDArray[np.int64]
 
-LEAST: Final = 100  # Least number of captures for a tail
+LEAST: Final = 100  # Smallest number of captures in a tail
 
-LEVEL: Final = 0.05  # Level of the tests of a tail: a lower chance rejects the exponential
+LEVEL: Final = 0.05  # Level of the tests of a tail: a lower p-value rejects the exponential
 
-_BINS: Final = 8  # Stretches of the tail, of equal expected captures, whose rates are compared
+_BINS: Final = 8  # Intervals of the tail, of equal expected captures, whose rates are compared
 
-_GROWTH: Final = 1.1  # Ratio of successive beginnings that are tried
+_GROWTH: Final = 1.1  # Ratio of successive beginnings of the tail that are tested
 
-_AGREEING: Final = 3  # Beginnings in a row that must be exponential
+_AGREEING: Final = 3  # Number of successive beginnings that must pass the tests
 _FOLLOWED: Final = 400  # Largest number of trajectories along which deviations are followed
 _LONGEST: Final = 400  # Largest number of periods of these trajectories
-_LEAST_FOLLOWED: Final = 20  # Least number of trajectories for an estimate of growth
+_LEAST_FOLLOWED: Final = 20  # Smallest number of trajectories for an estimate of growth
 _SETTLING: Final = 4.0
-"""Power of e by which a trajectory nears an attractor before it counts as captured."""
+"""Logarithm of the factor by which a trajectory approaches an attractor until its capture."""
 _LEAST_SETTLING, _MOST_SETTLING = 10, 500  # Bounds of the settling time, periods
-_ALIGNED: Final = 5  # Periods in which a deviation turns into the direction of growth
+_ALIGNED: Final = 5  # Periods in which a deviation aligns with the direction of growth
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Tail:
     captured: int
     censored: int
     weibull: float
-    """Chance of an exponential tail by the score test for the shape of a Weibull distribution."""
+    """p-value of an exponential tail in the score test of a Weibull distribution's shape."""
     steady: float
-    """Chance of an exponential tail by chi squared of the rates in eight stretches."""
+    """p-value of an exponential tail in a chi-squared test of the rates in eight intervals."""
 
     @property
     def is_exponential(self) -> bool:
@@ -64,9 +64,9 @@ class Tail:
 
 
 def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
-    """Fit an exponential to times beyond ``start``; ``censored`` starts are alive at ``bound``.
+    """Fit an exponential to times beyond ``start``; ``censored`` ones are cut off at ``bound``.
 
-    Maximum likelihood: the mean is the sum of all times beyond ``start``, those cut off included,
+    Maximum likelihood: the mean is the sum of all times beyond ``start``, censored ones included,
     over the number of captures (Cox & Oakes 1984, Analysis of Survival Data, sections 3.2 and 3.3).
     """
     own = times[times > start] - start
@@ -87,10 +87,10 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
 
 
 def begin(times: Times, censored: int, bound: int) -> Tail | None:
-    """Return the exponential tail, None where there is none.
+    """Return the exponential tail, or None if there is none.
 
-    It begins at twice the earliest period from which the tests of three beginnings in a row pass:
-    just there a remaining transient is hidden by noise and would bias the mean.
+    It begins at twice the earliest period from which three successive beginnings pass the tests:
+    at that period itself noise may hide a remaining transient, which would bias the mean.
     """
     row: list[Tail] = []
     for start in _beginnings(times):
@@ -105,7 +105,7 @@ def begin(times: Times, censored: int, bound: int) -> Tail | None:
 
 
 def residual(times: Times, censored: int, bound: int) -> list[Tail]:
-    """Return tails from all beginnings; means are constant where the tail is exponential."""
+    """Return the tails from all beginnings; their means are constant in an exponential tail."""
     tails = (tail(times, censored, bound, start) for start in _beginnings(times))
     return [each for each in tails if each.captured >= LEAST // 4]
 
@@ -118,8 +118,8 @@ def _beginnings(times: Times) -> Iterator[int]:
 
 
 def _weibull(own: Times, censored: int, left: int) -> float:
-    """Return the chance of a score as large for the shape k in ``exp(-(x/a)^k)``, were k = 1."""
-    x = own - 0.5  # a time in whole periods is over half a period before, on average
+    """Return the p-value of ``k = 1`` in the score test of the shape k in ``exp(-(x/a)^k)``."""
+    x = own - 0.5  # times are rounded up to whole periods: half a period too long on average
     logs = np.log(x)
     end, log_end = float(left), math.log(max(left, 1))
     count = x.size
@@ -132,7 +132,7 @@ def _weibull(own: Times, censored: int, left: int) -> float:
 
 
 def _steady(own: Times, censored: int, left: int, rate: float) -> float:
-    """Return the chance of rates as different in stretches of the tail, were they equal."""
+    """Return the p-value of equal rates in the intervals of the tail, by chi squared."""
     from scipy.special import chdtrc  # noqa: PLC0415 (scipy takes a while)
 
     last = math.exp(-rate * left) if censored else 0.0
@@ -155,7 +155,7 @@ def growth_on_saddle(
     pendulum: Pendulum,
     threads: int | None,
 ) -> tuple[float, float, int]:
-    """Return the exponent per period of starts before capture, its error, and their number."""
+    """Return exponent per period of starts before capture, its standard error, their number."""
     none = math.nan, math.nan, 0
     if fitted is None:
         return none
@@ -165,7 +165,7 @@ def growth_on_saddle(
     end = end - _settling(found, pendulum.period)
     chaos = found["kind"].str.endswith("chaos").values
     never = (label < 0) | np.concatenate([[False], chaos])[np.maximum(label, 0)]
-    # The natural measure of the saddle is where those are that live for long.
+    # Long-lived trajectories sample the natural measure of the saddle.
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
     chosen = np.flatnonzero((end >= min(least, _LONGEST // 2)) & ~never)[:_FOLLOWED]
     if chosen.size < _LEAST_FOLLOWED:
@@ -192,7 +192,7 @@ def growth_on_saddle(
 
 
 def _settling(found: xr.Dataset, period: float) -> NDArray[np.int64]:
-    """Return the periods that each start needs to approach the attractor that captures it."""
+    """Return the number of periods in which each start approaches its attractor."""
     rate = -Units.of(found.attrs).bare(found["exponent"].values, RATE) * period
     rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
     periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)

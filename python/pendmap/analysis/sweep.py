@@ -45,9 +45,9 @@ class Varied:
     name: str
     """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
     values: NDArray[np.float64]
-    """In the parameter's own units."""
+    """Values in the units of the parameter."""
     parameter: str
-    """Its name in the core."""
+    """Name of the parameter in the core."""
     bare: NDArray[np.float64]
     """The values without dimensions."""
     unit: str
@@ -55,7 +55,7 @@ class Varied:
 
     @property
     def kernel(self) -> tuple[str, list[float]]:
-        """It as the core takes it."""
+        """Name and values as passed to the core."""
         return self.parameter, self.bare.tolist()
 
     @property
@@ -77,7 +77,7 @@ class Varied:
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` parameters that vary: first and last value, how many values."""
+    """Return the ``count`` parameters that vary, from their first and last value and number."""
     if not isinstance(ranges, dict) or len(ranges) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
@@ -103,7 +103,7 @@ def varied(
 
 
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
-    """Return the model in one line, and what varies in it."""
+    """Return one line: the ranges of the parameters that vary, and the other parameters."""
     spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
     rest = title_without(model, *(a.parameter for a in axes))
     return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
@@ -120,7 +120,7 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
 
 
 def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
-    """Return a line where some of these pendulums have no damping at all, and nothing attracts."""
+    """Return a summary line if some of the pendulums have no damping, hence no attractors."""
     pendulum, _ = without_dimensions(model)
     least = {axis.parameter: float(axis.bare[0]) for axis in axes}
     if any(effect.brakes for effect in model.effects):
@@ -134,11 +134,11 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
-    # The rig's number that each number of the laboratory changes, and by which factor.
+    # Parameter of the rig that each laboratory quantity changes, and the factor.
     laboratory: dict[str, tuple[str, float]] = {}
     if isinstance(model, Rig):
         laboratory["frequency_hz"] = ("Omega", math.tau)
-        if model.Omega > 0:  # without a frequency no stroke is an acceleration
+        if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
             laboratory["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity)
         own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
         powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
@@ -158,7 +158,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
             check(name, values[0])
             factor = laboratory[name][1]
         plain = units.bare(factor * values, power)
-        # A torque is one without dimensions here, also of a rig.
+        # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
     else:
         bare, unit = name, ""
@@ -210,17 +210,17 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
-STARTS = 9  # Initial conditions of a cell where no number is given
-_SPREAD = 1000  # Cells on each side of the default box; they decide nothing
+STARTS = 9  # Default number of initial conditions of a cell
+_SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746
-"""Plastic number, whose powers make the recurrence in two dimensions even."""
-_CELLS = 61  # Cells after which initial conditions come again: a prime, so that columns differ too
+"""Plastic number, whose powers give an even additive recurrence in two dimensions."""
+_CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
     """Return angles and velocities that cover a box evenly; no two are mirror images."""
     shift = 0.5 + (seed * 0.6180339887498949) % 1.0
-    # Not the box's centre, where a pendulum hangs at rest and stays however unstable that is.
+    # k = 0 may be the centre, where a pendulum at rest stays even if that is unstable.
     k = 1 + np.arange(count)
     parts = [(shift + k / _PLASTIC**power) % 1.0 for power in (1, 2)]
     ends = [(axis.low, axis.high - axis.low) for axis in (grid.theta, grid.velocity)]
@@ -246,7 +246,7 @@ class CellSearch:
         return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))
 
     def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return initial conditions without dimensions; each cell takes those after the last's."""
+        """Return initial conditions without dimensions; each cell takes the next ``starts``."""
         theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
         return theta, units.bare(velocity, VELOCITY)
 

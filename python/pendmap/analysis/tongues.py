@@ -1,4 +1,4 @@
-"""Critical curves: where rest, hanging and inverted, is stable under a drive of the pivot."""
+"""Critical curves of the stability of rest, hanging and inverted, under a drive of the pivot."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 _Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
-OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Frequencies and largest amplitude where none are given
-MOST_P = 100.0  # Largest amplitude that may be asked for
+OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Default frequencies and largest amplitude
+MOST_P = 100.0  # Largest allowed ``p_max``
 _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
 _TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
@@ -47,7 +47,7 @@ NEAR = 0.05  # Relative error below which an asymptotic curve is near the exact 
 
 
 def _curves(dataset: xr.Dataset, prefix: str, fold: str = "") -> list[dict[str, Any]]:
-    """Return the critical amplitudes at each frequency that was asked for, for the JSON object."""
+    """Return the critical amplitudes at each requested frequency for the JSON object."""
     index = dataset[f"{prefix}index"].values
     curves = []
     for k in np.flatnonzero(dataset["asked"].values):
@@ -118,21 +118,21 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     are found, and moved onto the map itself. In the plane of eq. 1.4 a point is ``(e, alpha^2) =
     (p/omega^2, 1/omega^2)``.
 
-    A constant torque makes of rest an orbit of the drive's period. Where rest is stable without the
-    torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, both ways,
-    by Newton's method. It is stable between critical amplitudes as rest is; it ceases at a fold,
-    which is the one with multiplier +1. Where rest sheds two oscillations of period 1, a torque
-    makes one of them the continuation of rest, without a critical amplitude.
+    A constant torque turns rest into an orbit of the drive's period. Where rest is stable without
+    the torque, the orbit that it becomes as the torque grows from 0 is followed along ``p``, in
+    both directions, by Newton's method. It is stable between critical amplitudes as rest is; it
+    ceases at a fold, the one with multiplier +1. Where two oscillations of period 1 branch from
+    rest, a torque makes one of them the continuation of rest, without a critical amplitude.
 
-    Without a torque, where hanging rest first loses its stability an oscillation is born, with
-    period 1 (multiplier +1) or 2 (-1). Where it is born toward smaller ``p`` it is followed to its
+    Without a torque, an oscillation branches off where hanging rest first loses its stability, with
+    period 1 (multiplier +1) or 2 (-1). If it branches toward smaller ``p`` it is followed to its
     fold: between fold and critical curve it coexists with a stable rest.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
-        those of Mathieu's equation. Effects count; rest must stay a solution.
+        those of Mathieu's equation. Effects are included; rest must be a solution.
     omega : array_like, optional
         Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
         evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
@@ -263,7 +263,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         return list(zip(found, undamped, above, strict=True))
 
     def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
-        # The end of what is looked for bounds the last strip.
+        # The end of the search bounds the last strip.
         return [(np.array([*r.p, p_max]), np.array([*r.multiplier, 0.0])) for r in rows]
 
     looked = np.ones(asked.size, dtype=bool)
@@ -286,7 +286,7 @@ def _folds_to_their_ends(
     looked: NDArray[np.bool_],
     solve: Callable[[Floats], list[_Row]],
 ) -> NDArray[np.bool_]:
-    """Bisect for the ends of folds among added frequencies; return where folds were sought."""
+    """Bisect added frequencies for the ends of folds; return where folds were sought."""
     looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)
@@ -338,7 +338,7 @@ def _asymptotic(
     gamma: float,
     p_max: float,
 ) -> dict[str, Any]:
-    """Return each asymptotic curve, and how far it is from the exact one with its multiplier."""
+    """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
     curves, errors = [], []
     for multiplier, formula in critical_curves.CURVES.values():
         p = formula(omega, gamma)
@@ -406,7 +406,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
-    """Return a line on where inverted rest is stable."""
+    """Return a summary line on the range in which inverted rest is stable."""
     rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
     if not dataset.attrs["inverted"]:
         return []

@@ -1,4 +1,4 @@
-"""Single trajectories, and many of them advanced at once."""
+"""Single trajectories, and many starts advanced together."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
 
 
 _SAMPLES = 64  # Default number of samples a period
-_APART = 0.1  # Angle between two samples, rad, that looks smooth in the phase plane
+_APART = 0.1  # Angle between two samples that looks smooth in the phase plane, rad
 _SMOOTH_SAMPLES = 200_000
-"""Samples in all up to which a trajectory has more a period than ``_SAMPLES``."""
+"""Total number of samples up to which a trajectory has more than ``_SAMPLES`` a period."""
 _MOST_SAMPLES = 2_000_000
-"""Samples in all from which on a trajectory has fewer a period than ``_SAMPLES``."""
+"""Total number of samples above which a trajectory has fewer than ``_SAMPLES`` a period."""
 _STRONGEST = 1e6  # Acceleration of the pivot over gravity up to which a trajectory takes seconds
 _ALIGNMENT, _BATCHES = 0.1, 20
-"""Part of a trajectory before the exponent is measured, and batches of it, as in the core."""
+"""Fraction of a trajectory before the exponent is measured, number of batches; as in the core."""
 FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
 """Formula of the energy, an attribute of datasets."""
 
@@ -133,14 +133,14 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         reached, ``end_error`` the difference at the end.
     samples : int, optional
         Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
-        picture needs, up to 200,000 in all; fewer than 64 where that would be more than two
-        million. The motion does not depend on them, the batches of an exponent do.
+        curve needs, up to 200,000 in all; fewer than 64 where that would be more than two million.
+        The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
         Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
         standard error from the spread of 20 batches, the first tenth left out (from the time
         ``exponent_from`` to ``exponent_to``). It is the exponent of an attractor only if the
         trajectory was on it all that time: a chaotic transient has a positive one, wherever it
-        ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may leave none.
+        ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may give none.
     live : callable, optional
         Called with times, angles and velocities, three arrays of one length in the units of the
         result, of the samples that are new since the last call: about every 50 ms while it
@@ -190,7 +190,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     periods = until / model.period
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
-        if not lyapunov:  # its batches are counted in samples: they stay what they are
+        if not lyapunov:  # the batches of an exponent depend on the number of samples
             speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
             samples = max(samples, _smooth(pendulum, speed, end))
     samples = check_whole("samples", samples, 1, MOST_SAMPLES)
@@ -256,7 +256,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
-    """Return samples a period that show the motion as a curve, from its guessed greatest speed."""
+    """Return the samples a period for a smooth curve, from an estimate of the largest speed."""
     periods = max(until / pendulum.period, 1.0)
     pulled = abs(velocity) + abs(pendulum.torque) * until
     if pendulum.gamma > 0:
@@ -355,7 +355,7 @@ def advance(  # noqa: PLR0913
     periods : int
         Forcing periods (of ``2 pi`` where p = 0); 0 or more.
     steps_per_period : int, optional
-        Steps a period; by default as ``tol`` asks.
+        Steps a period; by default chosen by ``tol``.
     tol, threads, progress
         As for :func:`pendmap.basins`.
 

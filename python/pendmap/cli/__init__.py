@@ -1,4 +1,4 @@
-"""The command ``pendmap``: parse, call, show. No mathematics."""
+"""The command ``pendmap``: it parses arguments, calls the library and shows results."""
 
 import sys
 

@@ -28,7 +28,7 @@ the recording it opens: {0}.rrd, or what --rerun names."""
 def analysis_command(
     name: str, *options: Decorator, model: Decorator = model_options
 ) -> Callable[[Callable[..., dict[str, Any]]], click.Command]:
-    """Return what makes a command of :data:`pendmap.ANALYSES`.
+    """Return a decorator that makes a command of :data:`pendmap.ANALYSES`.
 
     The decorated function takes model, outputs and the values of ``options``, and returns the
     keyword arguments of the analysis; its docstring is the help.

@@ -52,7 +52,7 @@ def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, 
     outputs.check_room(grid.cells)
     if outputs.plot or outputs.rerun:
         _core.reckon("cells", grid.cells, BYTES_OF_CELL)
-    if outputs.shows_progress:  # the summary says it too, after all periods have passed
+    if outputs.shows_progress:  # the summary repeats it after the computation
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)
     price.say(model, grid.cells, given, quiet=outputs.quiet)

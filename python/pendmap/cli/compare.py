@@ -50,12 +50,12 @@ def command(  # noqa: PLR0913 (an option each)
 ) -> None:
     """Simulate a MODEL beside every run of an EXPERIMENT.
 
-    MODEL is a model file in SI, as identify writes it; nothing of it is adapted. Of a free decay
-    the rms is over the whole record, from the start that brings it nearest; periods and peaks are
-    those of a motion from the first measured peak, in percent of the measured ones, as in the
-    paper's table 1. A forced run is compared with an ensemble from a neighbourhood of its start: by
-    wells visited, escapes, angle covered, time to settle and greatest velocity, and by the steady
-    state that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
+    MODEL is a model file in SI, as identify writes it; nothing of it is adapted. For a free decay
+    the rms is over the whole record, from the start that minimises it; periods and peaks are those
+    of a motion from the first measured peak, in percent of the measured ones, as in the paper's
+    table 1. A forced run is compared with an ensemble from a neighbourhood of its start: by wells
+    visited, escapes, angle covered, time to settle and greatest velocity, and by the steady state
+    that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.free import as_json as fields

@@ -81,7 +81,7 @@ def command(  # noqa: PLR0913 (an option each)
     output is named, a figure, a report and a recording too: diagnose.png, diagnose.html and
     diagnose.rrd.
     """
-    # The matrices are tall and narrow: threads for them cost more than they bring.
+    # The matrices are tall and narrow: threads would cost more than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.diagnosis import diagnose, diagnosed_model
     from pendmap.diagnosis.candidates import checked_own
@@ -136,7 +136,7 @@ def command(  # noqa: PLR0913 (an option each)
 
 @contextlib.contextmanager
 def _named(where: str) -> Iterator[None]:
-    """Name the file or option in a message of refusal."""
+    """Prefix the message of an InputError with a file or option."""
     try:
         yield
     except InputError as error:

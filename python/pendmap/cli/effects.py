@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
-    The formulas stand on the right of th'' = ..., with v = th'; those of drives say what the pivot
-    does, those of readings what the sensor shows. In brackets: values of interest without
-    dimensions, and what makes them those of a model file in SI. With NAMEs those effects alone, and
-    how they stand in a model file.
+    The formulas are terms on the right of th'' = ..., with v = th'; those of drives give the motion
+    of the pivot, those of readings what the sensor shows. In brackets: values of interest without
+    dimensions, and the factor that converts them to those of a model file in SI. With NAMEs: only
+    those effects, with examples for a model file.
     """
     from pendmap.cli.show import write_json
     from pendmap.model import load_formulas
@@ -71,7 +71,7 @@ def _draw(effects: list[EffectDefinition]) -> None:
     for effect in effects:
         parameters = "\n".join(_parameter(parameter) for parameter in effect.parameters)
         cells = (effect.name, effect.formula, parameters, effect.revealed_by, _maps(effect))
-        # Not markup: a formula may have brackets.
+        # Text, not markup: a formula may have brackets.
         table.add_row(*(Text(cell) for cell in cells))
     Console().print(table)
 
@@ -84,7 +84,7 @@ def _write(effect: EffectDefinition) -> None:
 
 
 def _maps(effect: EffectDefinition) -> str:
-    """Return how maps treat an effect, the predicate of a sentence about maps."""
+    """Return how maps treat an effect, as the predicate of a sentence."""
     if effect.group == "reading":
         return "do not see it"
     return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")

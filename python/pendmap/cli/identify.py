@@ -50,7 +50,7 @@ def command(
     """Identify natural frequency, viscous damping and Coulomb friction from free decays.
 
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. The default
-    method fits the whole record by its trajectory; the paper's and its rivals stand beside it. In
+    method fits a trajectory to the whole record; the paper's method and others are listed too. In
     brackets: standard errors in the last digits. Writes identify.toml, a model for --model of every
     other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
     """

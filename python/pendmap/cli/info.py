@@ -1,4 +1,4 @@
-"""``pendmap info``: what is installed, and what it runs on."""
+"""``pendmap info``: version, instruction set and threads."""
 
 from __future__ import annotations
 

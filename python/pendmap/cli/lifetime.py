@@ -1,4 +1,4 @@
-"""``pendmap lifetime``: how long transient chaos lives."""
+"""``pendmap lifetime``: the mean lifetime of transient chaos."""
 
 from __future__ import annotations
 

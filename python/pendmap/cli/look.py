@@ -1,4 +1,4 @@
-"""``pendmap look``: what a record holds."""
+"""``pendmap look``: contents and faults of a record."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 @json_option()
 @quiet_option
 def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
-    """Say what a record holds and what is odd about it, before anything is fitted.
+    """Describe the contents and faults of a record, before anything is fitted.
 
     A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
     experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,
-    releases and rest, gaps, outliers, missed counts, units: what is certain is mended as it is
-    read, and said. The files stay as they are.
+    releases and rest, gaps, outliers, missed counts, units: unambiguous faults are corrected on
+    reading and reported. The files are not changed.
     """
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import as_json as fields

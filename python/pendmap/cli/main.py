@@ -43,7 +43,7 @@ _COMMANDS = {
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
 }
-"""Commands with what each does, in the order of --help."""
+"""Commands and their descriptions, in the order of --help."""
 _NAMED = re.compile(
     r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL
 )
@@ -55,7 +55,7 @@ class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)
 
 
 class _Commands(click.Group):
-    """Commands that are imported when they are called: ``--help`` imports none of them."""
+    """Group whose commands are imported only when called: ``--help`` imports none of them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(_COMMANDS)
@@ -74,7 +74,7 @@ class _Commands(click.Group):
         except BrokenPipeError:
             raise _ReaderGone from None
         except KeyboardInterrupt as error:
-            # click writes an empty line for it, and none for what it would make of it.
+            # click writes an empty line for KeyboardInterrupt, but none for Abort.
             raise click.Abort from error
         except InputError as error:
             called = self.get_command(ctx, ctx.invoked_subcommand or "")
@@ -102,21 +102,21 @@ def command() -> None:
 def run() -> None:
     """Run the command line and exit: 0 done, 1 not all of it, 2 bad input, 130 interrupted.
 
-    What terminals and schedulers ask to stop with (SIGTERM, SIGHUP) stops it as Ctrl-C does.
+    SIGTERM and SIGHUP, which schedulers and terminals send, stop it like Ctrl-C.
     """
     if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # libraries' words to programmers
-    os.environ["MPLBACKEND"] = "agg"  # figures go to files: no window of the user's is needed
+        warnings.simplefilter("ignore")  # warnings of libraries are for developers
+    os.environ["MPLBACKEND"] = "agg"  # figures are written to files, without windows
     stops: list[int] = []
     try:
         with _stoppable(stops):
             code = _exit_code(stops)
     except KeyboardInterrupt:
-        # It came before the handlers were set, or at the very end.
+        # The interrupt came before the handlers were set, or after they were removed.
         code = INTERRUPTED if stops else _interrupted()
     if stops and code == INTERRUPTED:
-        # A library that was stopped in its middle, while it was imported for one, may not survive
-        # that Python takes it down.
+        # A library that was interrupted, for example during its import, may crash when the
+        # interpreter shuts down.
         with contextlib.suppress(OSError):
             sys.stdout.flush()
         os._exit(code)
@@ -124,7 +124,7 @@ def run() -> None:
 
 
 def _flushed(code: int) -> int:
-    """Flush stdout; where that fails, keep Python from reporting it again at its end."""
+    """Flush stdout; if that fails, keep the interpreter from reporting it again at exit."""
     try:
         if sys.stdout is not None:  # it may be closed
             sys.stdout.flush()
@@ -143,7 +143,7 @@ def _silence() -> None:
 
 @contextlib.contextmanager
 def _stoppable(stops: list[int]) -> Iterator[None]:
-    """Turn every signal that asks to stop into a KeyboardInterrupt, and list it."""
+    """Convert SIGINT, SIGTERM and SIGHUP to KeyboardInterrupt; append them to ``stops``."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -153,7 +153,7 @@ def _stoppable(stops: list[int]) -> Iterator[None]:
         raise KeyboardInterrupt
 
     def again(ignored: sys.UnraisableHookArgs) -> None:
-        # Python drops what is raised while an object is removed: the interrupt comes once more.
+        # Python ignores exceptions raised in finalizers: the interrupt is repeated.
         if isinstance(ignored.exc_value, KeyboardInterrupt) and hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, stop)
             signal.setitimer(signal.ITIMER_REAL, 0.01)
@@ -165,7 +165,7 @@ def _stoppable(stops: list[int]) -> Iterator[None]:
     for number in before:
         signal.signal(number, stop)
     hook, sys.unraisablehook = sys.unraisablehook, again
-    # At the very end nothing is left to interrupt.
+    # At exit an interrupt is ignored.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     try:
         yield
@@ -179,10 +179,10 @@ def _exit_code(stops: Sequence[int]) -> int:
     COMPLETE.clear()
     try:
         result = command.main(prog_name="pendmap", standalone_mode=False)
-    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (told apart below)
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (distinguished below)
         interrupted = isinstance(error, (click.Abort, KeyboardInterrupt))
-        # What a library makes of a signal, in the middle of its import for one, is the signal; a
-        # trajectory that is stopped is written, and may not fit.
+        # After a signal, an error of a library, for example during its import, is due to the
+        # signal, except that a stopped trajectory is written and may not fit the disk.
         if interrupted or (stops and not isinstance(error, NotWrittenError)):
             return _interrupted()
         return _failed(error)
@@ -204,7 +204,7 @@ def _failed(error: BaseException) -> int:  # noqa: PLR0911 (one for each way to 
         case FitDiverged() | InputError():
             return _refuse(str(error))
         case _ReaderGone():
-            # No message, and none from the interpreter at the end.
+            # No message, and none from the interpreter at exit.
             _silence()
             return 128 + signal.SIGPIPE
         case MemoryError():

@@ -58,7 +58,7 @@ def varied_model_options(function: Command) -> Command:
             )
         typed = {name for name in ("p", "omega", "frequency_hz") if given[name] is not None}
         if frequency is not None and typed == {"p"}:
-            # A model without a drive has no frequency of its own, and p needs one.
+            # p needs a frequency, which a model without drive lacks.
             first = ranges[frequency].low
             which = "omega" if frequency == "omega" else "frequency_hz"
             given[which] = first / math.tau if frequency == "Omega" else first
@@ -80,7 +80,7 @@ def varied_model_options(function: Command) -> Command:
 def model_options(
     function: Command, kind: click.ParamType[Any] = NUMBER, left_out: tuple[str, ...] = ()
 ) -> Command:
-    """Add the model's parameters, presets and file, without those that a command takes itself."""
+    """Add the options of parameters, preset and model file, without those ``left_out``."""
     model = option(
         "--model model",
         FILE,
@@ -105,7 +105,7 @@ def model_options(
 
 
 def model_from(given: dict[str, Any]) -> Pendulum | Rig:
-    """Take the model's options out of ``given`` and make the model that they describe."""
+    """Remove the model's options from ``given`` and return the model that they describe."""
     model, preset = given.pop("model"), given.pop("preset")
     typed = {name: given.pop(name, None) for name in (*_BARE, *_SI)}
     typed = {name: value for name, value in typed.items() if value is not None}
@@ -128,14 +128,14 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
 
 
 def begin(given: dict[str, Any], name: str) -> tuple[Pendulum | Rig, Outputs]:
-    """Take the options of model and outputs out of ``given``; the model's file is no output."""
+    """Remove the options of model and outputs from ``given``; refuse the model's file as output."""
     file = given["model"]
     model = model_from(given)
     return model, Outputs.take(given, name, reads=[file])
 
 
 def rig_from(path: Path) -> Rig:
-    """Read a model file that must be in SI; the message of a refusal says what it lacks."""
+    """Read a model file that must be in SI; otherwise raise an error that names what it lacks."""
     model = load_model(path)
     if not isinstance(model, Rig):
         raise InputError(

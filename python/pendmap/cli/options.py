@@ -36,9 +36,9 @@ def option(
     default: float | None = None,
     **more: Any,  # noqa: ANN401 (of click)
 ) -> Decorator:
-    """Return an option, by its names, with the type of its values; its help ends with the default.
+    """Return an option from its names, type and help, to which the default is appended.
 
-    Names are separated by spaces, that of the parameter last where it is another.
+    Names are separated by spaces; the parameter's name is the last if it differs.
     """
     if default is not None:
         text += f"  [default: {default:g}]".replace("e-0", "e-")
@@ -46,7 +46,7 @@ def option(
 
 
 def simd_option(function: Command) -> Command:
-    """Add the instruction set, which applies until the command has ended."""
+    """Add the option of the instruction set, which applies until the command ends."""
 
     def use(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
         if value is None:
@@ -90,23 +90,23 @@ view_option = click.option(
 
 
 def json_option(further: str = "") -> Decorator:
-    """Return the option of the JSON object; alone it writes no files, which ``further`` says."""
+    """Return the option --json, whose help ends with ``further``."""
     text = "One JSON object on stdout"
     return click.option("--json", "as_json", is_flag=True, help=f"{text}{further}.")
 
 
 def seed_option(what: str) -> Decorator:
-    """Return the option of a seed that does ``what``."""
+    """Return the option --seed with the help ``what``."""
     return click.option("--seed", type=Whole(0, MOST_SEED), default=0, help=f"{what}  [default: 0]")
 
 
 def max_periods_option(what: str) -> Decorator:
-    """Return the option of the bound on periods that does ``what``."""
+    """Return the option --max-periods with the help ``what``."""
     return click.option("--max-periods", type=Whole(1, MOST_PERIODS), help=what)
 
 
 def added(*options: Decorator) -> Decorator:
-    """Return what adds several options, in the order of --help."""
+    """Return a decorator that adds several options, in the order of --help."""
 
     def add(function: Command) -> Command:
         for option in reversed(options):

@@ -51,7 +51,7 @@ def command(  # noqa: PLR0913 (an option each)
     pendulum, its symbols and its equation. The others are made on a virtual rig like the paper's:
     4 a decay with its half cycles, 5 the decrements, 6 the decay by each model, 7 and table1 the
     errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
-    Writes figure_1.png to figure_9.png and table_1.csv, those that are asked for.
+    Writes figure_1.png to figure_9.png and table_1.csv, as requested.
     """
     from pendmap.paper import figures
 
@@ -61,7 +61,7 @@ def command(  # noqa: PLR0913 (an option each)
     if plot is not None and len(keys) > 1:
         raise click.UsageError("--plot must have one figure, it is one file; --out takes a folder")
     if out is not None:
-        out.mkdir(exist_ok=True)  # the folder above is there, as for every other file
+        out.mkdir(exist_ok=True)  # the parent folder must exist, as for every other file
     folder = out or Path()
     for key in keys if plot is None else ():  # before anything is computed
         default_file(folder / _name(key))
@@ -90,7 +90,7 @@ def _files(
 
 
 def _say(found: IdentificationReport) -> None:
-    """Print what each method finds, what its simulation misses, and the paper's table."""
+    """Print the results of each method, the errors of its simulation, and the paper's table."""
     from pendmap.cli.show import write_table
     from pendmap.identification.report import methods_table, table1_table
     from pendmap.paper import figures

@@ -63,7 +63,7 @@ def command(  # noqa: PLR0913 (the options above)
     except MemoryError:
         raise
     except Exception as error:
-        # Nobody but the file says what is drawn: numbers that no result has end anywhere.
+        # The content of the file is not checked: invalid values may raise any error.
         raise InputError(
             f"{file}: cannot be drawn: its content is not a result's: "
             f"{type(error).__name__}: {error}"

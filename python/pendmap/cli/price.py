@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-_TYPICAL: Final = 20  # Bound over typical settling time: 60 to 8 for gamma 0.01 to 0.0003
+_TYPICAL: Final = 20  # Ratio of bound to typical settling time: 60 to 8 for gamma 0.01 to 0.0003
 _BESIDE: Final = 5000  # Cost of the search for attractors and of the checks, in starts
-_SAMPLE: Final = 960  # Starts of the measurement of speed
+_SAMPLE: Final = 960  # Number of starts in a measurement of speed
 _LEAST_SECONDS: Final = 0.05  # Least time of a measurement of speed, s
 
 
 def say(model: Pendulum | Rig, count: int, given: Mapping[str, Any], *, quiet: bool) -> None:
-    """Report periods and time of ``count`` starts where damping raises the bound."""
+    """Report the periods and time of ``count`` starts if small damping raises the bound."""
     if quiet or given["max_periods"] is not None:
         return
     from pendmap import _core
@@ -47,7 +47,7 @@ def say(model: Pendulum | Rig, count: int, given: Mapping[str, Any], *, quiet: b
 
 
 def _speed(pendulum: Pendulum, tol: float, threads: int) -> float:
-    """Return the periods of single trajectories that are computed in a second."""
+    """Return the number of periods of single trajectories computed in a second."""
     import numpy as np
 
     from pendmap import _core

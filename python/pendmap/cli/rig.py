@@ -76,8 +76,8 @@ def command(  # noqa: PLR0913 (an option each)
     """Write an experiment of a virtual rig: records, and the truth in a file beside them.
 
     free_decay is one release near pi; forced are runs under drive; hidden has runs of both kinds
-    and an effect in them that the paper's equation lacks. What is hidden stands in
-    DIR.truth.toml alone. The same seed gives the same experiment.
+    and an effect in them that the paper's equation lacks. Hidden values are only in DIR.truth.toml.
+    The same seed gives the same experiment.
     """
     from pendmap import virtual_rig
 
@@ -126,7 +126,7 @@ def _names(where: virtual_rig.Places) -> str:
 
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
-    """Draw the records with their public description, not what is hidden."""
+    """Draw the records with their public description, without hidden values."""
     from pendmap import render, virtual_rig
 
     held = virtual_rig.held_out(experiment)

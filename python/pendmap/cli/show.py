@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a bar with the time left on stderr; give its callback, or None."""
+    """Show a progress bar with the time left on stderr; yield its callback, or None."""
     if not shown:
         yield None
         return
@@ -55,7 +55,7 @@ def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], Non
 
 @dataclasses.dataclass(frozen=True)
 class Outputs:
-    """Outputs that a command writes."""
+    """Output files and options of a command."""
 
     out: Path | None = None
     plot: Path | None = None
@@ -75,7 +75,7 @@ class Outputs:
         *,
         default: bool = True,
     ) -> Outputs:
-        """Take the output options out of ``given``; where none is given, by default all files."""
+        """Remove the output options from ``given``; if none is given, by default all files."""
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
         taken = {field: given.pop(field) for field in fields}
@@ -93,7 +93,7 @@ class Outputs:
         return outputs
 
     def check_room(self, cells: int) -> None:
-        """Refuse a map for which the disk has no space: half a byte a cell at least, compressed."""
+        """Refuse a map if the disk lacks half a byte a cell, the least compressed size."""
         for path in (self.out, self.rerun):
             if path is not None:
                 check_room(path, cells // 2)
@@ -115,7 +115,7 @@ class Outputs:
         draw: str = "draw",
         record: str = "record",
     ) -> Iterator[tuple[Write, Path]]:
-        """Give what writes each file; matplotlib and Rerun are imported when their turn comes."""
+        """Yield writer and path of each file; import matplotlib and Rerun only when needed."""
         if self.out is not None and save is not None:
             yield save, self.out
         if self.plot is not None:
@@ -132,7 +132,7 @@ class Outputs:
             yield functools.partial(getattr(viewer, record), result), self.rerun
 
     def open_viewer(self) -> None:
-        """Open the viewer on the recording where --view asks for it."""
+        """Open the viewer on the recording if --view is given."""
         if not self.view or self.rerun is None:
             return
         from pendmap import viewer
@@ -144,7 +144,7 @@ class Outputs:
 
 
 def check_view() -> None:
-    """Refuse --view before anything is computed where no window can open."""
+    """Refuse --view before anything is computed if no window can open."""
     from pendmap import viewer
 
     try:
@@ -164,7 +164,7 @@ def _report_files(report: Path | None) -> list[Path]:
 def keep_inputs(
     inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
 ) -> None:
-    """Refuse outputs, by their option, that are inputs, or folders that hold one."""
+    """Refuse outputs, named by their option, that are inputs or folders of inputs."""
 
     def lost(path: Path, output: Path) -> bool:
         places = [path, *path.resolve().parents] if output.is_dir() else [path]
@@ -213,7 +213,7 @@ class Written(list[str]):
         self.refused: list[InputError] = []
 
     def name(self, path: Path | None) -> str | None:
-        """Return the name of a file that is complete, none of another."""
+        """Return the name of a file if it is complete, else None."""
         return str(path) if str(path) in self else None
 
     def say(self) -> None:
@@ -222,7 +222,7 @@ class Written(list[str]):
             click.echo("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
-        """End the command with an error where a file was refused, or not taken by the disk."""
+        """Raise an error if a file was refused, or could not be written to the disk."""
         if self.refused:
             raise self.refused[0]
         if self.missed:
@@ -231,10 +231,10 @@ class Written(list[str]):
 
 
 def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Written:
-    """Write files one after the other, an interrupt between two of them; return their names.
+    """Write files one after the other, with interrupts only between them; return their names.
 
-    Where the disk does not take one, the others are tried all the same (:meth:`Written.check`).
-    What cannot be put into a file is refused and leaves none, unless ``keep`` asks for the others.
+    If the disk refuses one, the others are still written (:meth:`Written.check`). If a file cannot
+    hold its content, InputError is raised and all files are removed, unless ``keep`` is True.
     """
     written = Written()
     for write, path in files:
@@ -255,13 +255,13 @@ def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Wri
 
 
 def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write a table in columns as wide as they need, however wide the terminal is."""
+    """Write a table with a bold header and aligned columns, whatever the terminal's width."""
     first, *others = columns(head, rows).split("\n")
     click.echo("\n".join([click.style(first, bold=True), *others]))
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
-    """Return numbers of numpy as Python's own, and numbers that are not finite as null."""
+    """Convert numpy numbers to Python's, and numbers that are not finite to None."""
     if isinstance(value, dict):
         return {str(key): plain(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

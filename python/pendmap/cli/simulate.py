@@ -64,7 +64,7 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
 
 
 def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> Live:
-    """Connect to the viewer before anything is computed."""
+    """Return a connection to the viewer, made before anything is computed."""
     from pendmap import viewer
 
     try:
@@ -74,7 +74,7 @@ def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> 
 
 
 def _finished(live: Live, dataset: xr.Dataset) -> Exception | None:
-    """Send the last samples; return the error, to be raised after the files are written."""
+    """Send the last samples; return an error, to be raised after the files are written."""
     from pendmap import viewer
 
     try:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def command(_: object, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Find where rest, hanging and inverted, is stable: critical curves of eq. 1.3, exact.
 
-    Also without damping; folds of the oscillation born there; curves by perturbation beside. For
-    files, frequencies are added where curves turn, end or bend; --json lists those asked for.
+    Also without damping; folds of the oscillation born there; curves by perturbation. For files,
+    frequencies are added where curves turn, end or bend; --json lists the requested ones.
     """
     return {"omega": given.pop("omegas"), "refine": outputs.draws, **given}

@@ -24,13 +24,13 @@ _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?",
 
 
 class OptionType(click.ParamType[T], Generic[T]):
-    """A type of option, by its name and the function that reads a text or raises InputError."""
+    """Type of an option, from its name and a function that reads a text or raises InputError."""
 
     def __init__(self, name: str, read: Callable[[str], T]) -> None:
         self.name, self.read = name, read
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> T:
-        """Return the value of a text; a value that is read already is kept."""
+        """Return the value of a text; other values are returned unchanged."""
         if not isinstance(value, str):
             return value  # type: ignore[return-value]
         try:
@@ -167,12 +167,12 @@ def _output(suffixes: tuple[str, ...], text: str) -> Path:
 
 
 def default_file(name: str | Path) -> Path:
-    """Return a file that no option names, where it can be written."""
+    """Return the path of a file that no option names; refuse it if it cannot be written."""
     return OutputFile([Path(name).suffix]).convert(str(name), None, None)
 
 
 def _report(text: str) -> Path:
-    """Refuse a report that cannot be written: a file, or a folder that is made where missing."""
+    """Refuse a report that cannot be written: a file, or a folder, which may be missing."""
     path, suffixes = Path(text), (".html", ".md")
     if path.suffix and not path.is_dir():
         return _output(suffixes, text)

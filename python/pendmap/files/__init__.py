@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, TOML, and results as NetCDF or Zarr (``files.dataset``)."""
+"""File access: atomic writing, TOML, and results as NetCDF or Zarr (``files.dataset``)."""
 
 from pendmap.files.atomic import (
     COMPLETE,

@@ -1,4 +1,4 @@
-"""Files that are complete or absent."""
+"""Atomic writing of files and folders: each is complete or absent."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from pendmap.errors import InputError
 
 try:
     import fcntl
-except ImportError:  # without locks no folder of another run is certainly left over
+except ImportError:  # without file locks, stages of killed processes cannot be recognised
     fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import IO
 
-COMPLETE: Final[list[str]] = []  # Files written so far, named by an interrupt
+COMPLETE: Final[list[str]] = []  # Files written so far; the message of an interrupt names them
 # Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-# Name of a folder in which files are written before they take their places
+# Name of a stage, the temporary folder in which files are written before they are moved
 _STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
-_OWNER: Final = "owner"  # File in a stage that its run keeps locked while it lives
-_PROBE: Final = 2**20  # Bytes written on trial, which a full disk refuses
-_LEAST: Final = 4096  # Bytes written on trial before anything is computed: one block of most disks
+_OWNER: Final = "owner"  # File in a stage that its process keeps locked
+_PROBE: Final = 2**20  # Bytes of a trial write, which fails on a full disk, and of one read
+_LEAST: Final = 4096  # Bytes of the trial write before a computation: one block of most disks
 
 
 @contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Hold signals that ask to stop back until the end of the block, then let them happen.
+    """Delay SIGINT, SIGTERM and SIGHUP until the end of the block, then raise the first one.
 
-    An interrupted library may leave its locks closed and wait for ever (NetCDF's does). Outside the
-    main thread, where no signal arrives, nothing is done.
+    An interrupted library may keep its locks and deadlock (NetCDF's does). Outside the main
+    thread, which receives no signals, nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -63,11 +63,11 @@ def held_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterator[Path]:
-    """Yield a temporary place beside ``path`` of the same name and put its file there at the end.
+    """Yield a temporary path with the same file name; move its file to ``path`` at the end.
 
-    ``path`` always holds either the whole new file or what it held before. Raises InputError for
-    suffixes other than ``suffixes`` (lower case), OSError where nothing can be written, whatever a
-    library makes of that. An interrupt waits until the file is in its place.
+    ``path`` always holds either the complete new file or its previous content. Raises InputError
+    for suffixes other than ``suffixes`` (lower case), OSError if nothing can be written, also if a
+    library raises another error for it. An interrupt is delayed until the file is in place.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -86,11 +86,11 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary place beside ``path`` for a new folder and put it there at the end.
+    """Yield a temporary path for a new folder; move the folder to ``path`` at the end.
 
-    A folder at ``path`` stays until the new one is whole, and is removed then; whether it may be is
-    for the caller to check. A link is followed. Raises OSError where nothing can be written. An
-    interrupt waits until the folder is in its place.
+    A folder at ``path`` is kept until the new one is complete, and then removed; the caller checks
+    that it may be. Symbolic links are followed. Raises OSError if nothing can be written. An
+    interrupt is delayed until the folder is in place.
     """
     target = Path(path).resolve()
     with _named(Path(path)), _stage(target.parent) as stage:
@@ -112,7 +112,7 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
     """Return the bytes of a file; raise InputError for more than ``most``, a pipe or a device."""
     source = Path(path)
     check_regular(source)
-    at_once = getattr(os, "O_NONBLOCK", 0)  # a pipe that takes its place is not waited for
+    at_once = getattr(os, "O_NONBLOCK", 0)  # do not block if a pipe has replaced the file
     with open(source, "rb", opener=lambda name, flags: os.open(name, flags | at_once)) as stream:
         check_regular(source, stream.fileno())
         data = bytearray()
@@ -125,7 +125,7 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
 
 
 def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -> None:
-    """Raise OSError for a folder or nothing, InputError for a pipe or a device."""
+    """Raise OSError for a folder or a missing file, InputError for a pipe or a device."""
     found = Path(path).stat() if descriptor is None else os.fstat(descriptor)
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(path))
@@ -134,9 +134,9 @@ def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -
 
 
 def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
-    """Raise OSError where a file or folder of ``size`` bytes cannot be made, before its content is.
+    """Raise OSError if a file or folder of ``size`` bytes cannot be written.
 
-    That is a folder that does not exist, a place where nothing may be written, or a full disk.
+    Checks the parent folder, the permission and the free space before anything is computed.
     """
     target = Path(path)
     with _named(target), _stage(target.parent) as stage:
@@ -154,7 +154,7 @@ def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
 
 @contextlib.contextmanager
 def _named(target: Path) -> Iterator[None]:
-    """Let errors of the disk name the file that was asked for, not its temporary place."""
+    """Re-raise errors of the disk with the name of the target in place of the temporary path."""
     if not target.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(target.parent))
     try:
@@ -180,13 +180,13 @@ def _disk_faults(part: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _stage(folder: Path) -> Iterator[Path]:
-    """Give a hidden folder, removed at the end together with stages of runs that were killed."""
+    """Remove stages of killed processes; yield a new stage, which is removed at the end."""
     with held_interrupts():
         _sweep(folder)
         while True:
             stage = folder / f".pendmap-{uuid.uuid4().hex}.part"
             stage.mkdir()
-            # A run that sweeps at the same moment may take the stage away again.
+            # A process that sweeps at the same moment may remove the new stage.
             with contextlib.suppress(FileNotFoundError):
                 owner = (stage / _OWNER).open("xb")
                 if _locked(owner) and (stage / _OWNER).exists():
@@ -200,7 +200,7 @@ def _stage(folder: Path) -> Iterator[Path]:
 
 
 def _locked(owner: IO[bytes]) -> bool:
-    """Lock a stage's file for this run, unless another one holds it."""
+    """Lock the owner file of a stage; return False if another process holds the lock."""
     if fcntl is None:
         return True
     try:
@@ -213,7 +213,7 @@ def _locked(owner: IO[bytes]) -> bool:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove the stages of runs that were killed: those whose lock nobody holds."""
+    """Remove stages of killed processes: those whose lock is free."""
     if fcntl is None:
         return
     for stage in folder.glob(".pendmap-*.part"):
@@ -230,7 +230,7 @@ def _sweep(folder: Path) -> None:
 
 
 def _put_back(stage: Path) -> None:
-    """Restore a folder that was to be replaced where nothing took its place."""
+    """Restore a folder that was moved into a stage and not replaced."""
     for old in (stage / "old").glob("*"):
         if not (stage.parent / old.name).exists():
             old.rename(stage.parent / old.name)

@@ -1,4 +1,4 @@
-"""Results in files: NetCDF, and Zarr where it is installed."""
+"""Saving and loading of results: NetCDF, and Zarr if it is installed."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
 FORMAT_VERSION: Final = 1  # Version of the layout, in the attribute ``format_version``
-SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of the files that a result is stored in
+SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
-_LARGE: Final = 4096  # Values from which on a variable is compressed
-# Names of the files of a stored result: descriptions and chunks
+_LARGE: Final = 4096  # Number of values above which a variable is compressed
+# Names of files in a Zarr store: metadata and chunks
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
 
 
@@ -45,8 +45,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If it is not a result of pendmap, the suffix is not known, or .zarr is asked for and zarr is
-        not installed.
+        If it is not a result of pendmap, the suffix is not known, or it is .zarr and zarr is not
+        installed.
     OSError
         If the file cannot be written.
 
@@ -79,7 +79,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:
-    """Refuse to replace a folder that is not a stored result, with the files of one alone."""
+    """Raise InputError unless a path is free or a Zarr store of a result without other files."""
     target = Path(path)
     wanted = "must be a new folder, or a result of pendmap, which is replaced"
     if target.exists() and not target.is_dir():
@@ -138,7 +138,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
             return dataset.load()
     except InputError:
         raise
-    except Exception as error:  # whatever a damaged file makes of the reader
+    except Exception as error:  # a damaged file may raise any error
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
 
 
@@ -151,14 +151,14 @@ def _check_result(dataset: xr.Dataset, source: Path) -> None:
         raise InputError(f"{source}: has format {version}, {known}")
     if not isinstance(kind, str):
         raise InputError(f"{source}: has kind {kind}, which is no text")
-    # What is lazily opened has a size, but takes no memory yet.
+    # The dataset is opened lazily: its size is known before it takes memory.
     if dataset.nbytes > _memory() / 2:
         size = f"{dataset.nbytes / 2**20:.0f} MiB"
         raise InputError(f"{source}: must unpack to half of this memory at most, got {size}")
 
 
 def _memory() -> float:
-    """Bytes of memory of this machine; without bound where it does not say."""
+    """Return this machine's memory in bytes; infinity if it is unknown."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

@@ -1,4 +1,4 @@
-"""TOML: read within bounds, written one key on a line."""
+"""Reading of TOML up to a largest size, and writing with one key per line."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import tomli_w
 from pendmap.errors import InputError
 from pendmap.files.atomic import read_whole
 
-_LONGEST: Final = 100  # Characters of a line of TOML that a table within a table may take
-_MOST_TOML: Final = 2**22  # Bytes of a TOML file at most: a thousand runs take a tenth
+_LONGEST: Final = 100  # Largest length of a table written on one line, characters
+_MOST_TOML: Final = 2**22  # Largest size of a TOML file, bytes; a thousand runs take a tenth
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def toml_text(content: Mapping[str, Any]) -> str:
-    """Return TOML whose lists of tables are written ``[[name]]``, a line a key, as people do.
+    """Return TOML with lists of tables as ``[[name]]`` and one key per line.
 
     Raises TypeError or ValueError for values that TOML does not have.
     """
@@ -48,7 +48,7 @@ def _is_tables(value: object) -> bool:
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> str:
-    """Return one ``[[name]]``; tables too long for a line follow as separate tables."""
+    """Return the TOML of one ``[[name]]``; tables too long for a line follow as separate tables."""
     lines, further = [f"[[{name}]]\n"], []
     for key, value in table.items():
         line = f"{_value({key: value})[2:-2]}\n"
@@ -60,7 +60,7 @@ def _entry(name: str, table: Mapping[str, Any]) -> str:
 
 
 def _value(value: object) -> str:
-    """Return a value on one line."""
+    """Return the TOML of a value on one line."""
     if isinstance(value, Mapping):
         keys = {key: tomli_w.dumps({key: 0}).removesuffix(" = 0\n") for key in value}
         inside = ", ".join(f"{keys[key]} = {_value(part)}" for key, part in value.items())

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MISSES: Final = 1.5  # Residual over noise above which a model misses its record
+MISSES: Final = 1.5  # Ratio of residual to noise above which a model misses its record
 _ROUNDING: Final = 1e-9
-"""Largest negative eigenvalue of a correlation per parameter that is rounding."""
+"""Size of a negative eigenvalue of a correlation matrix, per parameter, taken as rounding."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Covariance:
 
 
 def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
-    """Return the uncertainty in a model's notes, if any, without that of single runs and sensors.
+    """Return the covariance in a model's notes, if any, without parameters of runs and sensors.
 
     ``[covariance]`` has ``names`` and ``matrix``, and may have ``between_runs``, standard
     deviations between runs by name, whose squares are added to the diagonal.
@@ -78,7 +78,7 @@ def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
     """Return notes whose covariance lacks the parameters that are known exactly."""
     try:
         known = covariance_of(notes)
-    except InputError:  # refused where draws are made of it
+    except InputError:  # drawing models from it raises the error
         known = None
     if known is None or not set(known.names) & set(exact):
         return dict(notes)
@@ -97,7 +97,7 @@ def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
 
 
 def misses(notes: Mapping[str, Any]) -> float:
-    """Return ``rms / noise`` of ``[provenance]`` where a model misses its record; else nan."""
+    """Return ``rms / noise`` of ``[provenance]`` if it is above ``MISSES``, else nan."""
     table = notes.get("provenance", {})
     rms, noise = (table.get(name) for name in ("rms", "noise"))
     if not all(isinstance(x, int | float) and x > 0 for x in (rms, noise)):
@@ -107,6 +107,6 @@ def misses(notes: Mapping[str, Any]) -> float:
 
 
 def said_of(notes: Mapping[str, Any]) -> dict[str, float | str]:
-    """Return the attribute ``misses_record`` of a dataset where a model misses its record."""
+    """Return the attribute ``misses_record`` of a dataset, if a model misses its record."""
     ratio = misses(notes)
     return {"misses_record": ratio} if math.isfinite(ratio) else {}

@@ -20,7 +20,7 @@ _NO_SHAPE: Final = ("size", "phase")
 
 
 class ParameterKey(NamedTuple):
-    """A parameter of a formula as the core takes it; ``less`` is a place among the parameters."""
+    """A formula's parameter as passed to the core; ``less`` is an index into the parameters."""
 
     name: str
     power: float
@@ -33,7 +33,7 @@ class ParameterKey(NamedTuple):
 
 
 class FormulaKey(NamedTuple):
-    """A formula as the core takes it."""
+    """A formula as passed to the core."""
 
     name: str
     term: str
@@ -42,15 +42,15 @@ class FormulaKey(NamedTuple):
 
 
 class Described(Protocol):
-    """A formula as an effect knows it; :class:`pendmap.Formula` is one."""
+    """Interface of formulas used by :class:`Effect`; :class:`pendmap.Formula` implements it."""
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the formula."""
 
     @property
     def key(self) -> FormulaKey:
-        """The argument of the kernel."""
+        """The formula as passed to the core."""
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -58,12 +58,12 @@ class Described(Protocol):
 
     @property
     def table(self) -> dict[str, Any]:
-        """Its table in a model file."""
+        """Table of the formula in a model file."""
 
 
 @functools.cache
 def library() -> dict[str, dict[str, Any]]:
-    """Return the library's effects by name, as they are written in Rust."""
+    """Return the definitions of the library's effects by name, as the Rust core lists them."""
     from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
 
     return {entry["name"]: entry for entry in _core.effects()}
@@ -151,7 +151,7 @@ def effects() -> list[EffectDefinition]:
 
 
 def described(entry: Mapping[str, Any]) -> EffectDefinition:
-    """Return a definition as :func:`effects` does; of a formula it is ``Formula.entry``."""
+    """Return the definition of an entry of :func:`library`, or of ``Formula.entry``."""
     parameters = [
         EffectParameter(**each | {key: tuple(each[key]) for key in ("range", "typical")})
         for each in entry["parameters"]
@@ -171,14 +171,14 @@ def opposes(definition: Mapping[str, Any]) -> bool:
 
 
 def middle(entry: Mapping[str, Any]) -> float:
-    """Return the middle of a shape's typical range, by ratio if it is positive."""
+    """Return the mean of a shape's typical range, geometric if the range is positive."""
     low, high = entry["typical"]
     value: float = math.sqrt(low * high) if low > 0 else 0.5 * (low + high)
     return float(round(value)) if entry["role"] == "order" else value
 
 
 def definition(name: object) -> dict[str, Any]:
-    """Return what the library states about an effect; raise InputError if it has none."""
+    """Return the library's definition of an effect; raise InputError if there is none."""
     known = library()
     if not isinstance(name, str) or name not in known:
         near = difflib.get_close_matches(str(name), known, n=1)
@@ -195,13 +195,13 @@ class Effect:
     """An effect of the library, or a formula, with values for its parameters.
 
     In a :class:`pendmap.Pendulum` its parameters are without dimensions, in a
-    :class:`pendmap.Rig` in the SI units that the library states; each is the one without dimensions
-    times a power of ``w0`` that the library knows.
+    :class:`pendmap.Rig` in the SI units of its definition; each is the one without dimensions
+    times a power of ``w0``.
 
     Parameters
     ----------
     name : str
-        One of the library (``pendmap effects``), like ``quadratic_drag``.
+        Effect of the library (``pendmap effects``), like ``quadratic_drag``.
     parameters : mapping of str to float
         A value for each of its parameters.
     ci95 : mapping of str to (float, float), optional
@@ -217,7 +217,7 @@ class Effect:
     ------
     InputError
         If the library has no such effect, a parameter is missing, not known or not finite, or an
-        interval is none.
+        interval is not valid.
 
     Examples
     --------
@@ -267,7 +267,7 @@ class Effect:
 
     @classmethod
     def blank(cls, name: str, units: Units) -> Effect:
-        """Return an effect of the library where a search may begin: weak, of a usual shape."""
+        """Return an effect as the start of a search: smallest typical size, middle shape."""
         values = {
             entry["name"]: float(f"{middle(entry):.1g}") if is_shape(entry) else entry["typical"][0]
             for entry in definition(name)["parameters"]
@@ -286,7 +286,7 @@ class Effect:
 
     @property
     def drives(self) -> bool:
-        """Whether it moves the pivot, or pushes with the phase of the drive."""
+        """Whether it moves the pivot, or is a torque with the phase of the drive."""
         return bool(self.definition["group"] == "drive")
 
     @property
@@ -301,7 +301,7 @@ class Effect:
 
     @property
     def drifts(self) -> bool:
-        """Whether it changes with the time in the laboratory, which maps hold."""
+        """Whether it changes with the time in the laboratory, which is fixed in maps."""
         return bool(self.definition["mappable"] == "frozen")
 
     def title(self, units: Units, without: Collection[str] = ()) -> str:
@@ -316,11 +316,11 @@ class Effect:
         return f"{self.name} ({', '.join(shown)})" if shown else self.name
 
     def given(self, units: Units) -> Effect:
-        """Return an effect without dimensions in ``units``."""
+        """Convert the effect, without dimensions, to ``units``."""
         return self._scaled(units.given)
 
     def bare(self, units: Units) -> Effect:
-        """Return an effect in ``units`` without dimensions."""
+        """Convert the effect, in ``units``, to one without dimensions."""
         return self._scaled(units.bare)
 
     def _scaled(self, scale: Any) -> Effect:  # noqa: ANN401 (a method of Units)

@@ -1,4 +1,4 @@
-"""Model files: TOML in and out, without dimensions or in SI."""
+"""Reading and writing of model files: TOML, without dimensions or in SI."""
 
 from __future__ import annotations
 
@@ -25,12 +25,11 @@ def load_model(
 
     The table ``[pendulum]`` has the parameters of a :class:`Pendulum`, or those of a :class:`Rig`
     in SI with the other ways to write them that :meth:`Rig.of` takes; without dimensions ``zeta``
-    may stand for ``gamma`` = 2 zeta. A key that is left out is 0. Each ``[[effect]]`` has a
-    ``name`` and ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each
-    ``[[formula]]`` is a :class:`Formula`, which effects may name; ``[covariance]`` and
-    ``[provenance]`` are kept in the model's ``notes``; typed parameters are known exactly and are
-    no part of the covariance. Editors complete keys from the JSON Schema that
-    ``python -m pendmap.model.schema`` prints.
+    may replace ``gamma`` = 2 zeta. A missing key is 0. Each ``[[effect]]`` has a ``name`` and
+    ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each ``[[formula]]``
+    is a :class:`Formula`, which effects may name; ``[covariance]`` and ``[provenance]`` are kept in
+    the model's ``notes``; typed parameters are known exactly and are removed from the covariance.
+    Editors complete keys from the JSON Schema that ``python -m pendmap.model.schema`` prints.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Effects that a user writes: a torque as a formula."""
+"""Effects defined by the user: a torque as a formula."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
 _EXAMPLES: Final = {"name": '"cubic"', "term": '"-k*v^3"', "parameters": "{ k = -1 }"}
 """Keys that a formula needs, with examples for messages."""
-_TYPICAL: Final = (1e-4, 0.3)  # Default values of interest: those of the library's sizes
+_TYPICAL: Final = (1e-4, 0.3)  # Default range of interest: that of the library's sizes
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
 
 
@@ -45,9 +45,9 @@ class Formula:
     term : str
         The torque per moment of inertia on the right of ``th'' = ...``: numbers, ``pi``, ``+ - * /
         ^`` and brackets; ``theta`` (rad, not wrapped), ``v`` (velocity), ``phase`` (of the harmonic
-        drive, rad), ``t`` (time in the laboratory, which maps hold), ``w0``, ``a`` (the pivot's
+        drive, rad), ``t`` (time in the laboratory, fixed in maps), ``w0``, ``a`` (the pivot's
         upward acceleration over gravity) and the parameters; ``sqrt exp log sin cos tanh abs sign
-        min max`` and ``wrap``, which takes whole turns off an angle. It means the same in SI and
+        min max`` and ``wrap``, which subtracts whole turns from an angle. It is valid in SI and
         without dimensions, where ``w0`` is 1.
     parameters : mapping
         For each parameter, one to three, its power of ``w0`` or a mapping of
@@ -62,17 +62,17 @@ class Formula:
         - ``range``: the least and the greatest value allowed, without dimensions; by default any;
         - ``unit``, in SI, and ``meaning``.
 
-        The first one is the size; a diagnosis needs a term proportional to it. A further one in
-        which the term repeats every turn is a phase; all others are shapes, of which a diagnosis
-        scans the first.
+        The first one is the size; a diagnosis needs a term proportional to it. A further one is a
+        phase if the term is 2 pi periodic in it; all others are shapes, of which a diagnosis scans
+        the first.
     revealed_by : str
         Data that show it, for the advice of a diagnosis.
 
     Raises
     ------
     InputError
-        If something is missing, the term cannot be read, its units do not balance, it is no number
-        somewhere, or it jumps elsewhere than where the velocity passes zero; on one line.
+        If something is missing, the term cannot be read, its units do not balance, it is not a
+        number somewhere, or it jumps elsewhere than at zero velocity; on one line.
 
     Notes
     -----
@@ -141,8 +141,8 @@ class Formula:
     ) -> Formula:
         """Return the formula that a Python function computes.
 
-        The function is called once, with names in place of numbers; the term that it computes runs
-        compiled, in maps too.
+        The function is traced: called once with symbols in place of numbers. The resulting term
+        runs compiled, also in maps.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class Formula:
 
 @contextlib.contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the name of a file before the message of an error in it."""
+    """Prefix the message of an InputError with the name of a file."""
     try:
         yield
     except InputError as error:
@@ -195,14 +195,14 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def shown_key(key: str) -> str:
-    """Return a key of a file as messages name it."""
+    """Return a key of a file as it is written in messages."""
     return key if key.isidentifier() else short_repr(key)
 
 
 def each_table(
     name: str, tables: object, keys: tuple[str, ...], examples: Mapping[str, str]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the tables ``[[name]]`` of a file with their places, keys checked."""
+    """Check the keys of the tables ``[[name]]`` of a file; yield their places and contents."""
     if not isinstance(tables, list):
         raise InputError(f"{name} must be [[{name}]], one table each, got {short_repr(tables)}")
     for count, table in enumerate(tables, 1):
@@ -269,7 +269,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
 def _parameter(
     name: object, given: object, names: list[Any]
 ) -> tuple[ParameterKey, dict[str, Any]]:
-    """Return a parameter as the core takes it, and as a table without defaults."""
+    """Return a parameter as passed to the core, and as a table without defaults."""
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
@@ -317,7 +317,7 @@ def _power(name: str, value: object, names: list[Any]) -> tuple[float, int | Non
 
 
 def _checked(where: str, what: str, value: object, *, first: bool) -> object:
-    """Return a detail of a parameter, checked; the first parameter, and no other, is the size."""
+    """Return a checked property of a parameter; only the first parameter has the role ``size``."""
     if what in {"typical", "range"}:
         if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
             raise InputError(f"{where} must be [low, high], got {short_repr(value)}")

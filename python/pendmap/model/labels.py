@@ -1,4 +1,4 @@
-"""Symbol, unit and meaning of every parameter of a pendulum, once."""
+"""Symbol, unit and meaning of every parameter of a pendulum."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Label(NamedTuple):
-    """A parameter as pictures, tables and messages name it."""
+    """Symbol, unit and meaning of a parameter in figures, tables and messages."""
 
     symbol: str
-    unit: str  # in plain characters; empty of a pure number
+    unit: str  # in ASCII; empty for a pure number
     meaning: str
 
 

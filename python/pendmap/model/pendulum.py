@@ -56,9 +56,9 @@ class Pendulum:
     Raises
     ------
     InputError
-        If a value is not finite or outside its range, an effect is there twice, or one is given
-        that is a parameter here: ``viscous_damping`` beside ``gamma``,
-        ``coulomb_friction`` beside ``theta_r``, ``bias_torque`` beside ``torque``.
+        If a value is not finite or outside its range, an effect occurs twice, or one duplicates a
+        parameter: ``viscous_damping`` beside ``gamma``, ``coulomb_friction`` beside ``theta_r``,
+        ``bias_torque`` beside ``torque``.
 
     References
     ----------
@@ -93,7 +93,7 @@ class Pendulum:
         own = {name: (name, getattr(self, name)) for name in self.numbers()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
         if self.effects:
-            _ = self.period  # the core refuses effects that are there twice or outside their range
+            _ = self.period  # the core refuses effects that occur twice or are outside their range
 
     @classmethod
     def numbers(cls) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
         check_type("effects", effect, Effect, "Effect('quadratic_drag', {'q': 0.01})")
         if effect.formula is not None:
             continue
-        # The library gives the only parameter of such an effect the paper's name.
+        # The only parameter of an effect that duplicates one of the model has its name.
         names = [entry["name"] for entry in effect.definition["parameters"]]
         if len(names) == 1 and names[0] in own:
             called, value = own[names[0]]
@@ -178,7 +178,7 @@ def title_of(
     names: Sequence[str],
     always: set[str],
 ) -> str:
-    """Return those parameters that are not 0 or shown ``always``, the last if effects drift."""
+    """Return one line: parameters not 0 or shown ``always``, the last if effects drift; effects."""
     shown = always | ({names[-1]} if any(effect.drifts for effect in model.effects) else set())
     parts = []
     for name in names:

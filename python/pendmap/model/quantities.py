@@ -1,4 +1,4 @@
-"""A rig's numbers from any of the ways to write them: natural frequency or length, stroke or p."""
+"""Conversion of the notations of a rig's quantities: frequency or length, stroke or p."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OPTIONAL: Final = ("Tr", "torque", "phi", "lab_time_s", "gravity")
 _POSITIVE: Final = ("length_m", "gravity", "Omega", "frequency_hz")
 _W0: Final = (1e-6, 1e6)
 _NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Y", "stroke_mm")
-_AGREE: Final = 1e-3  # Largest relative difference of two numbers for one quantity: rounded digits
+_AGREE: Final = 1e-3  # Largest relative difference of two values of one quantity: rounded digits
 
 
 def check(name: str, value: object) -> float:
@@ -44,7 +44,7 @@ def check(name: str, value: object) -> float:
 
 
 def natural_frequency(given: Mapping[str, float]) -> float:
-    """Return ``w0`` in rad/s, given itself or as ``sqrt(gravity / length_m)``."""
+    """Return ``w0`` in rad/s, given directly or as ``sqrt(gravity / length_m)``."""
     ways = {}
     gravity = check("gravity", given.get("gravity", GRAVITY))
     if "w0" in given:
@@ -94,7 +94,7 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def one(name: str, ways: Mapping[str, float]) -> float:
-    """Return the first of several values for one quantity, by their sources; refuse others."""
+    """Return the first of several values of one quantity; raise InputError if they disagree."""
     (first, value), *others = ways.items()
     for other, second in others:
         if abs(second - value) > _AGREE * max(abs(value), abs(second)):

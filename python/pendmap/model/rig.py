@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def own_name(effect: str) -> str | None:
-    """Return the parameter of a :class:`Rig` that is the same term as an effect, if any."""
+    """Return the parameter of a :class:`Rig` with the same term as an effect, if any."""
     if effect not in library():
         return None
     entries = definition(effect)["parameters"]
@@ -68,8 +68,8 @@ class Rig:
     Raises
     ------
     InputError
-        If a value is not finite or outside its range, ``p`` has no frequency, an effect is there
-        twice, or one is given that is a parameter here.
+        If a value is not finite or outside its range, ``p`` has no frequency, an effect occurs
+        twice, or one duplicates a parameter.
 
     References
     ----------
@@ -123,7 +123,7 @@ class Rig:
         notes: Mapping[str, Any] | None = None,
         **given: float,
     ) -> Rig:
-        """Return the rig that these quantities describe.
+        """Return a rig from quantities in any of their notations.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class Rig:
 
     @functools.cached_property
     def pendulum(self) -> Pendulum:
-        """The pendulum without dimensions; ``omega`` is 1 where nothing is driven."""
+        """The pendulum without dimensions; ``omega`` is 1 without drive."""
         units = self.units
         numbers = {
             bare: units.bare(getattr(self, si), power) for bare, (si, power) in COUNTERPARTS.items()
@@ -251,5 +251,5 @@ def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:
 
 
 def _kept(notes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the notes that hold in other units too."""
+    """Return the notes that do not depend on units: all but the covariance."""
     return {name: table for name, table in notes.items() if name != "covariance"}

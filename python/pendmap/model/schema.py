@@ -1,7 +1,7 @@
 """The JSON Schema of model files, from the tables that check them.
 
-Editors complete keys with it: ``python -m pendmap.model.schema > model.schema.json`` writes it, and
-a file names it in its first line, ``#:schema ./model.schema.json``.
+Editors use it to complete keys: ``python -m pendmap.model.schema > model.schema.json`` writes it,
+and a model file names it in its first line, ``#:schema ./model.schema.json``.
 """
 
 from __future__ import annotations

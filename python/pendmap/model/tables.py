@@ -1,4 +1,4 @@
-"""The tables of model files: what they may hold, as the arguments of a model."""
+"""Tables of model files: their keys, and their conversion to the arguments of a model."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def read_model(
     bare: Callable[..., _Model] | None = None,
     si: Callable[..., _Model] | None = None,
 ) -> _Model:
-    """Return the model that ``bare`` or ``si`` makes of a file; without its maker refuse it."""
+    """Return the model of a file, made by ``bare`` or ``si``; refuse it if its maker is None."""
     content = read_toml(path)
     typed = dict(typed or {})
     with in_file(path):
@@ -77,7 +77,7 @@ def _check_top(content: dict[str, Any]) -> None:
 
 
 def check_notes(notes: object) -> None:
-    """Refuse notes that no model file can hold."""
+    """Raise InputError for notes that a model file cannot hold."""
     if not isinstance(notes, Mapping):
         raise InputError(f"notes must be a mapping, got {short_repr(notes)}")
     for name, table in notes.items():
@@ -105,7 +105,7 @@ def _is_si(table: dict[str, Any]) -> bool:
 
 
 def _instead(key: str) -> str:
-    """Return the end of the message that a key is not known: what may stand in its place."""
+    """Return the end of the message about an unknown key: the keys allowed in its place."""
     stem = key.rsplit("_", 1)[0]
     for known in SI_KEYS:
         if known != "p" and (known.rsplit("_", 1)[0] in (key, stem) or known == stem):
@@ -118,14 +118,14 @@ def _instead(key: str) -> str:
 
 
 def _own_name(name: str) -> str:
-    """Return the name in a :class:`Rig` of a quantity that is typed."""
+    """Return the name in a :class:`Rig` of a typed quantity."""
     if name in COUNTERPARTS:
         return COUNTERPARTS[name][0]
     return next((own for own, ways in quantities.GROUPS.items() if name in ways), name)
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:
-    """Return the quantities of a table in SI with those typed in their places."""
+    """Return the quantities of a table in SI, replaced by typed ones."""
     units = Units(quantities.natural_frequency(table), si=True)
     numbers = dict(table)
     for name, value in typed.items():

@@ -1,4 +1,4 @@
-"""The term of a formula from a Python function, called once with names in place of numbers."""
+"""Tracing of a Python function to the term of a formula, by one call with symbols."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
 _SUM, _PRODUCT, _POWER, _WHOLE = range(4)
-"""Precedence of operators; operands of lower precedence stand in brackets."""
+"""Precedence of operators; operands of lower precedence are put in brackets."""
 
 _USABLE: Final = (
     "arithmetic and numpy's sqrt, exp, log, sin, cos, tan, tanh, abs, sign, square, minimum, "
@@ -23,7 +23,7 @@ _USABLE: Final = (
 
 
 class _Text(np.lib.mixins.NDArrayOperatorsMixin):
-    """The text of a term, with the precedence of its last operator."""
+    """Symbolic operand: the text of a term, and the precedence of its last operator."""
 
     def __init__(self, text: str, strength: int = _WHOLE) -> None:
         self.text = text
@@ -34,7 +34,7 @@ class _Text(np.lib.mixins.NDArrayOperatorsMixin):
         return self.text if self.strength >= strength else f"({self.text})"
 
     def after(self, strength: int) -> str:
-        """Return the text for a place behind an operator or a sign."""
+        """Return the text as the operand after an operator or a sign."""
         return f"({self.text})" if self.text.startswith("-") else self.at_least(strength)
 
     def __array_ufunc__(
@@ -71,7 +71,7 @@ class _Text(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 def _joined(sign: str, strength: int, *, left: int = 0, right: int = 0) -> Callable[..., _Text]:
-    """Write an operator; ``left`` and ``right`` are added to the precedence of its operands."""
+    """Return a writer of an operator; ``left`` and ``right`` raise the precedence of operands."""
 
     def write(a: _Text, b: _Text) -> _Text:
         return _Text(f"{a.at_least(strength + left)}{sign}{b.after(strength + right)}", strength)
@@ -80,7 +80,7 @@ def _joined(sign: str, strength: int, *, left: int = 0, right: int = 0) -> Calla
 
 
 def _called(name: str) -> Callable[..., _Text]:
-    """Write a function."""
+    """Return a writer of calls of a function."""
     return lambda *parts: _Text(f"{name}({', '.join(part.text for part in parts)})")
 
 
@@ -106,11 +106,11 @@ _WRITTEN: Final[dict[str, Callable[..., _Text]]] = {
 
 
 class _UnreadableError(Exception):
-    """An operation, named by its text, that no formula has."""
+    """An operation that formulas do not have; the message names it."""
 
 
 def term_of(function: Callable[..., Any], parameters: Iterable[str], name: str) -> str:
-    """Return the term that a function computes, as :meth:`pendmap.Formula.of` takes both."""
+    """Return the term that a function computes; arguments as in :meth:`pendmap.Formula.of`."""
     known = {parameter: _Text(parameter) for parameter in parameters}
     variables = [_Text(variable) for variable in ("theta", "v", "t", "phase")]
     try:

@@ -51,7 +51,7 @@ _COLUMNS: Final = 120  # Number of frequencies of figure 1
 
 
 def wanted(name: str) -> list[str]:
-    """Return the keys of :data:`FIGURES` that a user means by ``4``, ``figure 4``, ``all``, ..."""
+    """Return the keys of :data:`FIGURES` for a name like ``4``, ``figure 4`` or ``all``."""
     text = re.sub(r"[\s_.-]+", "", name.lower())
     text = re.sub(r"^(figure|fig)(?=\d)", "", text)
     if text == "all":
@@ -143,13 +143,13 @@ def _critical() -> xr.Dataset:
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:
-    """Return the paper's own table 1, head and rows."""
+    """Return table 1 as printed in the paper, header and rows."""
     rows = [[name, *(f"{x:g} %" for x in row)] for name, row in PRINTED.items()]
     return ["the paper's own", *_PRINTED_HEAD], rows
 
 
 def write_table(found: IdentificationReport, path: str | os.PathLike[str]) -> Path:
-    """Write table 1 as CSV, in percent; an empty cell is a simulation that rests by then."""
+    """Write table 1 as CSV, in percent; a cell is empty if the simulation is at rest by then."""
     names = [name for name, each in found.methods.items() if each.applicable]
     with (
         whole_file(path, [".csv"]) as part,

@@ -1,4 +1,4 @@
-"""The forced motions of the paper's figures 8 and 9: a virtual rig beside the identified model."""
+"""Forced motions of the paper's figures 8 and 9: virtual rig against identified model."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ TUMBLING: Final = ((0.6, 2.0, 2.0, 6.0), (0.4, 2.0, 2.0, 6.0))
 """``p``, ``Omega / 6.2 rad/s``, angle (rad) and velocity (rad/s) of the start."""
 SECONDS = 2500.0  # Time after which the paper takes its steady states, s
 TUMBLED = 300.0
-"""Length of a run that tumbles, s: all but a fiftieth of the ensembles beside it settle in it."""
+"""Duration of a tumbling run, s, in which 98 % of the ensemble members settle."""
 _W0: Final = 6.2  # Natural frequency of the paper's rig, rad/s
 _CELLS: Final = 100  # Cells a side of the basin map in which starts are chosen
 _FASTEST: Final = 18.0  # Largest velocity of that map, rad/s
 _RATE: Final = 50.0  # Samples a second of the long runs
-_MEMBERS: Final = 40  # Starts of the ensemble beside a run of 2500 s
+_MEMBERS: Final = 40  # Number of ensemble members of a run of 2500 s
 
 
 def steady_states(model: Rig, seed: int = 0) -> list[ForcedComparison]:
@@ -60,7 +60,7 @@ def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
     found = basins(model, grid, check=False)
     own = (found["kind"] == kind) & (found["n"] == n) & (found["w"] == w)
     here = np.isin(found["label"].values, found["id"].values[own.values])
-    # The angle goes round: three times side by side, and the middle one counts.
+    # The angle is periodic: the map is tiled three times and the middle copy is used.
     deep = distance_transform_edt(np.tile(here, 3))[:, _CELLS : 2 * _CELLS]
     row, column = np.unravel_index(int(np.argmax(deep)), deep.shape)
     return float(found["theta"].values[column]), float(found["velocity"].values[row])

@@ -1,4 +1,4 @@
-"""The pendulum with its moving pivot, as a chart (figure 3)."""
+"""Chart of the pendulum with its moving pivot (figure 3)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
 
 TITLE: Final = "The parametric pendulum"
-SIZE: Final = (6.0, 5.6)  # Inches
-HEAD: Final = 0.95  # Inches of title, subtitle and margins
+SIZE: Final = (6.0, 5.6)  # Width and height, inches
+HEAD: Final = 0.95  # Height of title, subtitle and margins, inches
 THETA: Final = math.radians(38.0)  # Angle of the pendulum
 LENGTH: Final = 3.0
 BOB: Final = 0.3
 ASIDE: Final = 0.5
-"""Lengths in units of the drawing, of which one is an inch: rod, radius of the bob, distance of
-what stands beside the rod."""
+"""Lengths in units of the drawing, one inch each: rod, radius of the bob, distance of annotations
+from the rod."""
 
 _DRIVE: Final = "cos(\u03a9t + \u03c6)"
 _STEEL, _DARK, _RAIL, _HELP = "#3d4f66", "#1d3557", "#b8c2cf", "#8a8a8a"
@@ -36,7 +36,7 @@ _RIGHT, _LEFT = ("right", "center"), ("left", "center")
 def chart(size: Ends | None = None, title: str | None = None) -> Chart:
     """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction.
 
-    The pivot's acceleration upward, p g cos(Omega t + phi), adds to gravity; so its place is
+    The pivot's acceleration upward, p g cos(Omega t + phi), adds to gravity; so its position is
     ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
     """
     width, height = size or SIZE
@@ -53,7 +53,7 @@ def chart(size: Ends | None = None, title: str | None = None) -> Chart:
 
 
 def _guide(font: float) -> list[Mark]:
-    """Return the slider on its rail, and how it moves."""
+    """Return the slider on its rail, and the arrow of its motion."""
     slider = np.array([(-0.3, -0.24), (0.3, -0.24), (0.3, 0.24), (-0.3, 0.24), (-0.3, -0.24)])
     rail = np.array([(-0.42, -0.8), (-0.32, -0.8), (-0.32, 0.8), (-0.42, 0.8)])
     rungs = [_line((-0.42, y), (-0.54, y + 0.12), _HELP, 0.7) for y in -0.8 + 0.18 * np.arange(9)]
@@ -72,12 +72,12 @@ def _guide(font: float) -> list[Mark]:
 
 
 def _rod(font: float) -> list[Mark]:
-    """Return rod and bob, the place where they hang at rest, the angle, the length."""
+    """Return rod, bob, rest position, angle and length."""
     x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
     side, half, radius = (math.cos(THETA), math.sin(THETA)), THETA / 2, 1.55
     across, along = 0.055 * side[0], 0.055 * side[1]
     rod = [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)]
-    # The length stands beside the rod, on the other side of the angle, from pivot to bob.
+    # The length is drawn beside the rod, opposite to the angle, from pivot to bob.
     move = (ASIDE * side[0], ASIDE * side[1])
     marks: list[Mark] = [
         _line((0.0, -0.3), (0.0, -LENGTH - 0.3), _HELP, 0.9, dash=_DASHED),
@@ -123,7 +123,7 @@ def _forces(font: float) -> list[Mark]:
         Text(
             start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0", **above
         ),
-        # A torque on the axle, against the turning.
+        # Torque about the axle, opposite to the rotation.
         *_turn(0.98, math.radians(52), math.radians(-14), _FORCE, 1.6),
         Text(1.14, 0.42, torque, size=0.82 * font, **pull),
     ]

@@ -1,4 +1,4 @@
-"""Trajectories that tumble, a column each, as a chart (figure 2)."""
+"""Chart of tumbling trajectories, one a column (figure 2)."""
 
 from __future__ import annotations
 

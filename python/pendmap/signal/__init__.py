@@ -1,4 +1,4 @@
-"""Tools on sampled signals that know no pendulum."""
+"""Tools for sampled signals, independent of any model of the pendulum."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,4 +6,4 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
-Stretch = tuple[int, int]  # first place and the one after the last
+Stretch = tuple[int, int]  # first index and the one after the last

@@ -1,6 +1,6 @@
-"""Half cycles of a record, without errors, for checks.
+"""Half cycles of a record, without standard errors, for checks.
 
-The methods of identification have other peaks and crossings, with standard errors.
+The identification methods compute other peaks and crossings, with standard errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-DEAD_BAND: Final = 0.05  # Median size within which a crossing of the middle is noise
+DEAD_BAND: Final = 0.05  # Half width of the dead band about 0, in median absolute angles
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,21 +28,21 @@ class Swings:
 
     @property
     def middle(self) -> Floats:
-        """Middles of the swing at the peaks but the first and last, rad, shape (M - 2,).
+        """Midpoint of the oscillation at each peak but the first and last, rad, shape (M - 2,).
 
-        Weights (1, 2, 1) cancel the bias that the decay gives to a mean of two turns.
+        Weights (1, 2, 1) cancel the bias of the mean of two turning points due to decay.
         """
         return (self.peak[:-2] + 2 * self.peak[1:-1] + self.peak[2:]) / 4
 
     @property
     def period(self) -> Floats:
-        """Whole periods around the peaks but the first and last, s, shape (M - 2,)."""
+        """Period about each peak but the first and last, s, shape (M - 2,)."""
         halves = np.diff(self.crossing)
         return np.asarray((halves[:-2] + 2 * halves[1:-1] + halves[2:]) / 2)
 
 
 def after_turns(theta: Floats) -> int:
-    """Return where a record about 0 begins to swing, after turns over the top."""
+    """Return the index at which a record about 0 begins to oscillate, after rotations."""
     if not theta.size or abs(float(theta[0])) <= math.pi:
         return 0
     passed = np.flatnonzero(theta * theta[0] <= 0)
@@ -52,7 +52,7 @@ def after_turns(theta: Floats) -> int:
 def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
     """Return the half cycles of a record about 0 that exceed ``least``."""
     none = np.empty(0)
-    # The sign last seen outside a dead band.
+    # Sign of the angle outside the dead band, 0 inside.
     band = max(least, DEAD_BAND * float(np.quantile(np.abs(theta), 0.5)) if theta.size else 0.0)
     state = np.where(theta > band, 1, np.where(theta < -band, -1, 0))
     seen = np.flatnonzero(state)
@@ -61,7 +61,7 @@ def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
     signs = state[seen]
     turns = np.flatnonzero(signs[1:] != signs[:-1])
     before, after = seen[turns], seen[turns + 1]
-    # Straight lines through the samples around the band.
+    # Crossings by linear interpolation between the samples on both sides of the band.
     rise = theta[after] - theta[before]
     share = -theta[before] / np.where(rise == 0, 1.0, rise)
     crossing = time[before] + share * (time[after] - time[before])

@@ -1,4 +1,4 @@
-"""Polynomials through neighbouring samples of any smooth motion.
+"""Local polynomials fitted to neighbouring samples of a smooth motion.
 
 A quartic through nine well-sampled readings follows any motion: its residual in the middle is
 noise, from which outliers, missed counts and the noise of a record are found.
@@ -17,26 +17,26 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Mask
 
 
-POINTS: Final = 9  # Samples of a window
-_EVEN: Final = 1e-3  # Relative error of an even interval
-_BLOCK: Final = 20_000  # Uneven windows that are solved at a time
+POINTS: Final = 9  # Number of samples in a window
+_EVEN: Final = 1e-3  # Offset from even spacing, in intervals, above which a window is uneven
+_BLOCK: Final = 20_000  # Number of uneven windows solved at a time
 _NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
-_OUTLIER: Final = 4.5  # Standard deviations from which a residual is left out
-_ROUNDS: Final = 4  # Repetitions of a fit without outliers at most
+_OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
+_ROUNDS: Final = 4  # Largest number of repetitions of a fit without outliers
 _EVEN_WINDOW: Final = 1e-3
-_WINDOW_BLOCK: Final = 4096  # Windows of uneven samples that are solved at a time
+_WINDOW_BLOCK: Final = 4096  # Number of windows of uneven samples solved at a time
 
 
 @dataclasses.dataclass(frozen=True)
 class LocalFit:
     """Residuals and slopes of polynomials through neighbouring samples."""
 
-    middle: Indices  # samples of the residuals, shape (M,)
-    residual: Floats  # reading less polynomial over the noise gain, shape (M,)
-    slope: Floats  # in the middle, shape (M,)
+    middle: Indices  # index of the middle sample of each window, shape (M,)
+    residual: Floats  # (reading - polynomial) / noise gain, shape (M,)
+    slope: Floats  # derivative in the middle, shape (M,)
     neighbours: int  # samples to each side of a window
-    sum_of_squares: float  # M residuals are worth M over this many independent ones
-    shares: Floats  # of the samples in the variance of a residual, shape (points,); sum 1
+    sum_of_squares: float  # M residuals are equivalent to M over this number of independent ones
+    shares: Floats  # share of each sample in the variance of a residual, shape (points,); sum 1
 
     @property
     def rms(self) -> float:
@@ -49,7 +49,7 @@ class LocalFit:
         return self.rms * math.sqrt(self.sum_of_squares / (2 * self.middle.size))
 
     def only(self, which: Mask) -> LocalFit:
-        """Return the fit with some of its residuals."""
+        """Return the fit restricted to the residuals that a mask selects."""
         return dataclasses.replace(
             self, middle=self.middle[which], residual=self.residual[which], slope=self.slope[which]
         )
@@ -80,7 +80,7 @@ def local_fit(
     worst = np.zeros(count)
     here = theta[middle]
     for k, offset in enumerate(offsets):
-        part = theta[middle + offset] - here  # differences: many turns cost no digits
+        part = theta[middle + offset] - here  # differences keep the digits of angles of many turns
         residual += weights[k] * part
         slope += slopes[k] * part
         lag = time[middle + offset] - time[middle]
@@ -88,7 +88,7 @@ def local_fit(
     residual /= gain
     slope /= interval
     uneven = np.flatnonzero(worst > _EVEN)
-    # A polynomial across a gap of many intervals shows no noise.
+    # The residual of a polynomial across a gap of many intervals is not noise.
     across = worst > half
     for start in range(0, uneven.size, _BLOCK):
         block = uneven[start : start + _BLOCK]
@@ -134,8 +134,8 @@ def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
 class WindowFit:
     """A polynomial ``sum_j c_j ((t - centre) / half)**j`` fitted to samples of unit weight."""
 
-    centre: float  # of the window, s
-    half: float  # width of the window, s
+    centre: float  # middle of the window, s
+    half: float  # half width of the window, s
     coefficients: Floats  # rad, shape (degree + 1,)
     covariance: Floats  # of the coefficients for noise of unit variance
     points: int  # samples used
@@ -205,8 +205,8 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
 ) -> WindowFit | None:
     """Fit a polynomial of these powers to the samples within ``half`` of ``centre``, s.
 
-    Samples 4.5 times ``sigma`` off are left out and the fit is repeated; 0 keeps all. Samples
-    before ``begin`` are not used. Returns None where there are no more samples than powers.
+    Samples with residuals of 4.5 ``sigma`` or more are left out and the fit is repeated; 0 keeps
+    all. Samples before ``begin`` are not used. Returns None without more samples than powers.
     """
     first, last = np.searchsorted(time, (max(centre - half, begin), centre + half * (1 + 1e-9)))
     s, x = (time[first:last] - centre) / half, theta[first:last]
@@ -269,9 +269,9 @@ def smoothed_velocity(
 
 
 def _evenly(time: Floats, step: float, reach: int) -> Mask:
-    """Return around which samples a window of ``reach`` to each side is evenly spaced."""
+    """Return whether the window of ``reach`` samples to each side is even, for each sample."""
     even = np.zeros(time.size, bool)
-    # All intervals of a window together may be off by as much as one.
+    # The limit holds for each interval of a window and, times the root of their number, the sum.
     off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN_WINDOW)))
     drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
     even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
@@ -284,7 +284,7 @@ def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
     time: Floats, theta: Floats, at: Indices, width: int, scale: float, degree: int
 ) -> tuple[Floats, Floats]:
     """Return slopes and their errors at some samples, each from an uneven window."""
-    # The first and the last whole window serve the ends.
+    # Samples near an end use the first or the last whole window.
     first = np.clip(at - width // 2, 0, time.size - width)
     within = first[:, None] + np.arange(width)
     s, x = (time[within] - time[at, None]) / scale, theta[within]

@@ -1,4 +1,4 @@
-"""Robust scales, stretches of arrays, and the intervals of a clock."""
+"""Robust estimates of scale, runs in arrays, and sampling intervals of a record."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
 
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
-LONG_INTERVAL: Final = 1.6  # Ticks of an interval from which samples are missing
-SCATTERED_STAMPS: Final = 0.1  # Robust scatter of intervals, in ticks, that hides a gap
+LONG_INTERVAL: Final = 1.6  # Interval, in median intervals, above which samples are missing
+SCATTERED_STAMPS: Final = 0.1  # Scatter, in median intervals, above which stamps are averaged
 STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared
-CERTAIN_GAP: Final = 4.0  # Standard deviations of a step of these means that is a gap
+CERTAIN_GAP: Final = 4.0  # Step of these means above which it is a gap, standard deviations
 
 
 def normal_scale(values: Floats) -> float:
-    """Return the standard deviation of normal values from the median of their sizes."""
+    """Return the standard deviation of normal values from their median absolute value."""
     return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
 
 
 def broad_scale(sizes: Floats) -> float:
-    """Return a robust standard deviation from sizes with long tails.
+    """Return a robust standard deviation from absolute values with long tails.
 
-    It is the larger of those from the median and the 80 % quantile.
+    It is the larger of the estimates from the median and from the 80 % quantile.
     """
     if not sizes.size:
         return 0.0
@@ -36,32 +36,32 @@ def broad_scale(sizes: Floats) -> float:
 
 
 def true_runs(mask: Mask) -> tuple[Indices, Indices]:
-    """Return where stretches of True begin and end (exclusive)."""
+    """Return the first and last (exclusive) indices of the runs of True."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
 
 
 def stretches(mask: Mask) -> list[Stretch]:
-    """Return the stretches of True."""
+    """Return the runs of True as pairs of first and last (exclusive) index."""
     low, high = true_runs(mask)
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
 def between(stretches: list[Stretch], low: int, high: int) -> list[Stretch]:
-    """Return what stretches in order leave of the samples from ``low`` to ``high``."""
+    """Return the index ranges from ``low`` to ``high`` between sorted stretches."""
     edges = [low, *(place for stretch in stretches for place in stretch), high]
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def equal_runs(values: Floats, least: int) -> tuple[Indices, Indices]:
-    """Return where stretches of at least ``least`` equal values begin and end (exclusive)."""
+    """Return first and last (exclusive) indices of runs of at least ``least`` equal values."""
     low, high = true_runs(np.diff(values) == 0)
     long = high - low + 1 >= least
     return low[long], high[long] + 1
 
 
 def from_first(time: ArrayLike) -> tuple[Floats, float]:
-    """Return times relative to the first one, and the first one, s: stamps cost digits."""
+    """Return times relative to the first, which keeps their digits, and the first time, s."""
     t = np.ascontiguousarray(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t[0]):
         return t, 0.0
@@ -69,13 +69,13 @@ def from_first(time: ArrayLike) -> tuple[Floats, float]:
 
 
 def span(time: Floats) -> str:
-    """Return the time span of a record in words."""
+    """Return the time span of a record as text."""
     first, last = (f"{round(float(t), 4):.15g}" for t in (time[0], time[-1]))
     return f"{first} to {last} s"
 
 
 def even_times(time: Floats) -> tuple[float, Floats]:
-    """Return the median interval of a record, s, and even times over it; none for a long gap."""
+    """Return the median interval of a record, s, and even times over it; none if gaps are long."""
     interval = float(np.median(np.diff(time)))
     count = math.floor((time[-1] - time[0]) / interval) + 1
     return interval, time[0] + interval * np.arange(count if count <= 10 * time.size else 0)
@@ -83,17 +83,17 @@ def even_times(time: Floats) -> tuple[float, Floats]:
 
 @dataclasses.dataclass(frozen=True)
 class Intervals:
-    """Tick and gaps of a clock."""
+    """Sampling interval and gaps of a record."""
 
     tick: float  # mean interval without gaps, s
-    gaps: Indices  # intervals that are too long
+    gaps: Indices  # indices of intervals that are too long
     missing: int  # samples missing in the gaps
 
 
 def intervals_of(time: Floats) -> Intervals:
-    """Return the tick of a clock and its gaps, from increasing times in s.
+    """Return the sampling interval and the gaps of a record with increasing times in s.
 
-    Where stamps scatter, an interval is a gap only if the stamps after it are late together.
+    If the stamps scatter, an interval is a gap only if the stamps after it are late on average.
     """
     steps = np.diff(time)
     usual = float(np.median(steps))
@@ -107,7 +107,7 @@ def intervals_of(time: Floats) -> Intervals:
             _ahead(time) - STAMPS_BESIDE * tick
         )
         gaps = gaps[late[gaps] > max(0.5 * tick, CERTAIN_GAP * normal_scale(late))]
-        # The means beside a gap contain a part of it.
+        # Means near a gap contain a part of it: only the largest one marks the gap.
         highest = [np.max(late[gaps[np.abs(gaps - k) < STAMPS_BESIDE]]) for k in gaps]
         gaps = np.asarray(gaps[late[gaps] >= highest], np.intp)
         usual = tick

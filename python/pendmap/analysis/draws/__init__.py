@@ -1,7 +1,7 @@
-"""Models drawn from what a fit knows of its parameters, and results over all draws.
+"""Models drawn from the covariance of fitted parameters, and results over all draws.
 
-``sample`` draws the models, ``match`` finds an attractor or orbit again in each of them; the other
-modules, one for each analysis, gather what its results say over all draws.
+``sample`` draws the models, ``match`` identifies attractors and orbits between models; the other
+modules, one for each analysis, compute statistics of its results over the draws.
 """
 
 from pendmap.analysis.draws.sample import Draws, drawn, part

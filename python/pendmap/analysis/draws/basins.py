@@ -1,16 +1,16 @@
-"""Basins over draws: the probability of each end of a start, and the sources of its doubt.
+"""Basins over draws: probability of each outcome of a start, and sources of its uncertainty.
 
 In a box of 5 x 5 cells let ``p_d(a)`` be the share of the cells that end on attractor ``a`` in draw
 ``d``, and ``H(p) = -sum p ln p``. Then
 
 ``H(mean_d p_d) = mean_d H(p_d) + I``
 
-The first part is doubt that remains when the parameters are known: it is the basin entropy of a
-single map, and comes from where in the box a start lies. The second, ``I >= 0``, is the mutual
-information between the end of a start in the box and the draw: doubt that better known parameters
-would remove. Where a smooth boundary moves by more than a box, ``I`` leads; where the boundary is
-fractal each draw mixes the labels anew in the same shares, and ``I`` is small. With 25 cells a box
-shares scatter by chance: ``I`` of ``K`` labels drawn at random is about ``(K - 1) / 50``, not 0.
+The first term is the uncertainty that remains when the parameters are known: the basin entropy of
+single maps, due to the position of the start in the box. The second, ``I >= 0``, is the mutual
+information between the outcome of a start in the box and the draw: uncertainty that better known
+parameters would remove. If a smooth boundary moves by more than a box, ``I`` dominates; if the
+boundary is fractal, each draw mixes the labels in the same shares, and ``I`` is small. With 25
+cells a box, shares scatter by chance: ``I`` of ``K`` random labels is about ``(K - 1) / 50``.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-SURE: Final = 0.95  # Probability of an end from which a cell counts as sure
+SURE: Final = 0.95  # Probability of an outcome from which a cell is sure
 
 _SHARES: Final = ("outcome", "share_mean", "share_low", "share_high", "exists")
 """Variables over the outcomes."""
-_UNKNOWN: Final = ("undecided", "failed")  # The ends of labels 0 and -1
+_UNKNOWN: Final = ("undecided", "failed")  # Outcomes of the labels 0 and -1
 
 
 def basins_over(
     dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return a basin map of M x N cells with those of D draws.
+    """Return a basin map of M x N cells with statistics of the maps of D draws.
 
-    Adds, over ``outcome``, all ends of starts by name: ``probability`` (outcome, M, N),
+    Adds, over ``outcome``, all outcomes of starts by name: ``probability`` (outcome, M, N),
     ``drawn_share`` (outcome, D), ``exists`` (the share of the draws that have it), ``share_mean``,
     ``share_low``, ``share_high`` (the 95 % interval over the draws); over the cells ``certainty``,
-    the probability of the most likely end, and ``label_entropy``, in nat; over boxes
+    the probability of the most likely outcome, and ``label_entropy``, in nat; over boxes
     ``doubt_start`` and ``doubt_parameters``, in nat, whose means are attributes; ``drawn``
     (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty of 95 % or
     more.
@@ -81,22 +81,22 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
 
 @dataclasses.dataclass
 class _End:
-    """An end of starts with its counts over draws."""
+    """An outcome of starts with its counts over draws."""
 
     points: Floats
-    """Its stroboscopic points, shape (L, 2)."""
+    """Stroboscopic points of the attractor, shape (L, 2)."""
     cells: NDArray[np.uint16]
-    """Number of draws in which each cell ends on it."""
+    """Number of draws in which each cell has this outcome."""
     boxes: Floats
-    """Sum over the draws of its share of each box."""
+    """Sum over the draws of the outcome's share of each box."""
     shares: dict[int, float] = dataclasses.field(default_factory=dict)
-    """Its share of the starts in each draw that has it."""
+    """The outcome's share of the starts, by number of the draw."""
 
 
 def _counted(
     dataset: xr.Dataset, drawn: Iterable[xr.Dataset]
 ) -> tuple[dict[str, _End], Floats, NDArray[np.int64]]:
-    """Return ends by name, sums of the boxes' entropies, and numbers of draws with known ends."""
+    """Return outcomes by name, summed entropies of the boxes, and draws with known outcomes."""
     own = dataset["label"]
     none = _in_boxes(own, own.values > 0).values * 0.0
 

@@ -21,11 +21,11 @@ _KEYS = ("mean_periods", "stderr", "transient_chaos", "persistent")
 def lifetime_over(
     dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return a lifetime with those of D draws, from the same starts.
+    """Return a lifetime with the lifetimes of D draws from the same starts.
 
     Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
     ``drawn_persistent`` (D) and ``drawn`` (D, parameter); attributes ``mean_periods_low`` and
-    ``mean_periods_high``, the 95 % interval over the draws, which holds the error of counting too;
+    ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
     ``transient_share`` and ``persistent_share``.
     """
     rows = [[float(one.attrs[key]) for key in _KEYS] for one in draws.each(run, progress)]

@@ -1,4 +1,4 @@
-"""Attractors and orbits of one model found again in another that is nearly the same."""
+"""Identification of attractors and orbits between two models of similar parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_APART = math.pi  # Distance from an attractor without points, rad
+_APART = math.pi  # Distance assigned to an attractor without points, rad
 
 
 def plain(name: str) -> str:
@@ -39,7 +39,7 @@ def matched(
     others: list[str],
     theirs: list[NDArray[np.float64]],
 ) -> list[int]:
-    """Pair attractors of equal :func:`plain` names by least distance; return places, else -1."""
+    """Match attractors of equal :func:`plain` names by least distance; return indices, else -1."""
     found = [-1] * len(others)
     for name in dict.fromkeys(map(plain, others)):
         mine = [k for k, own in enumerate(names) if plain(own) == name]
@@ -53,7 +53,7 @@ def matched(
 
 
 def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Return the mean distance from points of one to the nearest of another, angles on a circle."""
+    """Return the mean distance from points of ``one`` to the nearest of ``other``, modulo turns."""
     if not (one.size and other.size):
         return _APART
     away = one[:, None] - other[None]

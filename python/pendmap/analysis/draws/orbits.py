@@ -1,4 +1,4 @@
-"""Closed orbits over draws: how far each moves, how often it exists, and how often stable."""
+"""Closed orbits over draws: spread of each, and probability that it exists and is stable."""
 
 from __future__ import annotations
 
@@ -25,16 +25,15 @@ if TYPE_CHECKING:
 def orbits_over(
     dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return K closed orbits with those of D draws.
+    """Return K closed orbits with statistics of the orbits of D draws.
 
-    An orbit is found again by its name, and among those of one name by its points. Its point is
-    the one next to that of the model's own orbit, and so is each of its multipliers. Adds
-    ``drawn_theta``, ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D),
-    nan where a draw has no such orbit; ``theta_spread``, ``velocity_spread`` and
-    ``multipliers_spread``, their standard deviations over the draws; ``exists`` and
-    ``stable_share``, the shares of the draws in which it exists, and exists and is stable;
-    ``drawn`` (D, parameter). Attribute ``drawn_others``: mean number of orbits of a draw that the
-    own model lacks.
+    Orbits are matched by name, and among those of one name by their points. Of each the point and
+    the multipliers nearest to those of the model's orbit are taken. Adds ``drawn_theta``,
+    ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
+    has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
+    standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
+    which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
+    mean number of orbits of a draw that the model itself lacks.
     """
     names, points = names_of(dataset, "orbit"), points_of(dataset, "orbit")
     count, total = len(names), len(draws)

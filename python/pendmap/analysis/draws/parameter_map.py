@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
 
 
-_LISTED = 10  # Regimes that a summary lists
+_LISTED = 10  # Largest number of regimes in a summary
 
 
 def regimes_over(

@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
     Run = Callable[..., xr.Dataset]
-    """Computes the result of a model, reporting to the keyword ``progress``."""
+    """Function that computes the result of a model and reports to the keyword ``progress``."""
 
 
-_TRIES: Final = 1000  # Draws in a row that may all be outside the allowed values
+_TRIES: Final = 1000  # Largest number of successive draws outside the allowed values
 
 _LEVELS: Final = (0.025, 0.975)  # Probabilities at the ends of a 95 % interval
 
 
 @dataclasses.dataclass(frozen=True)
 class Draws:
-    """Models drawn from the uncertainty of one.
+    """Models drawn from the covariance of a fitted model.
 
     Parameters
     ----------
     names : tuple of str
-        The parameters that vary, K.
+        Names of the K parameters that vary.
     values : ndarray of float, shape (N, K)
         Their values, in the model's own units.
     models : tuple of Pendulum or Rig
-        The models, N.
+        The N models.
     seed : int
         Seed with which they were drawn.
     """
@@ -65,12 +65,12 @@ class Draws:
         }
 
     def each(self, run: Run, progress: Progress | None) -> Iterator[xr.Dataset]:
-        """Give the result of each drawn model; progress counts the own model as the first part."""
+        """Yield the result of each drawn model; the model itself is the first part of progress."""
         for k, model in enumerate(self.models):
             yield run(model, progress=part(progress, k + 1, len(self) + 1))
 
     def complete(self, found: xr.Dataset, lines: Iterable[str]) -> None:
-        """Add attributes of the draws, and lines about them, to a result."""
+        """Add the attributes of the draws and their summary lines to a result."""
         names = ", ".join(self.names)
         head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
         found.attrs |= {"draws": len(self), "draws_seed": self.seed}
@@ -81,23 +81,23 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
     """Return models drawn from the Gaussian of a model's ``[covariance]``.
 
     ``x = m + A z``, ``A A^T`` the covariance with the variance between runs, ``m`` the model's own
-    values, ``z`` standard normal. A draw is drawn again where a damping or friction would be below
-    0, the size of an effect of damping would change its sign, or no model has such a value: the
-    Gaussian is cut off there. The first draws of many are those of few.
+    values, ``z`` standard normal. A draw is repeated if a damping or friction is below 0, the size
+    of a damping effect changes sign, or a value is outside a model's range: the Gaussian is
+    truncated there. The first draws do not depend on the number of draws.
 
     Parameters
     ----------
     model : Pendulum or Rig
         With ``notes`` as a model file has them (:func:`pendmap.load_model`).
     count : int
-        How many models, 2 to 10000.
+        Number of models, 2 to 10000.
     seed : int
-        Draws them.
+        Seed of the draws.
 
     Raises
     ------
     InputError
-        If the model has no covariance, one that is none, or hardly any draw is allowed.
+        If the model has no valid covariance, or hardly any draw is allowed.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
 
 def interval(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """Return mean, standard deviation and ends of the 95 % interval of the finite values."""
-    if not values.size:  # numpy has no quantiles of nothing
+    if not values.size:  # numpy has no quantiles of empty arrays
         none = np.full(values.shape[:-1], np.nan)
         return none, none, none, none
     known = np.where(np.isfinite(values), values, np.nan)
@@ -178,5 +178,5 @@ def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
 
 
 def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
-    """Give the values of variables of one dimension, place by place."""
+    """Yield the values of one-dimensional variables, index by index."""
     return zip(*(dataset[name].values for name in names), strict=True)

@@ -1,4 +1,4 @@
-"""Critical curves over draws of the parameters: the band in which each lies."""
+"""Critical curves over draws of the parameters: the 95 % band of each."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _TABLES: Final = (("critical", ""), ("inverted", "inverted_"))
 def tongues_over(
     dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
 ) -> xr.Dataset:
-    """Return K critical amplitudes with the bands in which they lie over D draws.
+    """Return K critical amplitudes with their 95 % bands over D draws.
 
     At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
-    lowest, and each is found again by its number. Adds ``drawn_p`` (K, D), nan where a draw has no
-    such amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the
-    share of the draws that have it; the same of inverted rest with the beginning ``inverted_``;
-    ``drawn`` (D, parameter).
+    lowest, and matched by this number. Adds ``drawn_p`` (K, D), nan where a draw has no such
+    amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the share
+    of the draws that have it; the same for inverted rest with the prefix ``inverted_``; ``drawn``
+    (D, parameter).
     """
     columns: dict[str, list[Floats]] = {table: [] for table, _ in _TABLES}
     for one in draws.each(run, progress):
@@ -78,7 +78,7 @@ def fields(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], float]:
-    """Return critical amplitudes by index of the frequency, multiplier and number."""
+    """Return critical amplitudes by frequency index, multiplier and number."""
     seen: dict[tuple[int, int], int] = {}
     numbered = {}
     names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
