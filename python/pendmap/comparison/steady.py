@@ -68,7 +68,7 @@ class Cycle:
 
     @property
     def at_rest(self) -> bool:
-        """Whether the amplitude is below 0.05 rad without net turns."""
+        """Whether the motion is rest: no net turns and a negligible amplitude."""
         return self.w == 0 and self.amplitude < _AT_REST
 
     @property
