@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 SPEED_REACH: Final = 0.7  # Half-width of the polynomials that give speeds, rad of phase
-FALSE_READING: Final = 8.0  # Distance from the median of five above which it replaces a reading
+FALSE_READING: Final = 8.0  # Standard deviations from a median of five that replaces a reading
 CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` above which it is significant
 LEAST_GROWTH: Final = 0.1  # Least ``(tau v)^2`` at the greatest speed, over ``still^2``
 DITHERED: Final = 0.55  # Noise over count below which slow readings do not show the noise
