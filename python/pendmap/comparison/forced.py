@@ -45,7 +45,7 @@ _AT_ONCE: Final = 4_000_000  # Samples held in memory at once
 _FOLLOWED: Final = 100  # Ensemble members that are integrated to their steady state
 FEWEST: Final = 32  # Fewest samples from which noise and initial state are estimated
 _UNLIKELY: Final = 0.01
-"""Probability below which a statistic is reported: for a true model, in 5 % of runs."""
+"""P-value below which a statistic is reported: for a true model, one of five in 5 % of runs."""
 _STATISTICS: Final = (
     ("wells visited", "", "wells"),
     ("escapes from a well", "", "escapes"),

@@ -68,7 +68,7 @@ def _steady(found: Steady) -> dict[str, Any]:
 
 
 def table(runs: Sequence[ForcedComparison]) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the table of statistics."""
+    """Return header and rows of the table of statistics."""
     rows = []
     for one in runs:
         name = one.run.name + (" (held out)" if one.run.hold_out else "")

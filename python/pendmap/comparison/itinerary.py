@@ -106,7 +106,7 @@ def wells(reading: Floats) -> Whole:
 
 
 def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
-    """Return ``n``, ``w`` and the time since which ``theta(t + n T) = theta(t) + 2 pi w``, (M,).
+    """Return ``n``, ``w`` and the time after which ``theta(t + n T) = theta(t) + 2 pi w``, (M,).
 
     ``n`` is the least for which this holds over the last five periods; 0, with infinite time, if
     there is none. Without a drive, ``n = 1`` and ``w = 0`` from the time when the motion rests.

@@ -116,7 +116,7 @@ class CoarseFinder:
         self.course = outline(t, x, sigma * math.sqrt(points))
 
     def _turns(self, sigma: float | None) -> tuple[SwingFit, bool, bool]:
-        """Return the fit of all turns; whether the first is a release, and whether after a hold."""
+        """Return the fit of all turns, whether the first is the record's start, and if held."""
         course = self.course
         assert course is not None  # noqa: S101 (checked by callers)
         t, x = self.fine

@@ -1,4 +1,4 @@
-"""The angle of a record: read, integrated, or computed from pixels or an acceleration."""
+"""Angle of a record: read, integrated, or computed from pixels or an acceleration."""
 
 from __future__ import annotations
 

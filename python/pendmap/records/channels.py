@@ -139,7 +139,7 @@ def _listed(names: Sequence[str], most: int) -> str:
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
-    """Refuse a table without times or angles, or with one column for two channels."""
+    """Raise InputError for a table without times or angles, or a column with two channels."""
     advice = "experiment.toml names others in [columns]"
     if "time" not in places and not timed:
         raise InputError(

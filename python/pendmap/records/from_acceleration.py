@@ -29,11 +29,9 @@ FEWEST_HALF_SWINGS: Final = 4  # Fewest half swings from which a period is estim
 CERTAIN_DIP: Final = 0.3  # Relative dip that noise cannot cause
 LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
 ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-BLIND_SPOT: Final = 0.05  # Relative distance from the centre of oscillation below which no signal
-WEAK_SPOT: Final = 0.2  # Relative distance from the centre of oscillation below which weak signal
-QUARTER_TURN_PERIOD: Final = (
-    1.18  # Period at an amplitude of a quarter turn over that of small ones
-)
+BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
+WEAK_SPOT: Final = 0.2  # Relative distance to the centre of oscillation that gives a warning
+QUARTER_TURN_PERIOD: Final = 1.18  # Period at an amplitude of a quarter turn, over that at 0
 LEAST_DIP: Final = 0.01  # Least relative dip between two maxima
 DIP_NOISE: Final = 4.0  # Least dip, standard deviations of the noise
 LEAST_HUMP: Final = 0.75  # Least maximum beside a dip, over the greatest reading (sine 1)

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
 SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
-MOST_OUTLIERS: Final = 0.1  # Share of samples above which they are no outliers
+MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
 SIDE: Final = 10  # Samples on each side from which a sample is judged
 MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished from the motion
 WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
 OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
-MOST_JUMPS: Final = 20  # Number of jumps above which they are no missed counts
+MOST_JUMPS: Final = 20  # Most jumps that are corrected
 TURN: Final = 2 * math.pi
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
@@ -330,7 +330,7 @@ def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: 
 
 
 def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
-    """Return the outliers of the first readings; inner ones are replaced by predictions."""
+    """Return the mask of outliers among the first readings, tested from the inside outward."""
     inner = np.arange(END_SAMPLES, lag.size - POINTS)
     tried = {
         degree: normal_scale(theta[inner] - _before(lag, theta, inner, degree))

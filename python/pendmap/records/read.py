@@ -134,7 +134,7 @@ def _tables(folder: Path) -> list[Path]:
 
 
 def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
-    """Read a folder without a description: each of its files is one free run."""
+    """Read a folder without a description, in which each file is one free run."""
     files = _tables(folder)
     runs: list[Run] = []
     text = f"no {NAME}: each file is taken for one free run, in the order of the names"

@@ -51,7 +51,7 @@ _LEVELS: Final = {
 }
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 _HEADS: Final = 30  # Most lines above the numbers of a short file
-LARGEST_READING: Final = 1e18  # Largest reading; larger numbers are missing values
+LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 1970) are missing
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",

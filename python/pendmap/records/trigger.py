@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Stretch
 
 BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels
-DEAD_BAND: Final = (
-    0.2  # Half-width of the hysteresis about the threshold, over the levels' distance
-)
+DEAD_BAND: Final = 0.2  # Half-width of the hysteresis band, over the distance of the levels
 RELEASES_APART: Final = 3.0  # Least time between releases, periods of small swings
 BOUNCE: Final = 0.3  # Drive periods within which a second edge is a bounce
 FEWEST_EDGES: Final = 4  # Fewest edges from which the frequency of a drive is estimated

@@ -89,7 +89,7 @@ OWN: Final = 50  # Fewest amplitudes from which a run's own noise level is estim
 class ResidualNoise:
     """Noise of residuals and the excess above it, in units of the readings' standard errors."""
 
-    level: float  # Spectral density of the noise at the motion's frequencies; 1 if as stated
+    level: float  # Spectral density of noise at the motion's frequencies; 1 for stated white noise
     colour: float  # Correlation from sample to sample, mean over all laws
     excess: float  # Sum of squares of the slow part over the noise's density, less its expectation
     stderr: float  # Standard error of the excess, from the noise and its unknown law
@@ -212,7 +212,7 @@ class Spectra:
     # Share of each bin in the slow part of the velocity, times samples, shape (runs, BINS).
     motion: Floats
     states: Floats  # Number of fitted initial states, shape (runs,)
-    independent: float  # As in ResidualNoise
+    independent: float  # Effective number of readings, as in ResidualNoise
 
     @property
     def mean(self) -> float:

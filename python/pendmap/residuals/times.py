@@ -41,7 +41,7 @@ DRAWS: Final = 32  # Noise samples from which the variance of the products is es
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Linear response of a window's readings to torques, by the formula of the module's head."""
+    """Linear response of a window's readings to torques, by the formula of the module."""
 
     time: Floats  # Laboratory time, s
     cosine: Floats  # Cosine of the angle

@@ -111,7 +111,7 @@ def triplets(peaks: Floats) -> tuple[Floats, Floats]:
 
 
 def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
-    """Return the result of eqs. 2.7 and 2.10 for absolute peaks; ``parity`` of the first number."""
+    """Return the result of eqs. 2.7 and 2.10; ``parity`` is that of the first peak's number."""
     if reading == "odd_triplets":
         deltas, thetas = (each[1 - parity :: 2] for each in triplets(peaks))
         delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
