@@ -1,8 +1,8 @@
-"""A model against records that it was not fitted to: decays, forced runs, forecasts, peaks.
+"""Validation of a model on records it was not fitted to: decays, forced runs, forecasts, peaks.
 
 ``free`` and ``forced`` compare a model file with an experiment. ``data`` divides records into those
-fitted and those held back; ``replay`` runs a fitted model from a state; ``forecast`` has its errors
-against the horizon, and those of periods and peaks.
+fitted and those held out; ``replay`` integrates a fitted model from a state; ``forecast`` computes
+its errors against the horizon, and those of periods and peaks.
 """
 
 from pendmap.comparison.forced import Ensemble, ForcedComparison

@@ -1,4 +1,4 @@
-"""Records divided into those that models are fitted to and those that are held back."""
+"""Division of an experiment's records into those fitted and those held out."""
 
 from __future__ import annotations
 
@@ -22,47 +22,47 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
-"""Parts of a run held back where no whole run is: a fifth, at large and at small swings."""
+"""Fractions of a run held out if no whole run is: a fifth in all, at large and small swings."""
 
-FEWEST_FORCED: Final = 2  # Forced runs of which one is held back whole
+FEWEST_FORCED: Final = 2  # Fewest forced runs for which one whole run is held out
 
-FEWEST_FREE: Final = 3  # Free runs of which one is held back whole
+FEWEST_FREE: Final = 3  # Fewest free runs for which one whole run is held out
 
-FEWEST: Final = 20  # Fewest samples of a stretch held back; two of them determine its initial state
+FEWEST: Final = 20  # Fewest samples of a held-out stretch
 
 LEAST: Final = round(FEWEST / (HELD[0][1] - HELD[0][0])) + 1
-"""Fewest samples of a run of which stretches can be held back."""
+"""Fewest samples of a run from which stretches can be held out."""
 
 KNOWN: Final = 0.1
-"""Relative standard error of the noise above which a record is too short to show it."""
+"""Relative standard error of the noise above which a record is too short to estimate it."""
 
 FINEST: Final = 1e-7
-"""Least noise, rad, finer than any sensor; it covers the error of local polynomials."""
+"""Lower bound on the noise, rad, below that of any sensor; covers errors of local polynomials."""
 
 BLOCKS: Final = 50
-"""Fewest blocks in a swing or turn, so that the spectrum separates noise and motion."""
+"""Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum."""
 
 FEWEST_BLOCKS: Final = 1000
-"""Fewest blocks of a record; with fewer readings the integrator's own steps take the time."""
+"""Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
 
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
 
-NEIGHBOURS: Final = 2  # Blocks on either side through which a parabola is fitted
+NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
 
 @dataclasses.dataclass(frozen=True)
 class DataSplit:
-    """Records to fit and records held back."""
+    """Records to fit and records held out."""
 
     experiment: Experiment
     runs: tuple[Run, ...]  # All runs with samples for fitting
     readings: tuple[Reading, ...]  # Noise of the readings of each run
     fitted: tuple[FitRun, ...]  # Records to fit; dense readings are block means
-    held: tuple[FitRun, ...]  # Records held back
-    fitted_of: tuple[int, ...]  # Place in ``runs`` of each fitted record
-    held_of: tuple[int, ...]  # Place in ``runs`` of each record held back
-    # Whether stretches within fitted runs are held back, which the fitted motion passes through;
-    # else the records held back have their own initial states.
+    held: tuple[FitRun, ...]  # Records held out
+    fitted_of: tuple[int, ...]  # Index in ``runs`` of each fitted record
+    held_of: tuple[int, ...]  # Index in ``runs`` of each held-out record
+    # True if held-out stretches are parts of fitted runs, predicted by the fitted trajectory; False
+    # if held-out records have their own initial states.
     inside: bool
 
     @property
@@ -72,7 +72,7 @@ class DataSplit:
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Share of rounding, ``count^2 / 12``, which is white, in the noise of each fitted run."""
+        """Share of rounding (white, variance ``count^2 / 12``) in each fitted run's noise."""
         readings = (self.readings[k] for k in self.fitted_of)
         pairs = zip(readings, self.fitted, strict=True)
         return tuple(
@@ -82,19 +82,19 @@ class DataSplit:
 
     @property
     def doubt(self) -> float:
-        """Relative standard error of the noise of all fitted runs, weighted by samples."""
+        """Relative standard error of the noise level of all fitted runs, weighted by samples."""
         doubts = np.array([self.readings[k].doubt for k in self.fitted_of])
         sizes = np.array([float(run.time.size) for run in self.fitted])
         return float(np.sqrt(np.sum((sizes * doubts) ** 2)) / np.sum(sizes))
 
 
 def split_records(experiment: Experiment) -> DataSplit:
-    """Divide an experiment into records to fit and records held back; raises InputError.
+    """Divide an experiment into records to fit and records held out; raises InputError.
 
-    Held back are runs marked ``hold_out``; without any, the middle one of at least two forced runs
-    and of at least three free runs. With fewer forced runs, two stretches of each free decay, which
-    the fitted motion passes through; without a free run, stretches of the forced one with initial
-    states of their own, since its windows are too short to pass through.
+    Runs marked ``hold_out`` are held out; without any, the middle one of at least two forced runs
+    and of at least three free runs. With fewer forced runs, two stretches of each free decay are
+    held out, which the fitted trajectory spans; without a free run, stretches of the forced one
+    with their own initial states, since its windows are too short to span them.
     """
     runs = tuple(run for run in experiment.runs if not run.peaks_only)
     if not runs:
@@ -135,9 +135,9 @@ def split_records(experiment: Experiment) -> DataSplit:
 
 
 def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
-    """Return the noise of each run's readings; a run too short to show it has that of the others.
+    """Return the noise of each run's readings.
 
-    All runs are read by one sensor.
+    A run too short to estimate it has the median of the others, since one sensor reads all runs.
     """
 
     def own(run: Run, sigma: float | None = None) -> Reading:
@@ -158,7 +158,7 @@ def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
 
 
 def _middle_runs(every: Sequence[FitRun]) -> list[int]:
-    """Return the runs held back where none is marked; none of too few."""
+    """Return the indices of the runs held out if none is marked; empty with too few runs."""
     forced = [k for k, run in enumerate(every) if run.forced]
     free = [k for k, run in enumerate(every) if not run.forced]
     if len(forced) < FEWEST_FORCED:
@@ -175,7 +175,7 @@ def _hold_stretches(
     readings: tuple[Reading, ...],
     every: Sequence[FitRun],
 ) -> DataSplit:
-    """Hold back two stretches of each free run, or of each run where none is free."""
+    """Hold out two stretches of each free run, or of each run if none is free."""
     inside = not all(run.forced for run in every)
     fitted, held, held_of = [], [], []
     for k, run in enumerate(every):
@@ -183,7 +183,7 @@ def _hold_stretches(
             fitted.append(run)
             continue
         good = run.counted
-        # Parts of the samples that count, not of the time at rest after them.
+        # Fractions of the included samples, not of the time at rest after them.
         samples = np.flatnonzero(good)
         back = np.zeros(good.shape, bool)
         for first, last in held_parts(samples.size):
@@ -213,17 +213,18 @@ def _hold_stretches(
 
 
 def held_parts(samples: int) -> list[tuple[int, int]]:
-    """Return first and one after the last of each stretch of samples that is held back."""
+    """Return start and end (exclusive) of each held-out stretch of samples."""
     return [(int(low * (samples - 1)), int(high * (samples - 1))) for low, high in HELD]
 
 
 def average_blocks(run: FitRun) -> FitRun:
-    """Return a run with dense readings averaged over blocks, else the run itself.
+    """Return a run with dense readings averaged over blocks, or else the run itself.
 
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
     error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
-    through five blocks, is subtracted; the error of order ``T^4/60`` times the fourth derivative,
-    in a block of length ``T``, is ``1e-6`` of a swing. Readings that are intervals have no mean.
+    through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
+    derivative in a block of length ``T``, is ``1e-6`` of a swing. Counts, which give intervals of
+    the angle, are not averaged.
     """
     if run.count is not None:
         return run
@@ -236,7 +237,7 @@ def average_blocks(run: FitRun) -> FitRun:
         return run
     time, theta, weight, variance = found
     good = weight > 0
-    # Blocks that do not count must not bend the parabolas of their neighbours.
+    # Excluded blocks must not bend the parabolas of their neighbours.
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))
     theta = theta - 0.5 * variance * _curvature(time, known)
     sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
@@ -248,7 +249,7 @@ def _block_means(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return mean time, mean reading, weight and variance of the times of each full block.
 
-    A block without a reading that counts has the unweighted means.
+    A block without included readings has the unweighted means.
     """
     count = time.size // size
     t, x, w = (values[: count * size].reshape(count, size) for values in (time, theta, weights))
@@ -261,19 +262,19 @@ def _block_means(
 
 
 def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
-    """Whether blocks are short against the fastest swing or turn of what counts."""
+    """Return whether blocks are short relative to the fastest swing or turn."""
     time, theta = time[weight > 0], theta[weight > 0]
     if time.size < FEWEST_BLOCKS:
         return False
     steps = np.diff(time)
     velocity = np.diff(theta) / steps
-    # The frequency of a swing, or that of a rotation.
+    # Angular frequency of swings, or of rotations.
     rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
     return float(np.median(steps)) * rate < math.tau / BLOCKS
 
 
 def _curvature(time: Floats, theta: Floats) -> Floats:
-    """Return the second derivative of the parabola through each block and its neighbours."""
+    """Return the second derivative of the parabola fitted to each block and its neighbours."""
     span = 2 * NEIGHBOURS + 1
     first = np.clip(np.arange(time.size) - NEIGHBOURS, 0, time.size - span)
     places = first[:, None] + np.arange(span)

@@ -1,4 +1,4 @@
-"""A model beside a forced run: statistics of an ensemble, and the steady state it reaches."""
+"""Comparison of a model with a forced run: ensemble statistics and steady state."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 
 
 _AT_ONCE: Final = 4_000_000  # Samples held in memory at once
-_FOLLOWED: Final = 100  # Members that are followed until they settle
-FEWEST: Final = 32  # Samples without which neither the noise nor a start is known
+_FOLLOWED: Final = 100  # Ensemble members that are integrated to their steady state
+FEWEST: Final = 32  # Fewest samples from which noise and initial state are estimated
 _UNLIKELY: Final = 0.01
-"""Chance below which a statistic is reported: of a true model, one of five in 5 % of runs."""
+"""P-value below which a statistic is reported: for a true model, one of five in 5 % of runs."""
 _STATISTICS: Final = (
     ("wells visited", "", "wells"),
     ("escapes from a well", "", "escapes"),
@@ -54,23 +54,23 @@ _STATISTICS: Final = (
     ("greatest velocity", "rad/s", "fastest"),
 )
 """Name, unit and field of :class:`Itineraries` of each statistic."""
-_EXACTNESS: Final = 1e-9  # Integrator's error allowed a step
-_EVEN: Final = (2.5, 97.5)  # Ends of the middle 95 %, percent
+_EXACTNESS: Final = 1e-9  # Error tolerance of the integrator per step
+_EVEN: Final = (2.5, 97.5)  # Percentiles of the central 95 % interval
 
 
 @dataclasses.dataclass(frozen=True)
 class Ensemble:
-    """Choice of the starts of a model.
+    """Ensemble of initial states from which a model is integrated.
 
     Parameters
     ----------
     members : int
-        How many; 20 to 100,000.
+        Number of initial states; 20 to 100,000.
     spread : float
-        Standard deviation about the measured start, in rad and over the natural frequency; beside
-        the start's own standard error.
+        Standard deviation about the measured initial state, rad for the angle and times the natural
+        frequency for the velocity, in addition to its standard error.
     seed : int
-        Draws starts and noise.
+        Seed of the random initial states.
 
     Raises
     ------
@@ -91,22 +91,22 @@ class Ensemble:
 
 @dataclasses.dataclass(frozen=True)
 class Start:
-    """Initial state of a run, as a model estimates it from the first seconds."""
+    """Initial state of a run, estimated with a model from its first window."""
 
     time: float  # s, on the run's clock
     theta: float  # rad
     velocity: float  # rad/s
-    covariance: Floats  # shape (2, 2), of both
+    covariance: Floats  # of angle and velocity, shape (2, 2)
 
     @property
     def stderr(self) -> tuple[float, float]:
-        """Standard errors, rad and rad/s."""
+        """Standard errors of angle and velocity, rad and rad/s."""
         return tuple(np.sqrt(np.diag(self.covariance)).tolist())
 
     def drawn(self, count: int, spread: float, w0: float, seed: int) -> tuple[Floats, Floats]:
-        """Draw starts about it, the first of them itself, shapes (count,).
+        """Return random initial states about this one, which is the first, shapes (count,).
 
-        They are normal with the covariance of the start plus ``spread^2`` in angle and ``(spread
+        Their distribution is normal, with this covariance plus ``spread^2`` in angle and ``(spread
         w0)^2`` in velocity.
         """
         wide = self.covariance + np.diag([spread**2, (spread * w0) ** 2])
@@ -118,7 +118,7 @@ class Start:
 def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
     """Return the state at the beginning of a run's first window, with its covariance.
 
-    ``fit`` is of this run alone, with its windows' states adapted.
+    ``fit`` is of this run alone, with fitted initial states of its windows.
     """
     first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
     _, (window,) = window_slopes(first, [run], (), fit.model)
@@ -134,8 +134,8 @@ def simulated_readings(
 ) -> Floats:
     """Return readings of a model under the drive or pivot motion of a run, rad, shape (M, N).
 
-    M starts (rad, rad/s) at the first of N times (s, on the run's clock); readings are not wrapped,
-    and NaN after a motion left the range of numbers.
+    ``starts`` are M angles and velocities (rad, rad/s) at the first of N times (s, on the run's
+    clock). Readings are not wrapped, and NaN after an overflow.
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
@@ -154,7 +154,7 @@ def simulated_readings(
 
 @dataclasses.dataclass(frozen=True)
 class Statistic:
-    """A number of the record beside those of the ensemble."""
+    """Statistic of a record and of each member of an ensemble."""
 
     name: str
     unit: str
@@ -168,13 +168,13 @@ class Statistic:
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """Middle 95 % of the ensemble."""
+        """Ends of the central 95 % interval of the ensemble."""
         low, high = np.percentile(self.ensemble, _EVEN, method="inverted_cdf")
         return float(low), float(high)
 
     @property
     def chance(self) -> float:
-        """Chance that the model gives a value as far out, on either side."""
+        """Two-sided p-value of the measured value in the ensemble."""
         below = 1 + int((self.ensemble <= self.measured).sum())
         above = 1 + int((self.ensemble >= self.measured).sum())
         return min(1.0, 2 * min(below, above) / (self.ensemble.size + 1))
@@ -182,37 +182,37 @@ class Statistic:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ForcedComparison:
-    """A model beside one forced run.
+    """Comparison of a model with one forced run.
 
     Parameters
     ----------
     run : Run
         The record.
     sigma : float
-        Its noise, rad.
+        Noise of the record, rad.
     rms : float
-        Of record less model in windows of up to three swings, each from the state that brings the
-        model nearest, rad.
+        Root mean square residual in windows of up to three swings, each with a fitted initial
+        state, rad.
     windows : int
-        How many these are.
+        Number of these windows.
     start : Start
-        Where the run begins.
+        Initial state of the run.
     phase : Estimate or None
-        Phase of a drive that was not known, rad, as it was found.
+        Fitted phase of the drive, rad, if it was not stated.
     time, measured : ndarray, shape (N,)
         The record at equal times, s and rad.
     velocity : ndarray, shape (N,)
-        Its velocity, rad/s.
+        Velocity of the record, rad/s.
     example : (ndarray, ndarray), shape (N,)
         Reading and velocity of the member whose statistics are nearest to the ensemble's medians.
     lost : int
-        Members whose motion left the range of numbers.
+        Number of members whose motion overflowed.
     statistics : tuple of Statistic
         Wells visited, escapes, angle covered, time to settle, greatest velocity.
     steady : Steady or None
-        The steady state, where the record reaches one under a periodic drive.
+        The steady state, if the record reaches one under a periodic drive.
     ensemble : Ensemble
-        How members were chosen.
+        Choice of the members' initial states.
     """
 
     run: Run
@@ -240,7 +240,7 @@ class ForcedComparison:
 
     @property
     def unlike(self) -> tuple[Statistic, ...]:
-        """Statistics that the model gives with a chance of less than 1 %."""
+        """Statistics with a p-value of less than 1 %."""
         return tuple(one for one in self.statistics if one.chance < _UNLIKELY)
 
 
@@ -252,12 +252,12 @@ def compare_forced(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> ForcedComparison:
-    """Compare a model with a forced run; only an unknown phase of the drive is adapted.
+    """Compare a model with a forced run; only an unknown phase of the drive is fitted.
 
-    Where the motion is chaotic, two paths diverge however good the model is: statistics are
-    compared, over a neighbourhood of the measured start. Members are read with the noise of the
-    record and measured like it. Where the record ends on a steady state, members are followed to
-    theirs, and the two cycles are compared at the same phase of the drive.
+    Chaotic trajectories diverge however good the model is, so statistics are compared over a
+    neighbourhood of the measured initial state. The noise of the record is added to the members'
+    readings. If the record ends on a steady state, members are integrated to theirs, and the two
+    cycles are compared at equal phase of the drive.
     """
     worth = reading_of_run(run)
     given = as_fit_run(run, worth)
@@ -312,7 +312,7 @@ def compare_forced(
 
 
 def _evenly(run: Run, worth: Reading, given: FitRun, begin: float) -> tuple[Floats, Floats]:
-    """Return times from the start on, one sample apart, and the record's angle at these."""
+    """Return equally spaced times from the initial state on, and the record's angle at them."""
     tick = intervals_of(run.time).tick
     time = np.arange(begin, given.time[-1] + 0.5 * tick, tick)
     resting = [s for s in run.segments if s.what == "rest"]
@@ -330,8 +330,8 @@ def _members(
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
 ) -> tuple[Itineraries, NDArray[np.bool_]]:
-    """Return the itineraries of the members, and which stayed in the range of numbers."""
-    draw = np.random.default_rng(0)  # of noise, in which nothing is sensitive
+    """Return the itineraries of the members, and which members stayed finite."""
+    draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
     count, many = starts[0].size, max(1, _AT_ONCE // time.size)
     parts, kept = [], np.zeros(count, dtype=bool)
     for first in range(0, count, many):
@@ -346,7 +346,7 @@ def _members(
 
 
 def _example(statistics: tuple[Statistic, ...]) -> int:
-    """Return the place of the member whose ranks are nearest to the middle of all statistics."""
+    """Return the index of the member whose ranks are nearest to the medians of all statistics."""
     ranks = []
     for one in statistics:
         order = np.argsort(np.argsort(one.ensemble, kind="stable"), kind="stable")

@@ -1,4 +1,4 @@
-"""A comparison of a model with a forced run, as JSON and as text."""
+"""JSON and text of a comparison of a model with a forced run."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _steady(found: Steady) -> dict[str, Any]:
 
 
 def table(runs: Sequence[ForcedComparison]) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the table of statistics."""
+    """Return header and rows of the table of statistics."""
     rows = []
     for one in runs:
         name = one.run.name + (" (held out)" if one.run.hold_out else "")
@@ -96,7 +96,7 @@ def written(of: Statistic, value: float, digits: int = 4) -> str:
 
 
 def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
-    """Yield the residual of one run, its steady state, and statistics unlike the model's."""
+    """Yield the lines on a run's residual, steady state and improbable statistics."""
     name = one.run.name
     ratio = one.rms / one.sigma if one.sigma else math.inf
     missing = ": something is missing in the model" if ratio > fits else ""

@@ -1,11 +1,11 @@
 """Errors of a baseline and of a better model: residuals, forecasts, periods and peaks.
 
-Forecasts: from many starts on held-out data a model runs forward without further readings. Its
-state at the start is fitted to the readings of the swing before. The error at a horizon is the root
-mean square of readings less forecast over all starts; with the right model it begins at the noise
-and grows with the error of the initial state.
+Forecasts: a model is integrated from many starts on held-out data, with the initial state fitted to
+the readings of the swing before. The error at a horizon is the root mean square of readings less
+forecast over all starts; with the right model it begins at the noise and grows with the error of
+the initial state.
 
-Periods and peaks: as in the paper's figure 7 a model runs forward from the first measured peak, at
+Periods and peaks: as in the paper's figure 7 a model is integrated from the first measured peak, at
 rest; nothing is fitted. Fitted damping may be negative there.
 """
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 REACH: Final = 2 / 3
-"""Length of a forecast over that of its stretch; it may start anywhere in the rest."""
+"""Length of forecasts over the median stretch; starts are spread over the rest of a stretch."""
 
 STARTS: Final = 12  # Most starts in a stretch, at least half a swing apart
 
@@ -47,15 +47,15 @@ BINS: Final = 40  # Most bins of the horizon, each at least a tenth of a swing
 
 FEWEST: Final = 8  # Fewest readings to which an initial state is fitted
 
-BEGIN: Final = 0.15  # Part of a swing over which a parabola gives the first guess of a state
+BEGIN: Final = 0.15  # Fraction of a swing over which a parabola gives the first guess of a state
 
 BEFORE: Final = "before"
 AFTER: Final = "after"  # Names of the baseline and of the better model
 
 PER_SWING: Final = 200
-"""Instants of a swing between which cubics interpolate a peak, to 1e-7 of the swing."""
+"""Samples of a swing between which cubics interpolate a peak, to 1e-7 of the swing."""
 
-FEWEST_PEAKS: Final = 3  # Peaks of one full cycle
+FEWEST_PEAKS: Final = 3  # Fewest peaks of a compared run: one full cycle
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,19 +65,19 @@ class Forecast:
     kind: str  # Runs: ``free`` or ``forced``; errors of chaotic forced motion grow exponentially
     horizon: Floats  # Middle of each bin of the horizon, s, shape (n,)
     before: Floats  # Root mean square error of the baseline modulo a turn, rad, shape (n,)
-    after: Floats  # That of the model found
+    after: Floats  # Root mean square error of the selected model, rad, shape (n,)
     noise_floor: float  # Root mean square noise of the readings, rad
     starts: int  # Number of forecasts
 
 
 @dataclasses.dataclass(frozen=True)
 class _Stretch:
-    """Consecutive readings held back of a run."""
+    """Stretch of consecutive held-out readings of a run."""
 
     run: FitRun
-    place: int  # Of the record in what is held back
-    held: Mask  # Readings held back
-    good: Mask  # Readings that count, held back or not
+    place: int  # Index of the record among those held out
+    held: Mask  # Held-out readings
+    good: Mask  # Included readings, held out or not
     earliest: float  # First time with a swing of readings before it, s
     latest: float  # Last time, s
 
@@ -88,14 +88,14 @@ class _Launch:
 
     stretch: _Stretch
     behind: Mask  # Readings of the swing before, to which the state is fitted
-    ahead: Mask  # Readings held back up to the horizon
-    bins: NDArray[np.int64]  # Bin of the horizon of each of these
+    ahead: Mask  # Held-out readings up to the horizon
+    bins: NDArray[np.int64]  # Bin of the horizon of each reading ahead
 
 
 def compare_forecasts(
     data: DataSplit, base: Fits, best: Fits, reasons: Reasons
 ) -> tuple[Forecast, ...]:
-    """Return the error of forecasts, of free and of forced runs."""
+    """Return the forecast errors of free and of forced runs."""
     swing = math.tau / base.fitted.model.w0
     every = [s for place in range(len(data.held)) for s in _stretches(data, place, swing)]
     found = []
@@ -107,7 +107,7 @@ def compare_forecasts(
 
 
 def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
-    """Return the stretches of a record held back, as parts of their run."""
+    """Return the held-out stretches of a record, as parts of their run."""
     held, of = data.held[place], data.held_of[place]
     run = data.fitted[data.fitted_of.index(of)] if of in data.fitted_of else held
     back = np.zeros(run.time.shape, bool)
@@ -125,7 +125,7 @@ def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
 def _forecast(
     kind: str, stretches: list[_Stretch], base: Fits, best: Fits, swing: float
 ) -> Forecast | None:
-    """Return the errors of both models over all starts; None without a start."""
+    """Return the errors of both models over all starts; None if there is no start."""
     rooms = [s.latest - s.earliest for s in stretches if s.latest > s.earliest]
     if not rooms:
         return None
@@ -173,7 +173,7 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
     squares, samples = np.zeros(count), np.zeros(count)
     for one, (readings, _) in zip(launches, forecasts, strict=True):
         error = one.stretch.run.theta[one.ahead] - readings[readings.size - one.bins.size :]
-        error = np.angle(np.exp(1j * error))  # turns over the top do not count
+        error = np.angle(np.exp(1j * error))  # modulo a turn
         squares += np.bincount(one.bins, error**2, count)
         samples += np.bincount(one.bins, minlength=count)
     with np.errstate(invalid="ignore"):
@@ -181,7 +181,7 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
 
 
 def _samples(run: FitRun, kept: Mask) -> FitRun:
-    """Return a run with some of its samples."""
+    """Return a run with only the selected samples."""
     sigma, time, theta = run.sigmas[kept], run.time[kept], run.theta[kept]
     return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=None)
 
@@ -209,13 +209,13 @@ class RunGap:
 class Gap:
     """Root mean square residuals, rad."""
 
-    noise_floor: float  # Of the noise alone, without a model, in the fitted runs
-    held_out_noise_floor: float  # The noise of what is held back
-    before: float  # Of the baseline in the fitted runs
-    after: float  # Of the model found in the fitted runs
-    held_out_before: float  # Of the baseline on what is held back, with fitted initial states
-    held_out_after: float  # Of the model found on what is held back
-    by_run: tuple[RunGap, ...]  # Each run, or part of one
+    noise_floor: float  # Noise of the fitted records
+    held_out_noise_floor: float  # Noise of the held-out records
+    before: float  # Residual of the baseline in the fitted records
+    after: float  # Residual of the selected model in the fitted records
+    held_out_before: float  # Residual of the baseline in the held-out records
+    held_out_after: float  # Residual of the selected model in the held-out records
+    by_run: tuple[RunGap, ...]  # Residuals of each record
 
 
 def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
@@ -239,7 +239,7 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
 
 
 def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
-    """Return the root mean square residual of runs, the first of them at a place of a fit."""
+    """Return the root mean square residual of consecutive runs of a fit, from index ``first``."""
     squares, count = 0.0, 0
     for k, run in enumerate(runs, start=first):
         residual = fit.residuals[k]
@@ -251,19 +251,19 @@ def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Cycles:
-    """Periods and peaks of one free run against those of two models."""
+    """Errors of two models in the periods and peaks of one free run."""
 
-    name: str  # Of the run
-    held_out: bool  # Whether the whole run is held back
-    peaks: Peaks  # Measured
-    errors: dict[str, PeakErrors]  # Of the models ``before`` and ``after``, if they can be run
+    name: str  # Name of the run
+    held_out: bool  # True if the whole run is held out
+    peaks: Peaks  # Measured peaks
+    errors: dict[str, PeakErrors]  # By model, ``before`` and ``after``, unless it diverges
 
 
 def compare_cycles(data: DataSplit, base: Fits, best: Fits, reasons: Reasons) -> tuple[Cycles, ...]:
-    """Return the errors of every free run with a full cycle, those held back first."""
+    """Return the errors in each free run with a full cycle, held-out runs first."""
     found = []
     for k, (run, reading) in enumerate(zip(data.runs, data.readings, strict=True)):
-        # An angle made of an acceleration is too rough.
+        # An angle computed from an acceleration is too inaccurate.
         if run.kind != "free" or run.accelerometer is not None:
             continue
         peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
@@ -292,7 +292,7 @@ def _simulated_peaks(
     swing = math.tau / fit.model.w0
     time = first + np.linspace(0.0, until, math.ceil(PER_SWING * until / swing) + 1)
     run = FitRun(time, np.zeros(time.shape), sigma, lab_time_s=lab_time_s)
-    # Errors of the sensor, which depend slowly on the angle, separate angle and reading.
+    # Find the angle with the measured reading: they differ by the sensor's errors.
     start = amplitude
     for _ in range(2):
         ((readings, curve),) = run_forward(Motion.of(fit), [run], [(start, 0.0)])
@@ -301,7 +301,7 @@ def _simulated_peaks(
 
 
 def _turning_points(time: Floats, readings: Floats, curve: Floats) -> tuple[Floats, Floats]:
-    """Return times and readings at the turning points of a curve, with its start and its stop."""
+    """Return times and readings of a curve's first sample, turning points and stop."""
     theta, velocity = curve
     before, after = velocity[1:-1], velocity[2:]
     turns = np.flatnonzero((before * after < 0) | ((before != 0) & (after == 0))) + 1
@@ -313,7 +313,7 @@ def _turning_points(time: Floats, readings: Floats, curve: Floats) -> tuple[Floa
     half = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * v, 0.0)), b))
     with np.errstate(divide="ignore", invalid="ignore"):
         roots = np.stack([v / half, half / a])
-    # The velocity changes its sign once between the ends: one root lies there.
+    # The velocity changes sign once between the samples: one root is inside.
     inside = (roots >= 0) & (roots <= 1)
     x = np.where(inside[0], roots[0], np.where(inside[1], roots[1], 1.0))
     angle = bottom + x * (v + x * (b / 2 + x * a / 3))

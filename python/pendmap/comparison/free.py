@@ -1,4 +1,4 @@
-"""A model against records that it was not fitted to: comparison, JSON and text."""
+"""Comparison of a model with an experiment's runs, with its JSON and text."""
 
 from __future__ import annotations
 
@@ -47,27 +47,26 @@ MODEL = "model"  # Name of the model in table 1
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class RunComparison:
-    """A model beside one free decay.
+    """Comparison of a model with one free decay.
 
     Parameters
     ----------
     run : Run
         The record.
     sigma : float
-        Its noise, rad.
+        Noise of the record, rad.
     start : (float, float)
-        Angle (rad) and velocity (rad/s) at its first free sample, from which the model comes
-        nearest.
+        Fitted angle (rad) and velocity (rad/s) at the first free sample.
     curve : ndarray, shape (2, N)
-        Angle and velocity of the model at each sample.
+        Angle and velocity of the model at each sample, rad and rad/s.
     residual : ndarray, shape (N,)
-        What the sensor read less the model's reading, rad; 0 where a sample does not count.
+        Measured reading less the model's, rad; 0 at excluded samples.
     rms : float
-        Of the residual over the samples that count, rad.
+        Root mean square residual of the included samples, rad.
     peaks : Peaks
-        Of the record.
+        Peaks of the record.
     table : Table1
-        Table 1 and figure 7, with one column; the model starts at the first peak, as measured.
+        Table 1 and figure 7, with one column; the model starts at the first measured peak.
     """
 
     run: Run
@@ -88,26 +87,26 @@ class RunComparison:
 
     @property
     def errors(self) -> PeakErrors | None:
-        """Errors of periods and peaks; none where there are too few."""
+        """Errors of periods and peaks; None if there are too few."""
         return self.table.errors.get(MODEL)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Comparison(Readable):
-    """A model beside an experiment.
+    """Comparison of a model with an experiment.
 
     Parameters
     ----------
     model : Rig
-        With its effects, those on the reading included.
+        The model with its effects, including those on the reading.
     experiment : Experiment
         The records.
     runs : tuple of RunComparison
-        One for each free decay.
+        Comparisons with the free decays.
     forced : tuple of ForcedComparison
-        One for each forced run.
+        Comparisons with the forced runs.
     left_out : tuple of (str, str)
-        Name of each other run, and why it is not compared.
+        Name of each other run, and the reason why it is not compared.
     """
 
     model: Rig
@@ -143,34 +142,33 @@ def compare(
 ) -> Comparison:
     """Compare a model with every run of an experiment.
 
-    No parameter of the model is adapted. The residual of a free decay is least over the angle and
-    velocity of its first free sample, known only to the noise; periods and peaks are those of a
-    motion from the first peak as it was measured.
+    No parameter of the model is fitted. Of a free decay, angle and velocity at the first free
+    sample are fitted, since they are known only to the noise; periods and peaks are those of the
+    motion from the first measured peak.
 
-    A forced run may be chaotic, and two chaotic paths diverge however good the model is. It is
-    compared with an ensemble of simulated records over a neighbourhood of its start, by the wells
-    visited, escapes between them, the angle covered, the time to settle and the greatest velocity;
-    where it ends on a steady state also with the cycle that the model ends on, at the same phase of
-    the drive. Its residual is taken in windows of up to three swings with a state each.
+    A forced run may be chaotic, and chaotic trajectories diverge however good the model is. It is
+    compared with an ensemble of simulated records over a neighbourhood of its initial state, by the
+    wells visited, escapes between them, the angle covered, the time to settle and the greatest
+    velocity; if it ends on a steady state, also with the model's cycle at equal phase of the drive.
+    Its residual is computed in windows of up to three swings, each with a fitted initial state.
 
     Parameters
     ----------
     model : Rig
-        In SI; :func:`pendmap.load_model` reads it.
+        Model in SI units, from :func:`pendmap.load_model`.
     experiment : Experiment
-        As for :func:`pendmap.read_experiment`.
+        Records, from :func:`pendmap.read_experiment`.
     ensemble : Ensemble, optional
-        How many starts a forced run has, and how far apart.
+        Number and spread of the initial states for a forced run.
     threads : int, optional
-        Number of threads; by default one a processor.
+        Number of threads; by default one per processor.
     progress : callable, optional
-        Called now and then with the members done and in all of a forced run.
+        Called repeatedly with the number of members done and in all, for each forced run.
 
     Raises
     ------
     InputError
-        If no run has samples in which something moves, and a drive that is known where it is
-        forced.
+        If no run can be compared: one needs samples with motion, a forced one also a known drive.
     KeyboardInterrupt
         After Ctrl-C.
     """
@@ -199,7 +197,7 @@ def compare(
                     forced.append(
                         compare_forced(model, run, many, threads=threads, progress=progress)
                     )
-            except (FitDiverged, InputError) as error:  # the others are compared all the same
+            except (FitDiverged, InputError) as error:  # the other runs are still compared
                 why = str(error)
         if why:
             out.append((run.name, why))
@@ -210,7 +208,7 @@ def compare(
 
 
 def _why_not(model: Rig, run: Run) -> str:
-    """Return why a run cannot be compared with a model; empty where it can."""
+    """Return why a run cannot be compared with a model; empty if it can."""
     time, swing = run.time[run.trusted], math.tau / model.w0
     seconds = float(np.ptp(time)) if time.size else 0.0
     why = ""
@@ -253,7 +251,7 @@ def _compared(model: Rig, run: Run) -> RunComparison:
 
 
 FITS: Final = 1.1
-"""Rms over noise up to which a model describes a record: the noise is known to a few percent."""
+"""Rms residual over noise up to which a model fits; the noise is known to a few percent."""
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -304,7 +302,7 @@ def _pairs(places: Floats, errors: Floats) -> list[dict[str, float]]:
 
 
 def tables(comparison: Comparison) -> list[tuple[list[str], list[list[str]]]]:
-    """Return heads and rows of the tables of free decays and of forced runs."""
+    """Return headers and rows of the tables of free decays and of forced runs."""
     rows = []
     for one in comparison.runs:
         errors = one.errors
@@ -324,7 +322,7 @@ def tables(comparison: Comparison) -> list[tuple[list[str], list[list[str]]]]:
 
 
 def as_text(comparison: Comparison) -> Iterator[str]:
-    """Yield the lines beside the tables: doubts first, then table 1, the fit, findings."""
+    """Yield the lines printed with the tables: doubts, table 1, quality of fit, findings."""
     runs = [one.run for one in comparison.every]
     yield from doubts_said(comparison.experiment, *runs)
     for one in comparison.runs:

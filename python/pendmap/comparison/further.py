@@ -1,7 +1,7 @@
-"""Parts of a diagnosis that its verdict does not rest on: each may fail by itself.
+"""Optional parts of a diagnosis, on which the verdict does not depend.
 
-A fitted model may diverge where such a part runs it: in another record, from another state, with
-another size of an effect. The part is then left out, and the reason is kept.
+A fitted model may diverge in another record, from another state or with another size of an effect.
+The part that needs this motion is then omitted, and the reason is kept.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-Reasons = dict[str, str]  # Why a part was not computed, by its field in the JSON object
+Reasons = dict[str, str]  # Reason why a part was not computed, by its field in the JSON object
 
 Part = TypeVar("Part")
 
 LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
-"""Errors that a diverging motion raises, directly or through a quotient or matrix of it."""
+"""Errors raised by a diverging motion, directly or in arithmetic and linear algebra with it."""
 
 
 def compute_part(reasons: Reasons, field: str, compute: Callable[[], Part], default: Part) -> Part:
-    """Return a part of a diagnosis; where it fails, the default, with the reason kept."""
+    """Return a part of a diagnosis, or the default if it fails, with the reason in ``reasons``."""
     try:
         return compute()
     except LOST as error:

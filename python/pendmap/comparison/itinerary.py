@@ -1,8 +1,8 @@
-"""Statistics of a pendulum's path among its wells, measured and simulated paths alike.
+"""Statistics of measured and simulated trajectories among the potential wells.
 
-A well is the range of angles around one hanging position, from one top to the next. Chaotic paths
-are not comparable point by point; compared are the number of wells, escapes between them, the range
-of the angle, the greatest speed, and the time to settle.
+A well is the range of angles around one hanging position, from one top to the next. Chaotic
+trajectories cannot be compared point by point; the statistics are the number of wells, escapes
+between them, the range of the angle, the greatest speed, and the time to settle.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ if TYPE_CHECKING:
     Whole = NDArray[np.int64]
 
 
-LONGEST: Final = 8  # Longest cycle that is looked for, forcing periods
+LONGEST: Final = 8  # Longest cycle that is searched for, forcing periods
 
 _MARGIN: Final = 0.1
-"""Angle below both tops from which a path is in a well, rad: noise at the top is no escape."""
+"""Distance from either top at which a new well is entered, rad: noise at a top is no escape."""
 _REPEATED: Final = 0.05
-"""Distance within which readings repeat themselves, rad, if six times the noise is less."""
-_NOISES: Final = 6.0  # Distance within which readings repeat themselves, in noises
-_HELD: Final = 5  # Periods for which a motion must repeat itself to have settled
+"""Least tolerance within which readings repeat themselves, rad."""
+_NOISES: Final = 6.0  # Tolerance within which readings repeat, over the noise of a difference
+_HELD: Final = 5  # Forcing periods for which a motion must repeat itself to be settled
 _SWING: Final = 0.06
-"""Half window of the local polynomials that give velocities, over a small swing."""
-_DEGREE: Final = 3  # Degree of these polynomials
+"""Half-width of the local polynomials that give velocities, over the period of small swings."""
+_DEGREE: Final = 3  # Degree of the local polynomials
 
 
 @dataclasses.dataclass(frozen=True)
 class Ruler:
-    """Units of length and time by which paths are measured."""
+    """Time scales and noise with which trajectories are analysed."""
 
-    tick: float  # between two samples, s
+    tick: float  # sampling interval, s
     swing: float  # period of small swings, s
-    period: float | None  # of the drive, s; None: only rest counts as settled
+    period: float | None  # of the drive, s; None: only rest is a steady state
     sigma: float  # noise of the readings, rad
 
     @property
     def near(self) -> float:
-        """Distance within which a reading repeats itself, rad."""
+        """Tolerance within which a reading repeats itself, rad."""
         return max(_REPEATED, _NOISES * math.sqrt(2) * self.sigma)
 
     def velocity(self, reading: Floats) -> Floats:
-        """Return slopes of local cubics, rad/s, shape (..., N) as the readings."""
+        """Return velocities from local cubics, rad/s, of the shape (..., N) of the readings."""
         half = max(round(_SWING * self.swing / self.tick), 2)
         width = min(2 * half + 1, (reading.shape[-1] - 1) // 2 * 2 + 1)
         if width <= _DEGREE:
@@ -59,19 +59,19 @@ class Ruler:
 
 @dataclasses.dataclass(frozen=True)
 class Itineraries:
-    """Statistics of M paths; arrays have the shape (M,)."""
+    """Statistics of M trajectories; arrays have the shape (M,)."""
 
-    wells: Whole  # different wells visited
-    escapes: Whole  # passages into another well
+    wells: Whole  # number of distinct wells visited
+    escapes: Whole  # number of passages into another well
     covered: Floats  # greatest less least angle, rad
     fastest: Floats  # greatest speed, rad/s
-    settled: Floats  # s, after which it repeats itself; infinite: never
-    n: Whole  # forcing periods of the cycle; 0 where not settled
+    settled: Floats  # time after which the motion repeats itself, s; infinite: never
+    n: Whole  # forcing periods of the cycle; 0 if not settled
     w: Whole  # net turns over the cycle
 
     @classmethod
     def of(cls, reading: Floats, ruler: Ruler) -> Itineraries:
-        """Measure paths, readings in rad, not wrapped, shape (M, N)."""
+        """Return the statistics of unwrapped readings, rad, shape (M, N)."""
         well = wells(reading)
         n, w, settled = repeats(reading, ruler)
         passed = np.abs(np.diff(well, axis=-1)).sum(axis=-1)
@@ -87,15 +87,15 @@ class Itineraries:
 
     @classmethod
     def joined(cls, parts: list[Itineraries]) -> Itineraries:
-        """Return all paths of several measurements as one."""
+        """Return the concatenation of several sets of trajectories."""
         names = [field.name for field in dataclasses.fields(cls)]
         return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
 def wells(reading: Floats) -> Whole:
-    """Return the number of the well at each sample, 0 that of ``theta = 0``, shape (M, N).
+    """Return the index of the well at each sample, 0 at ``theta = 0``, shape (M, N).
 
-    Within 0.1 rad of a top, or beyond, it is still the previous one.
+    Within 0.1 rad of a top the well is still the previous one.
     """
     nearest = np.round(reading / math.tau).astype(np.int64)
     inside = np.abs(reading - math.tau * nearest) < math.pi - _MARGIN
@@ -106,10 +106,10 @@ def wells(reading: Floats) -> Whole:
 
 
 def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
-    """Return ``n``, ``w`` and since when ``theta(t + n T) = theta(t) + 2 pi w``, shapes (M,).
+    """Return ``n``, ``w`` and the time after which ``theta(t + n T) = theta(t) + 2 pi w``, (M,).
 
-    The least ``n`` with which that holds for five periods at the end; 0 and infinity where none
-    does. Without a period: ``n = 1``, ``w = 0`` since when a path stays where it ends.
+    ``n`` is the least for which this holds over the last five periods; 0, with infinite time, if
+    there is none. Without a drive, ``n = 1`` and ``w = 0`` from the time when the motion rests.
     """
     count, size = reading.shape
     n, w = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
@@ -141,7 +141,7 @@ def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
 
 
 def _last(true: NDArray[np.bool_]) -> Whole:
-    """Return the last place that is true in each row, -1 where none is."""
+    """Return the last true index of each row, -1 if there is none."""
     size = true.shape[-1]
     found = size - 1 - np.argmax(true[:, ::-1], axis=-1)
     return np.where(true.any(axis=-1), found, -1).astype(np.int64)

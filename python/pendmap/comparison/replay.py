@@ -1,4 +1,4 @@
-"""A fitted model run forward from given states, without further data."""
+"""Integration of a fitted model from given initial states."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     States = Sequence[tuple[float, float]]
 
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")
-"""Parameters kept beside the model: fitted damping may be negative, which no model allows."""
+"""Parameters kept apart from the model, whose damping cannot be negative as a fitted one can."""
 
-STATE_STEPS: Final = 12  # Most steps of the least-squares search for initial states
+STATE_STEPS: Final = 12  # Most least-squares iterations for initial states
 
 INSTANTS: Final = 150  # Instants of the records at which the torque of an effect is evaluated
 
 STEP: Final = 1e-3
-"""Length of the run from each instant, in small swings: the motion hardly changes in it."""
+"""Integration time from each instant, in periods of small swings, short against the motion."""
 
 EXACT: Final = 1e-9
-"""Standard error of readings, rad, from which the integrator takes its tolerance."""
+"""Nominal standard error of readings, rad, which sets the integrator's tolerance."""
 
 
 class Fits(NamedTuple):
-    """A model fitted to records, and with fixed parameters on the records held back."""
+    """Fit of a model to records, and the model with these parameters on the held-out records."""
 
     fitted: TrajectoryFit
     held: TrajectoryFit
@@ -46,10 +46,10 @@ class Fits(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """The equation of motion of a fitted pendulum."""
+    """Equation of motion of a fitted pendulum."""
 
-    model: Rig  # With its effects
-    own: Mapping[str, float]  # Values that replace the model's own parameters
+    model: Rig  # Model with its effects
+    own: Mapping[str, float]  # Values that replace the model's parameters
 
     @classmethod
     def of(cls, fit: TrajectoryFit) -> Motion:
@@ -70,8 +70,8 @@ def run_forward(
 ) -> list[tuple[Floats, Floats]]:
     """Return readings (n,), rad, and angle and velocity (2, n), rad and rad/s, of each run.
 
-    Runs give times, drives and laboratory time, states the angle and velocity at their first times;
-    raises FitDiverged.
+    ``runs`` give times, drives and laboratory times; ``states`` are angle (rad) and velocity
+    (rad/s) at the first time of each. Raises FitDiverged.
     """
     blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
     fit = _fit_motion(motion, blank, states, steps=0)
@@ -80,7 +80,7 @@ def run_forward(
 
 
 def fit_states(motion: Motion, runs: Sequence[FitRun], states: States) -> list[tuple[float, float]]:
-    """Return the initial states with which a model fits readings best; raises FitDiverged."""
+    """Return the least-squares initial states of runs; raises FitDiverged."""
     fit = _fit_motion(motion, runs, states, steps=STATE_STEPS)
     return [(theta, velocity) for *_, theta, velocity in fit.windows]
 
@@ -113,8 +113,8 @@ class Strength:
 
     torque: float  # Root mean square of its torque over the moment of inertia, rad/s^2
     greatest_torque: float  # Greatest size of that torque, rad/s^2
-    reading: float  # Root mean square of what it adds to the reading, rad
-    greatest_reading: float  # Greatest size of that addition, rad
+    reading: float  # Root mean square of its contribution to the reading, rad
+    greatest_reading: float  # Greatest size of that contribution, rad
 
 
 def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
@@ -127,7 +127,7 @@ def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -
         known = np.flatnonzero(np.isfinite(theta))
         drive = fit.drive_of(run, k)
         for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
-            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # the fewest times of a record
+            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # a record has at least three
             runs.append(
                 dataclasses.replace(
                     run, time=time, theta=np.zeros(3), sigma=EXACT, trusted=None, drive=drive

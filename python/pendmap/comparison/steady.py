@@ -1,4 +1,4 @@
-"""Steady states: the cycle that a record ends on beside those that a model reaches."""
+"""Steady states: comparison of a record's final cycle with those of a model."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-SAMPLES: Final = 64  # Samples of a cycle in a forcing period
-_HARMONICS: Final = 12  # Harmonics of the drive that a cycle has: higher ones are noise
-_CYCLES: Final = 50  # Cycles at the end of a record that are averaged, at most
-_STEADY: Final = 0.01  # Cycles are averaged from where their halves differ by less, rad rms
+SAMPLES: Final = 64  # Samples of a cycle per forcing period
+_HARMONICS: Final = 12  # Harmonics of the drive kept in a cycle: higher ones are noise
+_CYCLES: Final = 50  # Most cycles averaged at the end of a record
+_STEADY: Final = 0.01  # Rms difference, rad, of early and late cycles below which all are averaged
 _AT_REST: Final = 0.05  # Amplitude below which a cycle is rest, rad
 _DECAY: Final = 10.0
-"""Power of e by which viscous damping shrinks a transient before cycles are looked for."""
-_FOLLOWED: Final = (100, 2000)  # Least and greatest number of periods of that
-_CLOSED: Final = 1e-3  # Distance within which a motion must close to be on a cycle, rad
-_ONE: Final = 0.02  # Distance below which two cycles are one, rad
+"""Number of e-foldings by which viscous damping reduces transients before cycles are sought."""
+_FOLLOWED: Final = (100, 2000)  # Least and greatest transient, forcing periods
+_CLOSED: Final = 1e-3  # Greatest closing error of a cycle, rad
+_ONE: Final = 0.02  # Rms distance below which two cycles are identical, rad
 
 
 @dataclasses.dataclass(frozen=True)
 class Cycle:
-    """A closed motion of S samples."""
+    """Periodic motion with S samples."""
 
-    n: int  # forcing periods
-    w: int  # net turns over them
+    n: int  # length in forcing periods
+    w: int  # net turns per cycle
     time: Floats  # s, from a whole number of periods of the drive
     theta: Floats  # rad, not wrapped
     velocity: Floats  # rad/s
 
     @classmethod
     def of(cls, n: int, w: int, period: float, theta: Floats) -> Cycle:
-        """Return the cycle through readings at equal times, by Fourier series."""
+        """Return the cycle of equally spaced readings, smoothed by a Fourier series."""
         time = np.arange(theta.size) * n * period / theta.size
         turning = math.tau * w / (n * period)
         waves = np.fft.rfft(theta - turning * time)
@@ -56,7 +56,7 @@ class Cycle:
 
     @property
     def swing(self) -> Floats:
-        """Angle less its steady turning, rad."""
+        """Angle less its mean rotation, rad."""
         return np.asarray(
             self.theta - math.tau * self.w * np.arange(self.theta.size) / self.theta.size
         )
@@ -68,12 +68,12 @@ class Cycle:
 
     @property
     def at_rest(self) -> bool:
-        """Whether it hardly moves."""
+        """Whether the motion is rest: no net turns and a negligible amplitude."""
         return self.w == 0 and self.amplitude < _AT_REST
 
     @property
     def kind(self) -> str:
-        """``rest``, ``oscillation period 2``, ``rotation 1:1``, ..."""
+        """Kind of motion: ``rest``, ``oscillation period 2``, ``rotation 1:1``, ..."""
         if self.w:
             return kind_of("rotation", self.n, self.w)
         if self.at_rest:
@@ -82,7 +82,7 @@ class Cycle:
         return kind_of("oscillation", self.n, 0)
 
     def moved(self, periods: int) -> Cycle:
-        """Return the motion from some whole periods later on."""
+        """Return the cycle shifted by whole forcing periods."""
         at = periods * SAMPLES
         turned = math.tau * self.w
         theta = np.concatenate([self.theta[at:], self.theta[:at] + turned])
@@ -91,9 +91,10 @@ class Cycle:
         )
 
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
-        """Return the least rms angle between both, rad, and this one shifted to reach it.
+        """Return the least rms difference to another cycle, rad, and this cycle shifted to it.
 
-        Shifts are whole periods of the drive and whole turns; infinite where ``n`` or ``w`` differ.
+        Shifts are whole forcing periods and turns; the difference is infinite if ``n`` or ``w``
+        differ.
         """
         if (self.n, self.w) != (other.n, other.w):
             return math.inf, self
@@ -110,7 +111,7 @@ class Cycle:
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """A cycle that a model ends on, and the share of starts that do."""
+    """Cycle that a model reaches, and the share of initial states that reach it."""
 
     cycle: Cycle
     share: float
@@ -118,18 +119,18 @@ class Reached:
 
 @dataclasses.dataclass(frozen=True)
 class Steady:
-    """A record's steady state beside a model's."""
+    """Comparison of a record's steady state with a model's."""
 
     measured: Cycle  # mean of the record's last cycles
-    cycles: int  # how many these are
-    reached: tuple[Reached, ...]  # by the model, the most frequent first
-    model: Cycle | None  # the nearest of these, shifted; None without equal n, w
-    rms: float  # of the difference, rad
-    rms_velocity: float  # likewise, rad/s
+    cycles: int  # number of averaged cycles
+    reached: tuple[Reached, ...]  # cycles of the model, the most frequent first
+    model: Cycle | None  # nearest cycle of the model, shifted; None if none has equal n and w
+    rms: float  # rms difference of the angles, rad
+    rms_velocity: float  # rms difference of the velocities, rad/s
 
     @property
     def overestimate(self) -> float:
-        """Amplitude of the model over the measured one, less 1; NaN at rest."""
+        """Relative error of the model's amplitude; NaN without a model cycle or at rest."""
         if self.model is None or self.measured.at_rest:
             return math.nan
         return self.model.amplitude / self.measured.amplitude - 1
@@ -141,7 +142,7 @@ def folded(
     """Return the mean of a record's last cycles, and their number.
 
     ``time`` is on the drive's clock; ``closes`` are ``n`` and ``w`` of the cycle, ``since`` (s) is
-    when it begins to repeat itself.
+    the time from which it repeats itself.
     """
     n, w = closes
     length = n * period
@@ -153,7 +154,7 @@ def folded(
     turns = math.tau * w * np.arange(count)
     begins = (first + n * np.arange(count)) * period
     rows = CubicSpline(time, reading)(begins[:, None] + at) - turns[:, None]
-    while count > 1:  # the last ones, where the transient still decays
+    while count > 1:  # only the last cycles while a transient decays
         early, late = rows[: count // 2].mean(axis=0), rows[count // 2 :].mean(axis=0)
         if math.sqrt(float(np.mean((late - early) ** 2))) < _STEADY:
             break
@@ -168,10 +169,11 @@ def reached(
     period: float,
     damping: float,
 ) -> tuple[Reached, ...]:
-    """Return the cycles that a model ends on, the most frequent first.
+    """Return the cycles that a model reaches, the most frequent first.
 
-    ``simulated`` returns readings from angles and velocities (rad, rad/s) at times (s); ``starts``
-    are a time on the run's clock, and angles and velocities then; ``damping`` is ``c/m``, 1/s.
+    ``simulated`` returns readings at times (s) from initial angles and velocities (rad, rad/s);
+    ``starts`` are the initial time on the run's clock, angles and velocities; ``damping`` is
+    ``c/m``, 1/s.
     """
     begin, theta, velocity = starts
     rate = 0.5 * damping * period
@@ -195,7 +197,7 @@ def reached(
 
 
 def _closed(row: Floats, period: float) -> Cycle | None:
-    """Return the shortest cycle on which readings close; None without."""
+    """Return the shortest cycle on which readings close; None if there is none."""
     for n in range(1, LONGEST + 1):
         size = n * SAMPLES
         apart = row[size:] - row[:-size]
@@ -206,7 +208,7 @@ def _closed(row: Floats, period: float) -> Cycle | None:
 
 
 def compared(measured: tuple[Cycle, int], ends: tuple[Reached, ...]) -> Steady:
-    """Return a record's cycle beside the nearest one of a model."""
+    """Return the comparison of a record's cycle with the nearest one of a model."""
     cycle, cycles = measured
     found = [one.cycle.nearest(cycle) for one in ends]
     rms, model = min(found, key=lambda pair: pair[0], default=(math.inf, cycle))

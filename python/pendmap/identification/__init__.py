@@ -1,4 +1,4 @@
-"""Damping from records of free decays: the trajectory method, the paper's, and others."""
+"""Identification of damping from free decays: the trajectory method, the paper's, and others."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Peaks and crossings of a record with few samples a period, by a pendulum's own swings.
+"""Peaks and crossings of a record with few samples per period, from fitted pendulum swings.
 
-A quartic through a peak needs more samples than such a record has within a quarter swing. Instead
-samples are joined by the equation of motion, with parameters fitted again every few swings.
+A quartic around a peak needs more samples than such a record has within a quarter swing. Instead,
+solutions of the equation of motion are fitted, with new parameters every few swings.
 """
 
 from __future__ import annotations
@@ -31,40 +31,39 @@ if TYPE_CHECKING:
 
 
 COARSE: Final = 20.0
-"""Samples a period of small swings below which nine of them, which a quartic needs, reach too
-far."""
-_FINE: Final = 32  # Points a period of the curve through the samples in which turns are looked for
-_GAP: Final = 2.5  # Pause in samples that is a gap
+"""Samples per period of small swings below which the nine of a quartic span too long a time."""
+_FINE: Final = 32  # Points per period of the interpolated curve in which turns are searched for
+_GAP: Final = 2.5  # Shortest gap, sampling intervals
 _CLEAR: Final = 0.02
-"""Noise over the range of the angle, assumed until it is known: only large swings count."""
+"""Noise over the range of the angle, assumed until it is estimated: only large swings are used."""
 _LONGEST: Final = 0.8
-"""Greatest half width of a turn's window, half swings: friction changes its sign at the next."""
+"""Greatest half-width of a turn's window, half swings: friction changes sign at the next turn."""
 _LEAST: Final = 3.2
-"""Half width of a turn's window, samples, where that is more than a quarter swing."""
-_BESIDE: Final = 0.95  # Half width of a crossing's window, quarter swings
+"""Half-width of a turn's window, samples, if this is more than a quarter swing."""
+_BESIDE: Final = 0.95  # Half-width of a crossing's window, over the time to the nearer peak
 
 
 def is_coarse(time: Floats, theta: Floats) -> bool:
-    """Return whether a record has fewer than 20 samples a period of small swings."""
+    """Return whether a record has fewer than 20 samples per period of small swings."""
     _, swing = _swinging(theta)
     time, theta = time[swing:], theta[swing:]
     raw = _natural(time, theta)
     if raw is None or 2 * math.pi / raw >= COARSE * float(np.median(np.diff(time))):
         return False
-    # The median removes single spikes; it also removes quick swings, or makes them slower.
+    # The median removes single spikes, but also fast swings, which lowers the frequency.
     calm = _natural(time, median_filter(theta, 5, mode="nearest"))
     return calm is None or calm > 0.6 * raw
 
 
 def _swinging(theta: Floats) -> tuple[float, int]:
-    """Return where a record rests, in whole turns (rad), and its first sample that swings."""
+    """Return a record's rest angle, in whole turns (rad), and the first sample after rotations."""
     tail = theta[-max(theta.size // 4, 1) :]
     rest = math.tau * round(float(np.median(tail)) / math.tau) if theta.size else 0.0
     return rest, after_turns(theta - rest)
 
 
 def _natural(time: Floats, theta: Floats) -> float | None:
-    """Return the natural frequency by the times of the turns of large swings, rad/s."""
+    """Return the natural frequency from the turning points of large swings, rad/s."""
     if time.size < 8:  # noqa: PLR2004 (two half swings, roughly)
         return None
     turns = zigzags(theta, 0.1 * float(np.ptp(theta)) + 1e-12, np.empty(0, np.intp))
@@ -75,7 +74,7 @@ def _natural(time: Floats, theta: Floats) -> float | None:
 
 
 def coarse_finder(time: Floats, theta: Floats, sigma: float | None) -> CoarseFinder:
-    """Return the finder of a record, shared by all methods."""
+    """Return the cached finder of a record, shared by all methods."""
     return _finder(time.tobytes(), theta.tobytes(), sigma)
 
 
@@ -85,13 +84,13 @@ def _finder(time: bytes, theta: bytes, sigma: float | None) -> CoarseFinder:
 
 
 class CoarseFinder:
-    """One record, a curve through its samples, and swings fitted to it.
+    """Peaks and crossings of one record, from swings fitted to its samples.
 
-    Without ``sigma`` (rad) the noise is the residual of fits to clear swings.
+    Without ``sigma`` (rad) the noise is the residual of fits to large swings.
     """
 
     def __init__(self, time: Floats, theta: Floats, sigma: float | None) -> None:
-        # Rotations before the swings have no turns and are left out.
+        # Rotations before the swings have no turning points and are excluded.
         rest, swing = _swinging(theta)
         self.rotated = swing > 0
         time, theta = time[swing:], theta[swing:] - rest
@@ -111,15 +110,15 @@ class CoarseFinder:
         self._follow(self.sigma)
 
     def _follow(self, sigma: float) -> None:
-        """Outline the curve; the mean over its points has no less noise than a sample."""
+        """Set the outline; the running mean of the interpolated curve has a sample's noise."""
         t, x = self.fine
         points = max(0.2 * math.tau / self.w0 / float(np.median(np.diff(t))), 1.0)
         self.course = outline(t, x, sigma * math.sqrt(points))
 
     def _turns(self, sigma: float | None) -> tuple[SwingFit, bool, bool]:
-        """Fit all turns; whether the first is the record's begin, and whether held."""
+        """Return the fit of all turns, whether the first is the record's start, and if held."""
         course = self.course
-        assert course is not None  # noqa: S101 (callers have asked)
+        assert course is not None  # noqa: S101 (checked by callers)
         t, x = self.fine
         instants, states = list(t[course.turns]), list(x[course.turns])
         begins, held = True, False
@@ -167,7 +166,7 @@ class CoarseFinder:
             stderr_angle = float(fit.stderr_state[k]) * shared
             kind = "turn"
             if k == 0 and begins:
-                # A first peak that lies before the record was not seen.
+                # A first peak before the record was not recorded.
                 if not held and instant < self.time[0] - max(3 * stderr_time, 0.05 * self.step):
                     continue
                 kind = "release"
@@ -189,14 +188,14 @@ class CoarseFinder:
         return result
 
     def _shared(self, instant: float) -> float:
-        """Return the factor on errors that samples share near a turn by the count."""
+        """Return the factor on standard errors near a turn by quantization."""
         if self.count <= 2 * self.sigma:
             return 1.0
         near = np.abs(self.time - instant) <= max(math.pi / 2 / self.w0, 2 * self.step)
         return levels_shared(self.theta[near], self.count)
 
     def crossings(self, index: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """Return instants of zero angle between peaks, errors and half cycles."""
+        """Return times of zero crossings between peaks, their errors and half cycles."""
         spans, at, speed, half, rows = [], [], [], [], []
         pairs = zip(itertools.pairwise(self.ends), index[:-1], self.rows, strict=False)
         for (before, after), k, row in pairs:
@@ -231,7 +230,7 @@ class CoarseFinder:
 
 
 def _through(time: Floats, theta: Floats, factor: int) -> tuple[Floats, Floats]:
-    """Return a curve through the samples, ``factor`` points for each; none across a gap."""
+    """Return cubic splines through the samples between gaps, with ``factor`` points per sample."""
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
     parts = []

@@ -1,4 +1,4 @@
-"""Identification from an experiment by every method, and the model file of its result."""
+"""Identification from an experiment by all methods, and the resulting model file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ MISSES: Final = 1.2  # Residual over noise above which quadratic drag is tried
 
 
 def decay_of(experiment: Experiment) -> Run:
-    """Return the free run that swings longest and is not held out; refuse an experiment without."""
+    """Return the longest free run that is not held out; raise InputError if there is none."""
     free = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
     if not free:
         raise InputError(
@@ -61,29 +61,30 @@ def identify_experiment(
     effects: Sequence[Effect | str] = (),
     progress: Callable[[int, int], object] | None = None,
 ) -> IdentificationReport:
-    """Identify damping from an experiment by every method.
+    """Identify damping from an experiment by several methods.
 
-    The trajectory method fits all free runs that are not held out together, each with a start of
-    its own; the others read the longest of them.
+    The trajectory method fits all free runs that are not held out jointly, each with its own
+    initial state; the other methods use the longest of these runs.
 
     Parameters
     ----------
     experiment : Experiment
-        As for :func:`pendmap.read_experiment`.
+        Records, from :func:`pendmap.read_experiment`.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
-        Where the trajectory method begins, with its effects; by default found from the record.
+        Starting values and effects of the trajectory method; by default estimated from the record.
     effects : sequence of Effect or str
-        Further effects, or their names, that it fits the sizes of.
+        Further effects, or their names, whose sizes the trajectory method fits.
     progress : callable, optional
-        Called with the steps done and those to do: one for each method, the peaks and the table.
+        Called with the numbers of steps done and in all: one for each method, the peaks and the
+        table.
 
     Raises
     ------
     InputError
-        If a method or an effect is not known, an effect is one of the drive, there is no free
-        decay, or the trajectory that fits best is plainly not one of these records.
+        If a method or an effect is unknown, an effect acts on the drive, there is no free decay,
+        or the best fit does not follow the records.
     """
     check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
     if start is not None:
@@ -129,7 +130,7 @@ def identify_experiment(
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
-    """Return a fit with drag, positive, where the one without does not reach the noise."""
+    """Return a fit with positive quadratic drag if the fit without it is poor, or None."""
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
     if joint.fit.rms < MISSES * noise:
         return None
@@ -157,7 +158,7 @@ def _best(
     except FitDiverged as error:
         if start is not None or effects:
             raise
-        # Other methods can replace this one, but not an effect or a start that was asked for.
+        # Other methods can replace this one, but not for requested effects or starting values.
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     certain = joint.fit.converged or len(runs) > 1
     if certain and not unit_wrong(experiment, *runs):
@@ -174,22 +175,22 @@ def _best(
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     """Return the model of the best method with the notes of its file.
 
-    ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all that was
-    fitted together, both wider where the model leaves more than chance allows; ``[provenance]``
-    the method, the records with their SHA-256, the version, the command, and of a fit of the whole
-    record ``rms``, which it leaves, and ``noise``, both in rad.
+    ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all jointly fitted
+    parameters, both widened if the residual exceeds the noise; ``[provenance]`` has the method, the
+    records with their SHA-256, the version, the command, and for a fit of the whole record its
+    residual ``rms`` and the ``noise``, both in rad.
 
     Parameters
     ----------
     report : IdentificationReport
-        As for :func:`pendmap.identification.identify_experiment`.
+        Result of :func:`pendmap.identification.identify_experiment`.
     command : str
-        How it was called.
+        Command line for the provenance.
 
     Raises
     ------
     InputError
-        If no method could be applied.
+        If no method gives a model.
     """
     best = report.best
     notes: dict[str, Any] = {}
@@ -232,8 +233,8 @@ def provenance(
 ) -> dict[str, Any]:
     """Return the table ``[provenance]`` of a model file from records and their SHA-256.
 
-    ``command`` is left out if empty. ``rms`` is the residual, ``noise`` that of a reading, both
-    rad: where rms is above 1.5 times the noise every map of the model has a warning.
+    ``command`` is omitted if empty. ``rms`` is the residual, ``noise`` that of a reading, both rad:
+    if rms is above 1.5 times the noise every map of the model has a warning.
     """
     table: dict[str, Any] = {"version": version("pendmap"), "simd": instruction_set()}
     if command:

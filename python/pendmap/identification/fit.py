@@ -1,4 +1,4 @@
-"""Fitting a pendulum to records by multiple shooting; the work is done in Rust (``src/fit``)."""
+"""Fitting of a pendulum to records by multiple shooting, implemented in Rust (``src/fit``)."""
 
 from __future__ import annotations
 
@@ -36,33 +36,33 @@ LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of
 
 @dataclasses.dataclass(frozen=True)
 class TrajectoryFit:
-    """A pendulum fitted to records, in SI."""
+    """Result of fitting a pendulum to records, in SI."""
 
-    estimates: Mapping[str, Estimate]  # profile intervals; name[k] belongs to run k
-    ends: Mapping[str, tuple[float, float]]  # ends of the intervals; NaN where not found
+    estimates: Mapping[str, Estimate]  # with profile intervals; name[k] belongs to run k
+    ends: Mapping[str, tuple[float, float]]  # ends of the intervals; NaN if not found
     names: tuple[str, ...]  # free parameters, in the order of the covariance
     covariance: NDArray[np.float64]  # shape (k, k)
-    chi2: float  # sum of squares; of interval readings -2 log P
-    samples: int  # samples that count
-    degrees: int  # samples less adapted numbers
-    rms: float  # of the residuals that count, rad
-    model: Rig  # as found; negative damping is set to 0
+    chi2: float  # sum of squares; for interval readings -2 log P
+    samples: int  # number of included samples
+    degrees: int  # degrees of freedom: samples less fitted parameters
+    rms: float  # root mean square residual of the included samples, rad
+    model: Rig  # fitted model; negative damping is set to 0
     curves: tuple[NDArray[np.float64], ...]  # theta, velocity by run, (2, n); NaN outside windows
-    residuals: tuple[NDArray[np.float64], ...]  # reading less model, rad; 0: does not count
+    residuals: tuple[NDArray[np.float64], ...]  # reading less model, rad; 0 if excluded
     white: tuple[NDArray[np.float64], ...]  # residuals of unit variance
     windows: tuple[tuple[int, int, int, float, float], ...]  # run, first, last + 1, state
-    steps: int  # steps of the search
-    converged: bool  # whether the search ended
-    given_up: bool  # whether the target was out of reach
-    widening: float  # of the intervals, squared: above 1 where the model does not fit
-    mixed: tuple[str, ...]  # sizes with a free exponent: intervals in equal ratios
+    steps: int  # number of iterations
+    converged: bool  # whether the search converged
+    given_up: bool  # whether the search ended because the target was out of reach
+    widening: float  # squared factor on the intervals, above 1 if the model does not fit
+    mixed: tuple[str, ...]  # sizes with a free exponent, whose intervals are in equal ratios
 
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
         return self.estimates[name].value
 
     def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
-        """Return a run's drive; an unknown phase is that fitted for the run at this place, or 0."""
+        """Return a run's drive, with an unknown phase replaced by its fit (run ``place``), or 0."""
         if run.drive is None or run.drive.get("phi") is not None:
             return run.drive
         names = (f"phi[{place}]", "phi")
@@ -86,20 +86,21 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
 
-    The sum over all samples of ``((reading - model) / sigma)**2`` is least over the free parameters
-    and an initial state for each window (Bock 1983, Progress in Scientific Computing 2, 95); where
-    readings are intervals, ``-2 log P`` of them stands for the square. Windows begin with about one
-    swing and grow by ``growth`` from stage to stage, to the whole record of a free
-    decay; ``windows`` of a former fit make one stage. Intervals are those of Venzon & Moolgavkar
-    (1988), Applied Statistics 37, 87, for the names in ``profiled``, by default all.
+    The sum over all samples of ``((reading - model) / sigma)**2`` is minimized over the free
+    parameters and an initial state for each window (Bock 1983, Progress in Scientific Computing 2,
+    95); for readings that are intervals the square is replaced by ``-2 log P``. Windows begin with
+    about one swing and grow by ``growth`` from stage to stage, to the whole record of a free decay;
+    with ``windows`` of a former fit there is one stage. Intervals are profile-likelihood intervals
+    (Venzon & Moolgavkar 1988, Applied Statistics 37, 87) for the names in ``profiled``, by default
+    all.
 
-    ``model`` is known and is the start, but for other values in ``start``, where damping may be
-    negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``; those of the
-    drive are fitted run by run, as is any phase that a run does not know. ``hold`` keeps the
-    parameters at their starts: only initial states and unknown phases are adapted. ``sigma_doubt``
-    is the relative standard error of ``sigma``, ``steps`` the most in a stage; the search ends
-    where a step promises less than ``least_gain``, or, with ``windows``, where the sum ``target``
-    is out of reach.
+    ``model`` gives fixed parameters and starting values; ``start`` replaces starting values, where
+    damping may be negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``;
+    those of the drive are fitted run by run, as are unknown phases. ``hold`` fixes the parameters
+    at their starting values: only initial states and unknown phases are fitted. ``sigma_doubt`` is
+    the relative standard error of ``sigma``, ``steps`` the maximum number of iterations in a stage;
+    the search ends when the expected gain of a step is below ``least_gain``, or, with ``windows``,
+    when the sum ``target`` is out of reach.
     """
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
@@ -128,7 +129,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
 def prepared(
     runs: Sequence[FitRun], model: Rig, free: Sequence[str], start: Mapping[str, float]
 ) -> tuple[Conversion, list[dict[str, Any]]]:
-    """Return the free parameters, and the runs as the core takes them."""
+    """Return the free parameters, and the runs in the core's format."""
     if not runs:
         raise InputError("runs must hold one record or more, got none")
     units = Units(model.w0, si=True)
@@ -154,7 +155,7 @@ def _result(
     profiled = [k for k in chosen if k not in unknown.mixed]
     for k, pair in zip(profiled, found.intervals, strict=True):
         both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in pair]
-        # The unit of a bias may be negative; an end that was not found is NaN.
+        # The unit of a bias may be negative; an end that is not found is NaN.
         low = next((end for end in both if end < values[k]), math.nan)
         high = next((end for end in both if end > values[k]), math.nan)
         intervals[k] = low, high
@@ -214,14 +215,14 @@ def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
 
 
 MISSED: Final = 0.5
-"""Residual over the readings' standard deviation from which a fit does not follow its record."""
+"""Rms residual over the readings' standard deviation above which a fit is refused."""
 
 FAR: Final = 1.0
-"""Residual, rad, from which a fit does not follow its record, also of a pendulum that turns."""
+"""Rms residual, rad, above which a fit is refused, also for rotations."""
 
 
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:
-    """Refuse a fit in which the residual of a run is as large as its motion."""
+    """Raise InputError for a fit with a residual comparable to the motion of a run."""
     for run, residual in zip(runs, fit.residuals, strict=True):
         counted = np.isfinite(residual) & run.counted
         if not counted.any():

@@ -1,4 +1,4 @@
-"""Free parameters: their names in SI and in the core."""
+"""Free parameters of a fit and their conversion between SI and the core."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ PLACES: Final[Mapping[str, tuple[str, float]]] = {
     "Omega": ("omega", 1),
     "phi": ("phase", 0),
 }
-"""Name in the core of each parameter of a rig, and the power of ``w0`` of its SI value."""
+"""Name in the core of each parameter of a rig, and the power of ``w0`` in its SI value."""
 
 SENSOR: Final = ("bias", "tilt")
-"""Parameters of a sensor on the rod, run by run: they are always fitted."""
+"""Parameters of a sensor on the rod, always fitted run by run."""
 
 PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A free parameter."""
+    """Free parameter of a fit."""
 
     name: str  # in SI
-    power: float  # of w0 in the SI value
-    places: list[tuple[int, str]]  # run and place
+    power: float  # power of w0 in the SI value
+    places: list[tuple[int, str]]  # run and name in the core
     start: float
     unit: float = 1.0  # further factor of the SI value
-    less: str | None = None  # free parameter whose value is subtracted from the power
+    less: str | None = None  # free exponent that is subtracted from the power
 
 
 def free_quantities(
@@ -57,11 +57,11 @@ def free_quantities(
     free: Sequence[str],
     start: Mapping[str, float],
 ) -> list[Quantity]:
-    """Return the free parameters of runs whose rigs are given.
+    """Return the free parameters of a fit to runs with given rigs.
 
-    ``free`` has names like those of :func:`pendmap.identification.fit.fit_runs`; the unknown phase
-    of a run is added, and so are bias and tilt of a sensor on the rod. ``start`` has starting
-    values that replace the rigs'.
+    ``free`` has names as in :func:`pendmap.identification.fit.fit_runs`; unknown phases, and bias
+    and tilt of sensors on the rod, are added. ``start`` has starting values that replace the
+    rigs'.
     """
     names = list(dict.fromkeys(free))
     of_run = [f"[{k}]" if len(runs) > 1 else "" for k in range(len(runs))]
@@ -118,10 +118,10 @@ def _found_in(
 class Conversion:
     """Conversion of a fit's free parameters between SI and the core.
 
-    The core counts time in ``1 / w_ref`` of a fixed ``w_ref``, and ``w0`` is a factor ``xi`` on
-    gravity. In SI ``w0 = w_ref sqrt(xi)``, and ``x = u w_ref^k xi`` of all others. The power ``k``
-    of a size whose unit depends on an exponent ``n`` is ``2 - n``; where both are free the Jacobian
-    ``dx / dxi`` has ``dq / dn = -ln(w_ref) q`` beside its diagonal.
+    The core's unit of time is ``1 / w_ref`` with a fixed ``w_ref``. Its parameter ``xi`` for ``w0``
+    is a factor on gravity: ``w0 = w_ref sqrt(xi)``; all others have ``x = u w_ref^k xi``. The power
+    ``k`` of a size whose unit depends on an exponent ``n`` is ``2 - n``; if both are free the
+    Jacobian ``dx / dxi`` has the off-diagonal element ``dq / dn = -ln(w_ref) q``.
     """
 
     quantities: Sequence[Quantity]
@@ -134,7 +134,7 @@ class Conversion:
 
     @property
     def start(self) -> list[tuple[list[tuple[int, str]], float]]:
-        """Names and start of each, as the core takes them."""
+        """Runs and names, and starting value, of each parameter in the core's units."""
         starts = [q.start for q in self.quantities]
         scales = self._scales(starts)
         return [
@@ -143,14 +143,14 @@ class Conversion:
         ]
 
     def given(self, values: ArrayLike) -> Floats:
-        """Return in SI the core's ``values``, shape (k,)."""
+        """Return the core's ``values`` in SI, shape (k,)."""
         bare = np.asarray(values, np.float64)
         roots = np.sqrt(np.where(bare > 0, bare, np.nan))
         first = np.array([q.name == "w0" for q in self.quantities], bool)
         return np.where(first, self.units.w0 * roots, self._scales(bare) * bare)
 
     def jacobian(self, values: ArrayLike) -> Floats:
-        """Return the derivatives of :meth:`given`, shape (k, k): of rows, by columns."""
+        """Return the Jacobian of :meth:`given`, shape (k, k)."""
         given = self.given(values)
         slopes = self._scales(values)
         for k, q in enumerate(self.quantities):
@@ -162,14 +162,13 @@ class Conversion:
         return found
 
     def columns(self, bare: Floats, values: ArrayLike) -> Floats:
-        """Return derivatives by the parameters in SI, shape (n, k), from those by the core's."""
+        """Return derivatives by the parameters in SI, shape (n, k), from those in core units."""
         return np.asarray(bare @ np.linalg.inv(self.jacobian(values)), np.float64)
 
     def covariance(self, bare: Floats, values: ArrayLike) -> Floats:
         """Return the covariance in SI, shape (k, k), from the core's.
 
-        Variances are infinite of parameters that the records do not determine, and of those that
-        follow.
+        Variances of undetermined parameters, and of those that depend on them, are infinite.
         """
         slopes = self.jacobian(values)
         known = np.where(np.isfinite(bare), bare, 0.0)
@@ -181,17 +180,17 @@ class Conversion:
 
     @property
     def mixed(self) -> tuple[int, ...]:
-        """Places of sizes whose unit depends on a free exponent."""
+        """Indices of sizes whose unit depends on a free exponent."""
         return tuple(self._exponents)
 
     @property
     def _exponents(self) -> dict[int, int]:
-        """Place of the exponent of each size whose unit depends on a free one."""
+        """Index of the exponent for each size whose unit depends on a free exponent."""
         places = {name: k for k, name in enumerate(self.names)}
         return {k: places[q.less] for k, q in enumerate(self.quantities) if q.less is not None}
 
     def _scales(self, values: ArrayLike) -> Floats:
-        """Return the SI value of one unit of the core's; an exponent is the same in both."""
+        """Return the SI value of each parameter's unit in the core."""
         powers = np.array([q.power for q in self.quantities], np.float64)
         for size, exponent in self._exponents.items():
             powers[size] -= np.asarray(values, np.float64)[exponent]
@@ -200,15 +199,15 @@ class Conversion:
 
 
 def interval(value: float, half: float, *, mixed: bool) -> tuple[float, float]:
-    """Return the ends of ``value +- half``; NaN where ``half`` is not finite.
+    """Return the ends of ``value +- half``; NaN if ``half`` is not finite.
 
-    ``mixed``, of a size whose unit is free too, in equal ratios: records determine ``q v^n`` at
-    their velocities ``v``, so that ``ln q`` and ``n`` vary together, nearly normally.
+    For a size whose unit is free (``mixed``) the ends are in equal ratios: records determine ``q
+    v^n`` at their velocities ``v``, so ``ln q`` and ``n`` are jointly nearly normal.
     """
     if not math.isfinite(half):
         return math.nan, math.nan
     if not mixed or value == 0:
         return value - half, value + half
-    ratio = min(half / abs(value), 300.0)  # beyond it nothing is known
+    ratio = min(half / abs(value), 300.0)  # avoids overflow
     low, high = sorted((value * math.exp(-ratio), value * math.exp(ratio)))
     return low, high

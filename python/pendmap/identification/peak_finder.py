@@ -1,4 +1,4 @@
-"""Peaks and crossings of one record, each fitted by a polynomial around it."""
+"""Peaks and crossings of one record, each from a polynomial fitted around it."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_BIAS: Final = 0.25  # Bias allowed in a peak's amplitude, in standard errors
+_BIAS: Final = 0.25  # Greatest bias of a peak's amplitude, standard errors
 _WIDEST: Final = 1.3
-"""Greatest half width of a peak's window, radians of phase w0 t: a quarter swing is 1.57."""
-_SHOW: Final = 6  # Peaks from which friction is estimated
-_CROSSING: Final = 0.6  # Half width of a crossing's window, radians of phase w0 t
-_FEWEST: Final = 8  # Samples of a peak's window
+"""Greatest half-width of a peak's window, rad of phase w0 t: a quarter swing is 1.57."""
+_SHOW: Final = 6  # Fewest peaks from which friction is estimated
+_CROSSING: Final = 0.6  # Half-width of a crossing's window, rad of phase w0 t
+_FEWEST: Final = 8  # Fewest samples of a peak's window
 
 
 class Finder:
-    """Peaks and crossings of one record, its noise and its rough course."""
+    """Peaks and crossings of one record, from its noise and its outline."""
 
     def __init__(self, time: Floats, theta: Floats, reading: Reading, course: Outline) -> None:
         # An unwrapped angle may come to rest some turns from its start.
@@ -57,7 +57,7 @@ class Finder:
         if begin is None:
             first = int(turns[0])
             inner = int(np.argmax(np.abs(self.course.smooth[: first // 2 + 1])))
-            if inner > 2:  # noqa: PLR2004 (samples that a turn needs before it)
+            if inner > 2:  # noqa: PLR2004 (fewest samples before a turn)
                 turns = [inner, *turns]
         for k in turns:
             end = self._clipped(k) or self._turn(k)
@@ -70,7 +70,7 @@ class Finder:
 
     @staticmethod
     def _in_time(ends: list[End]) -> list[End]:
-        """Subtract the lateness of turns by friction, as far as their sizes show friction."""
+        """Return ends without the delay by friction, which is estimated from their amplitudes."""
         sizes = np.array([e.angle for e in ends if math.isfinite(e.stderr_angle)])
         if sizes.size < _SHOW:
             return ends
@@ -80,7 +80,7 @@ class Finder:
         return [e.late(theta_r) for e in ends]
 
     def window(self, amplitude: float) -> float:
-        """Return the half width of the window of a peak, s."""
+        """Return the half-width of the window of a peak, s."""
         a = min(abs(amplitude), math.pi - 0.05)
         sixth = max(abs(math.sin(a) * (3 * math.sin(a) ** 2 - math.cos(a) ** 2)), 1e-3 * a, 1e-6)
         bias = 5 / 231 * sixth / 720
@@ -109,20 +109,20 @@ class Finder:
         sigma, bend = self._effective(fit), bend or math.inf
         slope = slope_gain * sigma
         stderr = slope / abs(bend)
-        # An error of the instant above the width of the window: there is no turn.
+        # If the error of the instant exceeds the width of the window there is no turn.
         if not stderr <= 2 * fit.half:
             return None
         return End(time, value + slope**2 / (2 * bend), stderr, gain * sigma, "turn", fit.half)
 
     def _effective(self, fit: WindowFit) -> float:
-        """Return the noise of a sample, where samples share errors of the count."""
+        """Return the noise of a sample, increased if quantization correlates the errors."""
         if self.count <= 2 * self.sigma:
             return self.sigma
         inside = self._between(fit.centre - fit.half, fit.centre + fit.half)
         return self.sigma * levels_shared(self.theta[inside], self.count)
 
     def _clipped(self, k: int) -> End | None:
-        """Return a top that was cut off: the extreme for longer than the swing stays."""
+        """Return a clipped peak, at the extreme for longer than a swing would be; or None."""
         extreme = self.top if self.course.smooth[k] > 0 else self.bottom
         half = self.course.period / 2
         around = self._between(float(self.time[k]) - half, float(self.time[k]) + half)
@@ -137,12 +137,12 @@ class Finder:
         return End(middle, extreme, self.step, math.inf, "clipped")
 
     def _between(self, begin: float, end: float) -> slice:
-        """Return the samples from one instant to another."""
+        """Return the slice of samples between two times."""
         first, last = np.searchsorted(self.time, (begin, end))
         return slice(int(first), int(last))
 
     def crossings(self, index: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """Return instants of zero angle between two peaks, their errors and half cycles."""
+        """Return times of zero crossings between two peaks, their errors and half cycles."""
         found = []
         for (before, after), k in zip(itertools.pairwise(self.ends), index[:-1], strict=True):
             if after.kind == "stop" or before.angle * after.angle >= 0:

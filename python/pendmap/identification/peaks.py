@@ -1,4 +1,4 @@
-"""Peaks and zero crossings of a free decay, between the samples, each with a standard error."""
+"""Peaks and zero crossings of a free decay, interpolated, each with a standard error."""
 
 from __future__ import annotations
 
@@ -29,29 +29,29 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Peaks:
-    """Turning points of a free decay, and the crossings of zero between them.
+    """Turning points of a free decay, and the zero crossings between them.
 
-    Half cycle ``k`` runs from peak ``k`` to peak ``k + 1``; it is odd if ``k`` is. Peak 0 is the
-    release where the record shows it, or else the first turn.
+    Half cycle ``k`` extends from peak ``k`` to peak ``k + 1``; it is odd if ``k`` is. Peak 0 is the
+    release if the record includes it, or else the first turning point.
 
     Parameters
     ----------
     time : array, shape (P,)
-        s.
+        Times, s.
     amplitude : array, shape (P,)
-        Angle, with its sign, as recorded, rad.
+        Recorded angle with its sign, rad.
     stderr_time, stderr_amplitude : array, shape (P,)
-        Standard errors; infinite where nothing is known (the top of a clipped reading).
+        Standard errors, s and rad; infinite if unknown (amplitude of a clipped peak).
     index : array of int, shape (P,)
-        Number ``k`` of the peak; one is missing where the record has a gap.
+        Number ``k`` of the peak; numbers are missing at gaps of the record.
     kind : tuple of str
-        ``release``, ``turn``, ``clipped``, or ``stop``: where the pendulum came to rest.
+        ``release``, ``turn``, ``clipped``, or ``stop``, at which the pendulum comes to rest.
     crossing_time, crossing_stderr : array, shape (C,)
-        s.
+        Times of the crossings and their standard errors, s.
     crossing_index : array of int, shape (C,)
-        Number of the half cycle in which the recorded angle is zero.
+        Number of the half cycle of each crossing.
     sigma : float
-        Standard deviation of the noise of a sample that the errors were computed with, rad.
+        Standard deviation of a sample's noise from which errors are computed, rad.
     """
 
     time: Floats
@@ -76,7 +76,7 @@ class Peaks:
         stderr_time: float = 0.0,
         stderr_amplitude: float = 0.0,
     ) -> Peaks:
-        """Return peaks that were measured elsewhere; absolute values get alternating signs."""
+        """Return peaks from given times and amplitudes; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
             raise InputError(
@@ -98,22 +98,22 @@ class Peaks:
 
     @property
     def odd(self) -> NDArray[np.bool_]:
-        """Peaks that begin an odd half cycle, as a mask, shape (P,)."""
+        """Mask of peaks that begin an odd half cycle, shape (P,)."""
         return np.asarray(self.index % 2 == 1)
 
     @property
     def turned(self) -> Peaks:
-        """Peaks at which the pendulum turned and was seen: no stop, nothing clipped."""
+        """Releases and turning points, without stops and clipped peaks."""
         return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
 
     def later(self, seconds: float) -> Peaks:
-        """Return the peaks on a clock that is ahead by some seconds."""
+        """Return the peaks with all times shifted by ``seconds``."""
         return dataclasses.replace(
             self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
         )
 
     def select(self, which: NDArray[np.bool_]) -> Peaks:
-        """Return some of the peaks, and all crossings."""
+        """Return the selected peaks, with all crossings."""
         names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
         some = {name: getattr(self, name)[which] for name in names}
         kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
@@ -123,7 +123,7 @@ class Peaks:
 def samples(
     time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the trusted samples as arrays; refuse what is not finite or does not increase."""
+    """Return the trusted samples; InputError if they are not finite or times do not increase."""
     t, x = np.asarray(time, float), np.asarray(theta, float)
     good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
     if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
@@ -148,23 +148,23 @@ def find_peaks(
     """Find the peaks and zero crossings of a free decay.
 
     A quartic is fitted by least squares around each peak, a cubic around each crossing. The
-    quartic leaves out the sixth derivative ``w0^6 sin A (3 sin^2 A - cos^2 A)`` that a pendulum has
-    at a peak ``A``; it shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half width
-    ``h``. The window is as wide as lets this be a quarter of the standard error, and 1.3 rad of
-    phase at most. Coulomb friction bends the two sides of a peak differently, which makes its time
-    late by ``5/32 h theta_r / sin A``: this is subtracted, with ``theta_r`` from the sizes of the
-    peaks, and a fifth of it counts as error. From amplitudes the mean excess of the highest point
-    of a noisy curve is subtracted, ``stderr(v)^2 / (2 abs(theta''))``.
+    quartic neglects the sixth derivative ``d6 = w0^6 sin A (3 sin^2 A - cos^2 A)`` at a peak ``A``,
+    which shifts the amplitude by ``5/231 d6 h^6 / 720`` for a window of half-width ``h``. The width
+    is chosen so that this is a quarter of the standard error, and at most 1.3 rad of phase. Coulomb
+    friction makes the curvature differ on both sides of a peak, which delays its estimated time by
+    ``5/32 h theta_r / sin A``: this is subtracted, with ``theta_r`` estimated from the amplitudes,
+    and a fifth of it is added to the error. The mean excess of the maximum of a noisy curve,
+    ``stderr(v)^2 / (2 abs(theta''))``, is subtracted from amplitudes.
 
-    With fewer than 20 samples a period (of small swings) peaks and crossings are those of a
-    pendulum's swings, ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0``, fitted to
-    the samples within half a swing, with parameters that each 12 turns in a row share. Errors
-    include the noise, the errors of these parameters, and the misfit of the form.
+    With fewer than 20 samples per period of small swings, solutions of ``th'' + c_over_m th' + Tr
+    sgn(th') + w0^2 sin(th - zero) = 0`` are fitted to the samples within half a swing, with
+    parameters shared by 12 consecutive turns. Errors include the noise, the errors of these
+    parameters, and the misfit of the model.
 
     Parameters
     ----------
     time, theta : array, shape (N,)
-        s, increasing, and rad from the downward rest, unwrapped.
+        Times, s, increasing, and angles from the downward rest, rad, unwrapped.
     sigma : float, optional
         Standard deviation of the noise, rad; by default estimated without a model.
     trusted : array of bool, shape (N,), optional
@@ -182,9 +182,9 @@ def find_peaks(
 
     Notes
     -----
-    Where the count is coarser than the noise, neighbouring samples share their error, and the
-    standard errors count three samples for each count that the window sees. Of a record with
-    samples drawn between the readings only the readings are used.
+    If the count is coarser than the noise, neighbouring samples have a common error, and standard
+    errors are computed with three independent samples per count in the window. Interpolated samples
+    between readings are not used.
     """
     t, x = samples(time, theta, trusted)
     t, first = from_first(t)
@@ -218,7 +218,7 @@ def find_peaks(
 def _finder(
     time: Floats, theta: Floats, sigma: float | None
 ) -> tuple[Finder | CoarseFinder | None, float]:
-    """Return a finder that suits the sampling, None without swings; and the noise."""
+    """Return the finder for the sampling rate, None without swings; and the noise."""
     if is_coarse(time, theta):
         coarse = coarse_finder(time, theta, sigma)
         return (None if coarse.course is None else coarse), coarse.sigma
@@ -228,7 +228,7 @@ def _finder(
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
-    """Return numbers of the peaks: signs alternate, and a gap hides an even number."""
+    """Return the numbers of the peaks, consistent with alternating signs and the half period."""
     result = [0] if ends else []
     for before, after in itertools.pairwise(ends):
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)

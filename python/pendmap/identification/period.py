@@ -1,4 +1,4 @@
-"""The natural frequency from the times of peaks with their amplitudes; peaks by energy."""
+"""Natural frequency from times and amplitudes of peaks; envelope of peaks by energy balance."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Frequency:
-    """Natural frequency ``w0`` (rad/s), its error, chi^2 per degree of freedom.
+    """Natural frequency ``w0`` (rad/s), its standard error, and chi^2 per degree of freedom.
 
-    The error is widened by the misfit where that is above 1.
+    The error is multiplied by the square root of the misfit if that is above 1.
     """
 
     w0: float
@@ -32,12 +32,12 @@ class Frequency:
 
 
 def mean_period(time: Floats) -> float:
-    """Return the mean of all overlapping ``t[i + 2] - t[i]``, s: the paper's average period."""
+    """Return the mean of all overlapping ``t[i + 2] - t[i]``, s, the paper's average period."""
     return float(np.mean(time[2:] - time[:-2]))
 
 
 def quarters(amplitude: Floats) -> tuple[Floats, Floats]:
-    """Return ``w0 t`` of a quarter swing, ``K(sin^2(A/2))``, and its derivative by ``A``."""
+    """Return the phase ``w0 t = K(sin^2(A/2))`` of a quarter swing, and its derivative by ``A``."""
     size = np.clip(np.abs(amplitude), 1e-6, math.pi - 1e-6)
     m, rest = np.sin(size / 2) ** 2, np.cos(size / 2) ** 2
     quarter = ellipkm1(rest)
@@ -49,9 +49,10 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
 
     A half cycle between the peaks ``A`` and ``B`` takes a quarter period of each, ``w0 t =
     [K(sin^2(A/2)) + K(sin^2(B/2))] / sqrt(1 - zeta^2)``. For viscous damping and friction this is
-    right to first order; at ``zeta = 0.004`` it misses 3e-4 of the half cycle near 2.6 rad and 5e-5
-    near 2 rad. Errors of times and amplitudes both count, and that neighbouring half cycles share a
-    peak. Half cycles beside a missing peak are left out. ``offset`` is the zero error, rad.
+    correct to first order; at ``zeta = 0.004`` its error is 3e-4 of the half cycle near 2.6 rad and
+    5e-5 near 2 rad. Weights include errors of times and amplitudes and their correlation between
+    neighbouring half cycles. Half cycles next to a missing peak are excluded. ``offset`` is the
+    zero error, rad.
     """
     amplitude = peaks.amplitude - offset
     quarter, slope = quarters(amplitude)
@@ -62,7 +63,7 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
     lasts, both = time[pairs + 1] - time[pairs], quarter[pairs + 1] + quarter[pairs]
     rough = float(np.median(lasts / both))
     one = np.ones(pairs.size)
-    # A late time makes one half cycle longer and the next shorter, a large amplitude both longer.
+    # An error of a time changes two half cycles oppositely, one of an amplitude alike.
     late = chain_covariance(pairs, -one, one, np.maximum(peaks.stderr_time, 1e-12) ** 2)
     wide = chain_covariance(
         pairs, slope[pairs] * rough, slope[pairs + 1] * rough, peaks.stderr_amplitude**2
@@ -91,8 +92,7 @@ def envelope(first: Floats, gamma: Floats, theta_r: Floats, count: int) -> Float
 
     Each half cycle loses ``cos B - cos A = gamma W((A + B)/2) + theta_r (A + B)`` with the work
     ``W`` of :func:`viscous_work`: first order in the damping, any amplitude, ``gamma = c_over_m /
-    w0``, ``theta_r = Tr / w0^2``. From where friction ends a half cycle before zero, the peaks are
-    0.
+    w0``, ``theta_r = Tr / w0^2``. Peaks are 0 after friction stops a half cycle before zero.
     """
     a, damping, friction = np.broadcast_arrays(
         np.abs(np.asarray(first, float)), np.asarray(gamma, float), np.asarray(theta_r, float)

@@ -1,4 +1,4 @@
-"""Runs as a fit takes them: readings and their standard errors, estimated without a model."""
+"""Conversion of runs for a fit: readings with standard errors estimated without a model."""
 
 from __future__ import annotations
 
@@ -22,32 +22,31 @@ if TYPE_CHECKING:
 
 
 DITHERED: Final = 0.45
-"""Noise (rounding included) over the count below which a fit takes readings for intervals. Below,
-the errors of successive readings are no longer independent."""
+"""Noise (with rounding) over the count below which errors are correlated: intervals are fitted."""
 
 
 QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
-"""Quantity that a recorded motion of the pivot has, by its unit."""
+"""Quantity of a recorded motion of the pivot, by its unit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reading:
     """Standard errors of readings; arrays have the shape (n,)."""
 
-    sigma: float  # of one reading, rad
-    count: float  # step of the sensor, rad; 0 where none is seen
-    each: NDArray[np.float64]  # rad, for a fit: by the law where there is one
+    sigma: float  # standard error of one reading, rad
+    count: float  # step of the sensor, rad; 0 for none
+    each: NDArray[np.float64]  # standard error of each reading, rad, from the law if any
     doubt: float  # relative standard error of sigma
     coarse: bool  # whether the count is coarser than the noise
-    alike: NDArray[np.float64]  # each without the law: for a model that lacks an effect
-    law: SpeedLaw | None = None  # growth of the noise with speed, where it is seen
-    shift: NDArray[np.float64] | float = 0.0  # mean error of stamps off time, rad; subtracted
-    gain: float = 1.0  # reading over the angle that it counts for
-    unit: str = "rad"  # of what was read
+    alike: NDArray[np.float64]  # uniform standard errors, for a model that lacks an effect
+    law: SpeedLaw | None = None  # growth of the noise with speed, if significant
+    shift: NDArray[np.float64] | float = 0.0  # bias by timing jitter, rad; subtracted
+    gain: float = 1.0  # sensor's reading over the equivalent angle
+    unit: str = "rad"  # unit of the sensor's readings
 
     @property
     def interval(self) -> float | None:
-        """Count, rad, where a fit takes readings for intervals."""
+        """Count, rad, if readings are fitted as intervals, else None."""
         return self.count if self.coarse else None
 
 
@@ -61,10 +60,9 @@ def reading_of(
 ) -> Reading:
     """Return the standard errors of readings (rad, at times in s), from the trusted ones.
 
-    The noise is that of :func:`pendmap.noise_floor`, by its law where it grows with speed. With few
-    samples a period it is the residual of a pendulum's swings, if that is less. It is at least that
-    of the count, ``count / sqrt(12)``. ``sigma`` and ``count`` (rad) are estimated unless they are
-    given.
+    The noise is that of :func:`pendmap.noise_floor`, with its growth with speed if any. With few
+    samples per period it is the residual of fitted pendulum swings, if that is less. It is at least
+    ``count / sqrt(12)``. ``sigma`` and ``count`` (rad) are estimated unless they are given.
     """
     if count is None:
         count = step_of(theta)
@@ -77,7 +75,7 @@ def reading_of(
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
         use = np.ones(time.size, bool) if trusted is None else trusted
         if known and is_coarse(time[use], theta[use]):
-            # A polynomial cannot follow a swing with few samples: its residual is motion.
+            # With few samples the residual of a polynomial contains motion.
             left = coarse_finder(time[use], theta[use], None).sigma
             if left < sigma:
                 sigma, law = left, None
@@ -92,9 +90,9 @@ def reading_of(
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
-    """Return a run as the fit takes it.
+    """Return a run in the format of a fit.
 
-    Times count from the first sample; under a drive from 0, for its phase.
+    Times are relative to the first sample, except under a drive, for its phase.
     """
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
     pivot = None
@@ -118,7 +116,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
 
 
 def as_angles(run: Run) -> NDArray[np.float64]:
-    """Return a run's angles; of a sensor on the rod the readings over the gain of small swings."""
+    """Return a run's angles; for a sensor on the rod, readings over the gain of small swings."""
     return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 
 
@@ -130,7 +128,7 @@ def reading_of_run(run: Run) -> Reading:
     found = reading_of(time, as_angles(run), trusted=run.trusted)
     law = found.law
     if law is not None and run.gyroscope is not None:
-        # The error of a late reading of a rate is proportional to the acceleration.
+        # The error of a rate by jitter is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
     return dataclasses.replace(found, law=law, gain=abs(sensor.gain), unit=sensor.unit)
 

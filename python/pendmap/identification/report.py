@@ -1,4 +1,4 @@
-"""The result of an identification, as text and as JSON."""
+"""Result of an identification, with its text and JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 DRAG: Final = "quadratic_drag"
-"""Effect that is tried unasked where viscous damping and friction do not explain a record."""
+"""Effect that is tried by default if viscous damping and friction do not explain a record."""
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",
@@ -32,35 +32,36 @@ COLUMNS: Final = {
     "theta_r": "theta_r (rad)",
     "offset": "offset (rad)",
 }
-"""Columns of the table of methods and their heads; effects' parameters follow."""
+"""Columns of the table of methods and their headers; effects' parameters follow."""
 
 STILL: Final = "in which nothing moves"  # Description of a run without motion
 
 PEAKS: Final = "of peaks alone"  # Description of a run of turning points
 
-COPY: Final = "that copies another"  # Description of a run whose readings count in another one
+COPY: Final = "that copies another"  # Description of a run that duplicates another one
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class IdentificationReport(Readable):
-    """Results of every method on an experiment.
+    """Results of several methods for an experiment.
 
     Parameters
     ----------
     experiment : Experiment
         The records.
     run : Run
-        The free decay that the methods of peaks read, and that is drawn.
+        Free decay used by the methods of peaks and in figures.
     peaks : Peaks
-        Its peaks.
+        Peaks of this run.
     methods : mapping of str to Identification
-        By method, the best one first.
+        Results by method, the best one first.
     joint : JointFit or None
-        Fit by the trajectory method; none where it was not asked for or cannot be applied.
+        Fit by the trajectory method; None if it was not requested or cannot be applied.
     table : Table1
         Table 1 and figure 7 of the decay.
     with_drag : JointFit or None
-        Fit with quadratic drag, where ``joint`` does not reach the noise and no effect was asked.
+        Fit with quadratic drag, if the residual of ``joint`` exceeds the noise and no effects were
+        given.
     """
 
     experiment: Experiment
@@ -83,12 +84,12 @@ class IdentificationReport(Readable):
 
     @property
     def sound(self) -> Identification | None:
-        """First method that could be applied and whose search converged; None without."""
+        """Result of the first method that is applicable and converged; None if there is none."""
         return next((found for found in self.methods.values() if found.sound), None)
 
     @property
     def best(self) -> Identification:
-        """Method of :attr:`sound`; InputError is raised if there is none."""
+        """Result of :attr:`sound`; InputError is raised if there is none."""
         if self.sound is not None:
             return self.sound
         lost = [name for name, found in self.methods.items() if not found.converged]
@@ -102,12 +103,12 @@ class IdentificationReport(Readable):
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """Every run that a method read."""
+        """Runs used by any method."""
         return (self.run,) if self.joint is None else self.joint.runs
 
     @property
     def passed_over(self) -> str:
-        """The better method that the best one replaces, and why; else empty."""
+        """Text on the preferred method that failed, with the reason; empty if none failed."""
         first = next(iter(self.methods.values()))
         if first.sound or self.sound is None:
             return ""
@@ -116,7 +117,7 @@ class IdentificationReport(Readable):
 
     @property
     def model(self) -> Rig:
-        """The pendulum that the best method found, with its effects."""
+        """Model of the best method, with its effects."""
         best = self.best
         if best.model is not None:
             return best.model
@@ -124,7 +125,7 @@ class IdentificationReport(Readable):
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
-    """Return how many runs of an experiment were read and which were not; empty if all were."""
+    """Return the text on the runs that were used and not used; empty if all were used."""
     reasons: dict[str, int] = {}
     held_too = any(each.hold_out for each in read)
     for run in experiment.runs:
@@ -133,7 +134,7 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
         if run.copied:
             why = COPY
         elif run.kind == "forced":
-            # Where runs held out are read too, being held out is no reason.
+            # If held-out runs are used too, being held out is no reason.
             why = "held out" if run.hold_out and not held_too else "forced"
         elif run.peaks_only and not run.hold_out:
             why = PEAKS
@@ -192,7 +193,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
 
 
 def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
-    """Return the runs that a method read; rms and noise are those of the joint fit."""
+    """Return the JSON objects of the runs used; rms and noise are those of the joint fit."""
     entries: list[dict[str, Any]] = []
     for k, run in enumerate(report.runs):
         time, joint = run.time[run.trusted], report.joint
@@ -227,7 +228,7 @@ def _method(found: Identification) -> dict[str, Any]:
 
 
 def _drag(report: IdentificationReport) -> Iterator[str]:
-    """Yield the gain by quadratic drag, where it was tried."""
+    """Yield the line on the gain by quadratic drag, if it was fitted."""
     if report.with_drag is None or report.joint is None:
         return
     drag = report.with_drag.fit
@@ -240,7 +241,7 @@ def _drag(report: IdentificationReport) -> Iterator[str]:
 
 
 def as_text(report: IdentificationReport) -> Iterator[str]:
-    """Yield the lines beside the tables: doubts first, then intervals, warnings, findings."""
+    """Yield the lines printed with the tables: doubts, intervals, warnings, findings."""
     for text in foremost(report):
         yield f"Warning: {text}"
     best = report.sound
@@ -264,13 +265,13 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
 
 
 def foremost(report: IdentificationReport) -> list[str]:
-    """Return doubts about the records, and which method another replaces."""
+    """Return doubts about the records, and the text on a preferred method that failed."""
     first = doubts(report.experiment, *report.runs)
     return [*first, report.passed_over] if report.passed_over else first
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
-    """Return heads and rows of the table of methods."""
+    """Return header and rows of the table of methods."""
     best = report.sound
     extra = [] if best is None else [n for n in best.estimates if n not in COLUMNS]
     names = [*COLUMNS, *extra]
@@ -285,7 +286,7 @@ def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[st
 
 
 def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:
-    """Return heads and rows of table 1: percent errors of each method's simulation."""
+    """Return header and rows of table 1: percent errors of each method's simulation."""
     rows = []
     for name, errors in report.table.errors.items():
         each = [percent(row.errors[name]) or "at rest" for row in report.table.rows]

@@ -1,4 +1,4 @@
-"""Records as a fit takes them, and as the core does, which counts time in ``1 / w0``."""
+"""Records in the format of a fit, and in that of the core, with time in units of ``1 / w0``."""
 
 from __future__ import annotations
 
@@ -19,71 +19,71 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 FORCED_WINDOW_SWINGS: Final = 3.0
-"""Longest window of a forced run, periods of small swings: chaos amplifies errors of a state."""
+"""Longest window of a forced run, periods of small swings: chaos amplifies initial errors."""
 
 EXACTNESS: Final = 1e-6
-"""Integrator's error allowed a step, over the smallest standard error of a reading."""
+"""Integrator's error per step, over the smallest standard error of a reading."""
 
 SHARPEST: Final = 0.1
-"""Least noise before the rounding, over a count: without noise readings would be hard walls."""
+"""Least noise before rounding, over a count: without noise the likelihood is discontinuous."""
 
 TOLERANCES: Final = (1e-13, 1e-8)
-"""Least and greatest error a step that the integrator is asked for."""
+"""Least and greatest error per step that the integrator is set to."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pivot:
-    """A recorded motion of the pivot."""
+    """Recorded motion of the pivot."""
 
     time: NDArray[np.float64]  # s, on the clock of the run, increasing
     vertical: NDArray[np.float64] | None = None  # shape (n,), upward: m/s^2, m/s or m
-    horizontal: NDArray[np.float64] | None = None  # likewise, toward positive theta
+    horizontal: NDArray[np.float64] | None = None  # shape (n,), toward positive theta
     quantity: str = "acceleration"  # or velocity, position
 
 
 @dataclasses.dataclass(frozen=True)
 class RodSensor:
-    """A gyroscope or accelerometer on the rod, whose readings a fit compares instead of angles.
+    """Gyroscope or accelerometer on the rod, whose readings are fitted instead of angles.
 
     A gyroscope reads ``rate th' + bias``, an accelerometer ``place (th'' cos(tilt) + th'**2
-    sin(tilt)) + gravity sin(th + tilt) + bias``; ``bias`` and ``tilt`` are fitted. Where friction
-    changes its sign, at every turn, ``th''`` jumps by ``2 Tr`` and the reading by ``2 place Tr``:
-    the reading whose interval of sampling holds the turn has a share of it. While friction holds
-    the pendulum, ``th''`` is 0.
+    sin(tilt)) + gravity sin(th + tilt) + bias``; ``bias`` and ``tilt`` are fitted. At every turning
+    point friction changes sign, ``th''`` jumps by ``2 Tr`` and the reading by ``2 place Tr``: the
+    reading whose sampling interval includes the turning point has a share of the jump. While
+    friction holds the pendulum, ``th''`` is 0.
     """
 
-    angle: NDArray[np.float64]  # rad, shape (n,): where the search starts
-    rate: float = 0.0  # reading per rad/s; 0 of an accelerometer
-    place: float = 0.0  # reading per rad/s^2; 0 of a gyroscope
-    gravity: float = 0.0  # reading of all of gravity; 0 where the sensor shows none
+    angle: NDArray[np.float64]  # initial guess of the angle, rad, shape (n,)
+    rate: float = 0.0  # reading per rad/s; 0 for an accelerometer
+    place: float = 0.0  # reading per rad/s^2; 0 for a gyroscope
+    gravity: float = 0.0  # reading of full gravity; 0 if the sensor does not measure it
     unit: float = 1.0  # unit of a bias over the unit of the readings
-    leans: bool = True  # whether its axis has a tilt
+    leans: bool = True  # whether the tilt of the axis is fitted
 
 
 @dataclasses.dataclass(frozen=True)
 class FitRun:
-    """A record to be fitted; arrays have the shape (n,)."""
+    """Record to be fitted; arrays have the shape (n,)."""
 
-    time: NDArray[np.float64]  # s, increasing; the drive's phase counts from time 0
-    theta: NDArray[np.float64]  # reading, rad unwrapped; of a rod sensor in its own unit
+    time: NDArray[np.float64]  # s, increasing; the drive's phase is that at time 0
+    theta: NDArray[np.float64]  # reading, rad unwrapped; of a rod sensor over its gain
     sigma: float | NDArray[np.float64]  # standard error with rounding, rad, above 0
-    trusted: NDArray[np.bool_] | None = None  # samples that count; None: all
+    trusted: NDArray[np.bool_] | None = None  # included samples; None: all
     drive: Mapping[str, float | None] | None = None  # p, Omega (rad/s), phi (rad; may be unknown)
-    pivot: Pivot | None = None  # a recorded motion instead of a drive
+    pivot: Pivot | None = None  # recorded motion instead of a drive
     lab_time_s: float = 0.0  # laboratory time at time 0, for drifts
     longest_s: float | None = None  # longest window, s; None: all, or 3 swings if forced
     name: str = ""
     rod_sensor: RodSensor | None = None  # effects on the reading do not act on it
-    count: float | None = None  # sensor's step, rad, where readings are intervals
+    count: float | None = None  # sensor's step, rad, if readings are intervals
 
     @property
     def angle(self) -> NDArray[np.float64]:
-        """Angle, rad; of a sensor on the rod the one that was computed from its readings."""
+        """Angle, rad; for a sensor on the rod the one computed from its readings."""
         return self.theta if self.rod_sensor is None else self.rod_sensor.angle
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """Samples that count."""
+        """Mask of the included samples."""
         return np.ones(self.time.shape, bool) if self.trusted is None else self.trusted
 
     @property
@@ -98,7 +98,7 @@ class FitRun:
 
 
 def rig_of(run: FitRun, model: Rig) -> Rig:
-    """Return the pendulum of one run, with its drive and its time in the laboratory."""
+    """Return the model with a run's drive and laboratory time."""
     drive = {"p": 0.0, "Omega": 0.0, "phi": 0.0}
     if run.drive is not None:
         drive |= {name: value or 0.0 for name, value in run.drive.items()}
@@ -107,7 +107,7 @@ def rig_of(run: FitRun, model: Rig) -> Rig:
 
 
 def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
-    """Return a run as the core takes it."""
+    """Return a run in the core's format."""
     time = _floats("time", run.time)
     theta = _floats("theta", run.theta)
     sigma = run.sigmas
@@ -136,21 +136,21 @@ def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
     sensor = run.rod_sensor
     if sensor is None:
         return None
-    # The pivot's motion does not enter a rate, but an acceleration.
+    # The pivot's motion does not affect a rate, but it affects an acceleration.
     if run.forced and (sensor.place or sensor.gravity):
         raise InputError(f"{run.name or 'run'}: an accelerometer on a moving pivot is not fitted")
     return {
         "rate": float(units.given(sensor.rate, 1)),
         "place": float(units.given(sensor.place, 2)),
         "gravity": sensor.gravity,
-        # A reading is the mean over an interval of sampling.
+        # A reading is the mean over a sampling interval.
         "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
         "angle": _floats("angle", sensor.angle),
     }
 
 
 def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
-    # Lengths in g / w0^2: then accelerations are over gravity.
+    # Lengths are in units of g / w0^2, so that accelerations are in units of gravity.
     powers = {"acceleration": 0, "velocity": 1, "position": 2}
     if pivot.quantity not in powers:
         raise InputError(
@@ -179,11 +179,11 @@ def _floats(what: str, values: object) -> NDArray[np.float64]:
 def bare_windows(
     windows: Sequence[tuple[int, int, int, float, float]], units: Units
 ) -> list[tuple[int, int, int, float, float]]:
-    """Return windows as the core takes them."""
+    """Return windows in the core's format."""
     return [(r, a, b, theta, units.bare(v, 1)) for r, a, b, theta, v in windows]
 
 
 def tolerance_of(runs: Sequence[FitRun]) -> float:
-    """Return the error that the integrator may make in a step."""
+    """Return the integrator's tolerance per step."""
     smallest = min(float(np.min(run.sigma)) for run in runs)
     return float(np.clip(EXACTNESS * smallest, *TOLERANCES))

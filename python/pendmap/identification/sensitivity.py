@@ -1,4 +1,4 @@
-"""Derivatives of each reading by parameters, those of the initial states projected out."""
+"""Sensitivities of readings to parameters, orthogonal to those to the initial states."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-STATE: Final = 2  # Columns of an initial state
+STATE: Final = 2  # Number of columns of an initial state
 
 FOLLOWED: Final = 1e-6
-"""Part of a column below which its remainder after the projection is rounding: set to 0."""
+"""Norm after the projection, relative to before, below which a column is rounding, set to 0."""
 
 BLIND: Final = 1e-11
-"""Relative size below which a direction of the initial state does not change the readings."""
+"""Relative norm below which a direction of the initial state does not affect the readings."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives over the standard errors, a row a sample that counts, states projected out."""
+    """Derivatives over standard errors of included samples, orthogonal to initial states."""
 
     names: tuple[str, ...]  # parameters, as in a fit
     columns: Floats  # shape (n, k), by the parameters in SI
@@ -43,7 +43,7 @@ class Sensitivities:
 
 @dataclasses.dataclass(frozen=True)
 class WindowSlopes:
-    """Derivatives in one window over the standard errors; rows of zeros do not count."""
+    """Derivatives in one window over the standard errors; rows of excluded samples are zero."""
 
     run: int
     first: int  # first sample
@@ -53,10 +53,10 @@ class WindowSlopes:
     weight: Floats  # shape (n,), one over the standard error, or its substitute
 
     def columns_as_in(self, other: WindowSlopes) -> Floats:
-        """Return the columns with the weights of the same window of another pass.
+        """Return the columns with the weights of ``other``, the same window of another fit.
 
-        The weight of a reading that is an interval depends on the motion; that of two passes
-        differs slightly, but by more than the differences between columns.
+        The weights of interval readings depend on the motion; between two fits they differ
+        slightly, but by more than the columns.
         """
         ratio = np.divide(
             other.weight, self.weight, out=np.zeros_like(self.weight), where=self.weight > 0
@@ -64,7 +64,7 @@ class WindowSlopes:
         return np.asarray(self.columns * ratio[:, None], np.float64)
 
     def freed(self, further: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return columns, further ones and residual where they count, the state projected out."""
+        """Return columns, further ones and residual orthogonal to the state, without zero rows."""
         counted = self.states.any(axis=1) | self.columns.any(axis=1)
         basis = _basis(self.states[counted])
 
@@ -80,7 +80,7 @@ class WindowSlopes:
 def window_slopes(
     fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
 ) -> tuple[tuple[str, ...], list[WindowSlopes]]:
-    """Return the parameters' names and the derivatives window by window."""
+    """Return the parameters' names and the derivatives in each window."""
     from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
 
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
@@ -105,13 +105,13 @@ def sensitivities(
 ) -> Sensitivities:
     """Return the derivatives by a fit's parameters and by further ones, ``candidates``.
 
-    ``model`` is the fit's, with the candidates' effects in it.
+    ``model`` is the fit's model with the candidates' effects added.
     """
     return freed_together(*window_slopes(fit, runs, candidates, model))
 
 
 def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> Sensitivities:
-    """Return the derivatives of all windows, initial states projected out."""
+    """Return the derivatives of all windows, orthogonal to the initial states."""
     parts = [window.freed(window.columns[:, :0]) for window in windows]
     columns, _, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
     run = np.repeat([window.run for window in windows], [len(own) for _, _, own in parts])
@@ -119,12 +119,12 @@ def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> S
 
 
 def lengths(columns: Floats) -> Floats:
-    """Return the length of each column, in one pass through the rows as they are stored."""
+    """Return the norm of each column, in one pass through the rows in memory order."""
     return np.asarray(np.sqrt(np.einsum("n...,n...->...", columns, columns)), np.float64)
 
 
 def _basis(states: Floats) -> Floats:
-    """Return an orthonormal basis of the changes that the initial state can make."""
+    """Return an orthonormal basis of the derivatives by the initial state."""
     sizes = np.linalg.norm(states, axis=0)
     seen = states[:, sizes > BLIND * max(float(sizes.max(initial=0.0)), 1e-300)]
     if not seen.size:

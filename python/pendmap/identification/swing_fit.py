@@ -1,4 +1,4 @@
-"""Peaks and crossings from few samples each: fits of a pendulum's own swings, some together."""
+"""Fits of pendulum swings around peaks and crossings with few samples, in blocks of turns."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 BLOCK: Final = 12
-"""Turns in a row that share their form: ``w0^2``, both dampings and the rest position."""
+"""Consecutive turns that share ``w0^2``, both dampings and the rest position."""
 _ROUNDS: Final = 12  # Most Gauss-Newton steps
-_SETTLED: Final = 6  # Rounds after which no more samples are left out
-_LOSS: Final = 4  # Turns from which the loss of a swing is estimated
-_OUTLIER: Final = 5.0  # Standard deviations beyond which a sample is left out
-_DOUBT: Final = 3.0  # Standard errors of a block's noise beyond which its misfit is the form's
-_NORMAL_MAD: Final = 0.674489750196
+_SETTLED: Final = 6  # Iteration after which no more outliers are excluded
+_LOSS: Final = 4  # Number of turns above which their damping is estimated
+_OUTLIER: Final = 5.0  # Standard deviations beyond which a sample is excluded
+_DOUBT: Final = 3.0  # Standard errors of a block's noise above which the model misfits
+_NORMAL_MAD: Final = 0.674489750196  # Median absolute deviation of a standard normal variable
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,12 +32,12 @@ class SwingFit:
 
     instant: Floats  # s, shape (W,)
     state: Floats  # angle at a turn, rad, or velocity at a crossing, rad/s
-    stderr_instant: Floats  # of the noise, the shared form, and its misfit
+    stderr_instant: Floats  # from the noise, the shared parameters, and the misfit, s
     stderr_state: Floats
-    form: Floats  # w0^2, c_over_m, Tr, zero: (W, 4), alike in a block
+    form: Floats  # w0^2, c_over_m, Tr, zero: (W, 4), equal within a block
     form_covariance: Floats  # shape (W, 4, 4)
-    sigma: float  # noise of a sample, rad, as given or fitted
-    factor: Floats  # noise of each block over sigma: above 1 by the form's misfit
+    sigma: float  # noise of a sample, rad, given or estimated
+    factor: Floats  # noise of each block over sigma, above 1 if the model misfits
 
 
 def fit_swings(
@@ -47,14 +47,14 @@ def fit_swings(
     sigma: float | None = None,
     known: SwingFit | None = None,
 ) -> SwingFit:
-    """Fit instants and states of all windows, and the form that each block of them shares.
+    """Fit instants and states of all windows, and the form (parameters) shared by each block.
 
-    Least squares by Gauss and Newton. Within a block of 12 turns each has its instant and its
-    state; the form is common, held by wide priors (10 % of ``w0^2``, the damping that turns show
-    give or take all of it) where a few swings do not determine it. Blocks are independent: a
-    damping of any law shows as forms that change. Samples 5 standard deviations off are left out.
-    ``start`` has instants (W,), states (W,) and forms (W, 4). ``sigma``, rad, is by default that of
-    the quiet half of the blocks. ``known`` forms are not fitted, and count with their errors.
+    Gauss-Newton least squares. Each turn has its instant and state; a block of 12 turns has a
+    common form, with wide priors (10 % of ``w0^2``, 100 % of the damping estimated from amplitudes)
+    in case a few swings do not determine it. Blocks are independent, so any law of damping is
+    represented by varying forms. Samples beyond 5 standard deviations are excluded. ``start`` has
+    instants (W,), states (W,) and forms (W, 4). ``sigma``, rad, is by default that of the half of
+    the blocks with the least noise. ``known`` forms are not fitted; their errors are propagated.
     """
     instant, state, form = (part.copy() for part in start)
     edges = np.linspace(0, instant.size, max(round(instant.size / BLOCK), 1) + 1).round()
@@ -91,10 +91,10 @@ def fit_swings(
 def _prior(
     instant: Floats, state: Floats, form: Floats, blocks: list[slice]
 ) -> tuple[Floats, Floats]:
-    """Return where the form is held, and its standard deviations, a row a window.
+    """Return mean and standard deviation of the form's prior, one row per window.
 
-    Damping is held about what the turns of a block lose; how that is shared between ``c_over_m``
-    and ``Tr`` is left open.
+    The mean damping is that of the block's amplitudes, all viscous; the standard deviations allow
+    any division between ``c_over_m`` and ``Tr``.
     """
     centre, wide = form.copy(), np.empty(form.shape)
     for block in blocks:
@@ -152,8 +152,8 @@ def _step(
 ) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
     """Return the Gauss-Newton step, (W, 6), and the parts of the covariance for unit noise.
 
-    The parts, a row a window: ``(L'L)^-1`` of the local unknowns, their derivatives by the form,
-    and its inverse normal matrix.
+    The parts, one row per window: ``(L'L)^-1`` of instant and state, their derivatives by the form,
+    and the form's inverse normal matrix.
     """
     local, shared, residual = rows
     across = np.swapaxes(local, 1, 2)
@@ -173,7 +173,7 @@ def _step(
         normal = np.einsum("wmi,wmj->ij", free[block], free[block]) + np.diag(hold)
         pull = np.einsum("wmi,wm->i", free[block], left[block])
         pull += hold * (centre[block][0] - form[block][0])
-        # Parameters differ by orders of magnitude: the matrix is scaled to be invertible.
+        # Parameters differ by orders of magnitude: scale the matrix before inversion.
         unit = 1 / np.sqrt(np.diag(normal))
         solved = np.linalg.pinv(normal * np.outer(unit, unit), hermitian=True) * np.outer(
             unit, unit
@@ -185,7 +185,7 @@ def _step(
 
 
 def _scales(residual: Floats, used: NDArray[np.bool_], blocks: list[slice]) -> Floats:
-    """Return a robust noise of each block's samples, rad, shape (W,)."""
+    """Return a robust estimate of each block's noise, rad, shape (W,)."""
     scale = np.ones(residual.shape[0])
     for block in blocks:
         some = np.abs(residual[block][used[block]])
@@ -230,7 +230,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     shared = form_inverse * scale[:, None, None] if known is None else known.form_covariance
     covariance = inverse * scale[:, None, None] + follows @ shared @ np.swapaxes(follows, 1, 2)
     error = np.sqrt(np.maximum(np.einsum("wii->wi", covariance), 0.0))
-    # Too few samples determine nothing.
+    # Windows with too few samples are undetermined.
     open_ = points < 2  # noqa: PLR2004 (instant and state)
     error[open_] = np.inf
     return SwingFit(instant, state, error[:, 0], error[:, 1], form, shared, sigma, factor)
@@ -240,7 +240,7 @@ FORM: Final = 4
 """Parameters of the form: ``w0^2``, ``c_over_m``, ``Tr`` and the rest position ``zero``."""
 
 _STEPS: Final = 20
-"""Steps of a window's half: over 2.5 rad of phase angles are then wrong by 1e-5 rad at most."""
+"""Runge-Kutta steps per half window: the error over 2.5 rad of phase is at most 1e-5 rad."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -249,9 +249,9 @@ class Windows:
 
     time: Floats  # s, shape (W, M)
     theta: Floats  # rad
-    used: NDArray[np.bool_]  # which samples there are: rows differ in length
-    crossing: NDArray[np.bool_]  # crossing of zero or turn, shape (W,)
-    held: NDArray[np.bool_]  # whether held before the turn
+    used: NDArray[np.bool_]  # False for padding of shorter rows and excluded samples
+    crossing: NDArray[np.bool_]  # True for a zero crossing, False for a turn, shape (W,)
+    held: NDArray[np.bool_]  # whether the pendulum is held before the turn
     side: Floats  # sign of the turn, or of the velocity at the crossing
 
     @classmethod
@@ -264,7 +264,7 @@ class Windows:
         crossing: bool = False,
         held: bool = False,
     ) -> Windows:
-        """Take the samples within spans of time; ``held`` applies to the first."""
+        """Return windows with the samples within spans of time; ``held`` applies to the first."""
         t, x = record
         edges = [np.searchsorted(t, (low, high + 1e-9 * (high - low))) for low, high in spans]
         first = np.array([e[0] for e in edges], np.intp)
@@ -282,8 +282,8 @@ def curves(windows: Windows, instant: Floats, state: Floats, form: Floats) -> tu
     """Return angle (rad) and velocity (rad/s) at the samples of windows, shape (W, M).
 
     Each window's curve solves ``th'' + c_over_m th' + Tr sgn(th') + w0^2 sin(th - zero) = 0`` from
-    its instant on to both sides; ``sgn(th')`` is that of the half cycle on each side, so windows
-    must end before the next turn. ``state`` is the angle at a turn or the velocity at a crossing.
+    its instant to both sides; ``sgn(th')`` is that of the half cycle on each side, so windows must
+    end before the next turn. ``state`` is the angle at a turn or the velocity at a crossing.
     """
     lag = np.where(windows.used, windows.time - instant[:, None], 0.0)
     angle, speed = np.empty(lag.shape), np.empty(lag.shape)
@@ -307,7 +307,7 @@ def _acceleration(x: Floats, v: Floats, sign: Floats, form: Floats) -> Floats:
 def _integrated(
     begin: tuple[Floats, Floats], step: Floats, sign: Floats, form: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return angle, velocity, acceleration, (W, steps + 1), by the Runge-Kutta method."""
+    """Return angle, velocity, acceleration, (W, steps + 1), by the classical Runge-Kutta method."""
     x, v = begin
     rows = [(x, v, _acceleration(x, v, sign, form))]
     for _ in range(_STEPS):
@@ -328,7 +328,7 @@ def _integrated(
 def _between(
     path: tuple[Floats, Floats, Floats], at: Floats, step: Floats
 ) -> tuple[Floats, Floats]:
-    """Return angle and velocity between the steps, by cubics through values and slopes."""
+    """Return angle and velocity between the steps by cubic Hermite interpolation."""
     angle, speed, bend = path
     low = np.minimum(at.astype(np.intp), _STEPS - 1)
     s = at - low

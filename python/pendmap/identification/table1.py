@@ -1,4 +1,4 @@
-"""The paper's table 1 and figure 7: errors of each model's simulation against a record's peaks."""
+"""Table 1 and figure 7 of the paper: errors of simulated periods and peaks against a record's."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 PERIODS: Final = (0.26, 1.54)
-"""Periods of the paper's table, s; the shortest one of a slower rig stands for the first."""
+"""Periods of the paper's table, s; on a slower rig the first is that of small swings."""
 PEAKS: Final = (1.2, 2.53)  # Peaks of the paper's table, rad
 
 ROUGH: Final = (
     "no errors of periods and peaks: the angle is made of an acceleration, too roughly to judge a "
     "model; the residual of the acceleration does"
 )
-"""Why a record of an acceleration alone has no table."""
+"""Reason why a record of an acceleration alone has no table."""
 
-_SAME: Final = 1e-9  # Interval below which events are one, s
+_SAME: Final = 1e-9  # Interval below which events are identical, s
 
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """Start of a simulation: time (s), angle (rad, as recorded) and velocity (rad/s)."""
+    """Initial state of a simulation: time (s), recorded angle (rad) and velocity (rad/s)."""
 
     time: float
     theta: float
@@ -47,16 +47,16 @@ class State:
 
 @dataclasses.dataclass(frozen=True)
 class PeakErrors:
-    """Figure 7 for one model; errors are simulation minus measurement over measurement, percent.
+    """Figure 7 for one model: relative errors of simulated periods and peaks, percent.
 
     Parameters
     ----------
     method : str
         Name of the model.
     period_time, period, period_error : array, shape (Q,)
-        Begin of each full cycle (s), measured length (s), error; NaN where the simulation rests.
+        Start of each full cycle (s), measured period (s), error; NaN if the simulation is at rest.
     peak_index, peak, peak_error : array, shape (P,)
-        Number of each peak, its measured size (rad), and the error.
+        Number of each peak, its measured amplitude (rad), and the error.
     """
 
     method: str
@@ -80,21 +80,21 @@ class PeakErrors:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """A row of table 1."""
+    """Row of table 1."""
 
     what: str  # period or peak
     asked: float  # value in the paper's table, s or rad
     measured: float  # nearest value in this record
-    errors: Mapping[str, float]  # by method, absolute, percent; NaN where the simulation rests
+    errors: Mapping[str, float]  # absolute errors by method, percent; NaN if at rest
 
 
 @dataclasses.dataclass(frozen=True)
 class Table1:
-    """Table 1 of a record, and figure 7 behind it.
+    """Table 1 of a record, with the data of figure 7.
 
-    Rows that fall on the same measured value are one, and none falls on the peak that simulations
-    start from. ``left_out`` says why there is none although there are peaks; else it is empty.
-    ``lost`` has the reason, by method, where a model cannot be run from the first peak.
+    Rows have different measured values, none the peak at which simulations start. ``left_out`` is
+    the reason why a record with peaks has no table, or empty. ``lost`` has the reason, by method,
+    why a model cannot be simulated from the first peak.
     """
 
     rows: tuple[Row, ...]
@@ -109,21 +109,18 @@ def _rms(errors: Floats) -> float:
 
 
 def first_state(peaks: Peaks) -> State:
-    """Return the state from which models are simulated: the first peak, at rest.
-
-    It is the release where the record shows it; else no sample gives a velocity as precisely.
-    """
+    """Return the initial state of simulations, the first peak, at which the velocity is zero."""
     turned = peaks.turned
     return State(float(turned.time[0]), float(turned.amplitude[0]), 0.0)
 
 
 def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Floats]:
-    """Return times (s) and angles (rad) of the peaks that a model has from a state on."""
+    """Return times (s) and angles (rad) of a model's peaks after an initial state."""
     run = simulate(rig, start.theta, start.velocity, max(until - start.time, 1e-3), samples=1)
     kinds = run["event_kind"].values
     turned = np.isin(kinds, ("turn", "stick", "stuck for ever"))
     times, angles = run["event_time"].values[turned], run["event_theta"].values[turned]
-    # A lasting stop is two events: its begin, and its confirmation.
+    # A permanent stop has two events: its start and its confirmation.
     new = np.concatenate(([True], np.diff(times) > _SAME)) if times.size else np.empty(0, bool)
     times, angles = times[new], angles[new]
     if start.velocity == 0 and (times.size == 0 or times[0] > _SAME):
@@ -136,8 +133,8 @@ def peak_errors(
 ) -> PeakErrors:
     """Return the errors of a model's simulation from ``start``, the first of ``peaks``.
 
-    ``start`` is as recorded: the zero error that was found is subtracted. ``offset`` is that of
-    ``peaks`` where it is another, rad.
+    The identified zero error is subtracted from the recorded ``start``. ``offset`` is the zero
+    error of ``peaks``, rad, if it differs.
     """
     zero = found["offset"] if "offset" in found.estimates else 0.0
     shown = zero if offset is None else offset
@@ -149,7 +146,7 @@ def peak_errors(
 
 
 def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakErrors:
-    """Compare simulated peaks (s, rad, as the sensor reads them) with measured ones by number."""
+    """Return errors of simulated peaks (s, rad, with the sensor's errors), matched by number."""
     turned = peaks.turned
     number = turned.index - turned.index[0]
     made_time, made = (np.full(int(number[-1]) + 1, math.nan) for _ in range(2))
@@ -179,20 +176,20 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
-    """Simulate what each method found from the record's first peak, and compare.
+    """Compare simulations of identified models from the first peak with a record.
 
     Parameters
     ----------
     time, theta : array, shape (N,)
-        s, and rad from the downward rest, unwrapped.
+        Times, s, and angles from the downward rest, rad, unwrapped.
     identifications : mapping of str to Identification
-        As for :func:`pendmap.identification.identify`; those that are not applicable are left out.
+        Results of :func:`pendmap.identification.identify`; inapplicable ones are ignored.
     sigma : float, optional
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional
         Samples that may be used.
     periods, peaks : sequence of float
-        Rows: the measured period (s) and peak (rad) nearest to each.
+        Rows of the table: the measured period (s) or peak (rad) nearest to each is used.
 
     Returns
     -------
@@ -213,7 +210,7 @@ def table_of(
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
-    """Return table 1 of peaks that are known; see :func:`table1`."""
+    """Return table 1 of given peaks; see :func:`table1`."""
     if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
     start = first_state(found)
@@ -227,7 +224,7 @@ def table_of(
             lost[name] = str(error)
     rows = [_row("period", asked, errors) for asked in periods]
     rows += [_row("peak", asked, errors) for asked in peaks]
-    # One measured value may be nearest to several asked ones.
+    # One measured value may be nearest to several values of the paper.
     told: dict[tuple[str, float], Row] = {}
     for row in rows:
         if row is not None:
@@ -236,24 +233,24 @@ def table_of(
 
 
 def table_of_run(run: Run, found: Peaks, identifications: Mapping[str, Identification]) -> Table1:
-    """Return table 1 of a run; empty where its angle was not measured."""
+    """Return table 1 of a run; empty if its angle was computed from an acceleration."""
     if run.accelerometer is not None:
         return Table1((), {}, ROUGH)
     return table_of(found, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
-    """Return the row of the value nearest to ``asked``, None where no model has any."""
+    """Return the row of the measured value nearest to ``asked``; None if there is none."""
     column, measured = {}, math.nan
     for name, each in errors.items():
         peak = what == "peak"
         there, wrong = (each.peak, each.peak_error) if peak else (each.period, each.period_error)
         if there.size == 0:
             return None
-        # An asked period below all measured ones would select the last, noisiest ones.
+        # A period below all measured ones would select the last, noisiest ones.
         least = -math.inf if peak else float(np.median(there[there.size // 2 :]))
         near = int(np.argmin(np.abs(there - max(asked, least))))
-        if peak and near == 0:  # where the simulation starts: it has no error there
+        if peak and near == 0:  # the simulation starts there, without error
             return None
         measured, column[name] = float(there[near]), abs(float(wrong[near]))
     return Row(what, asked, measured, column) if column else None

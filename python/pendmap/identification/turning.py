@@ -1,4 +1,4 @@
-"""Turns of a record, roughly; its two ends (release and stop); starting values from half swings."""
+"""Approximate turning points of a record, its release and stop, and starting values of a fit."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_SMOOTHING: Final = 0.1  # Half width of the running mean over the period
-_SURE: Final = 6.0  # Standard errors by which the angle must come back for a turn to count
-_FEWEST: Final = 8  # Samples that a record must have
-_GAP: Final = 10.0  # Pause in samples that is a gap, before the period is known
+_SMOOTHING: Final = 0.1  # Half-width of the running mean, periods
+_SURE: Final = 6.0  # Least return of the angle after a turn, standard errors
+_FEWEST: Final = 8  # Fewest samples of a record
+_GAP: Final = 10.0  # Shortest gap, sampling intervals, before the period is known
 
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The rough course of a record of N samples."""
+    """Outline of a record of N samples: approximate turns, period and rest."""
 
-    turns: NDArray[np.intp]  # samples at turns of the smoothed angle; tops and bottoms alternate
-    period: float  # of the late swings, s
+    turns: NDArray[np.intp]  # samples at turns of the smoothed angle, alternately maxima and minima
+    period: float  # period of the late swings, s
     smooth: Floats  # running mean of the angle, rad, shape (N,)
     noise: float  # standard error of smooth, rad
-    rest: int | None  # sample from which the record rests
+    rest: int | None  # first sample of the final rest
     left: int  # first sample that is off the initial level
 
 
 def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
-    """Find the turns of a record by hysteresis, first of the raw, then of the smoothed angle.
+    """Return the turns of a record by hysteresis, first of the raw, then of the smoothed angle.
 
-    None is returned of fewer than two turns.
+    Returns None for fewer than two turns.
     """
     if time.size < _FEWEST:
         return None
@@ -61,7 +61,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     # The median of five has slightly more noise than the mean.
     noise = 1.2 * max(sigma, 1e-9 * span) / math.sqrt(count)
     gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
-    # Near the end the mean is over ever fewer samples: its turns there are noise.
+    # Near the end the mean has fewer samples: its turns there are noise.
     ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
     turns = zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
     turns = _far_apart(turns, time, period)
@@ -72,17 +72,17 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
         turns = turns[turns < rest]
     if turns.size < 2:  # noqa: PLR2004
         return None
-    # Several in a row: a single one is an outlier.
+    # Three consecutive samples are required: a single one is an outlier.
     away = np.abs(theta - float(np.median(theta[:3]))) > _SURE * sigma + step
     runs = away[:-2] & away[1:-1] & away[2:]
     return Outline(turns, period, smooth, noise, rest, int(np.argmax(runs)))
 
 
 def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
-    """Return the mean over all samples within ``half`` s, and their median number."""
+    """Return the mean over all samples within ``half`` s, and the median number of samples."""
     first = np.searchsorted(time, time - half)
     last = np.searchsorted(time, time + half, side="right")
-    # At the ends the window shrinks on both sides, or the mean would lag behind.
+    # At the ends the window shrinks on both sides, to avoid a lag of the mean.
     index = np.arange(time.size)
     reach = np.minimum(index - first, last - 1 - index)
     first, last = index - reach, index + reach + 1
@@ -92,7 +92,7 @@ def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
 
 
 def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
-    """Return samples of the extremes from which the signal comes back by more than a threshold."""
+    """Return the indices of extremes after which the signal returns by more than a threshold."""
     found: list[int] = []
     values = x.tolist()
     low = high = 0
@@ -103,7 +103,7 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
         if value < values[low]:
             low = k
         if rising is not False and value < values[high] - threshold:
-            # The first extreme is the begin of the record, which need not be a turn.
+            # The first extreme is the start of the record, which need not be a turn.
             if rising is not None:
                 found.append(high)
             rising, low = False, k
@@ -115,14 +115,14 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
 
 
 def zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the extremes of each part between gaps: a sample next to a gap need not be a turn."""
+    """Return the extremes of each part between gaps, without samples next to gaps."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
     return np.concatenate([part + at for part, at in zip(parts, begins, strict=True)])
 
 
 def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[np.intp]:
-    """Return the turns without pairs that follow one another sooner than a pendulum swings."""
+    """Return the turns without pairs that are closer than 0.3 periods."""
     kept: list[int] = []
     for k in turns.tolist():
         if kept and time[k] - time[kept[-1]] < 0.3 * period:
@@ -132,45 +132,45 @@ def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[
     return np.array(kept, np.intp)
 
 
-_RESOLVED: Final = 8.0  # Standard errors by which a peak must differ from the one before
+_RESOLVED: Final = 8.0  # Least difference between successive peaks, standard errors
 _SURE_END: Final = 4.0
-"""Standard errors by which a velocity at the release, or a way to the stop, is seen."""
+"""Standard errors above which a velocity at the release, or a displacement to the stop, is real."""
 _LATENESS: Final = 5 / 32
-"""Slope at 0 of the quartic fitted to ``s abs(s)``, over 2 and over the window."""
-_DOUBT: Final = 0.2  # Part of the lateness by friction that counts as error
+"""Half the slope at 0 of the quartic fitted to ``s abs(s)``, over the window's half-width."""
+_DOUBT: Final = 0.2  # Fraction of the delay by friction that is added to the error
 _STILL: Final = 1e-3
-"""Velocity over amplitude and w0 that counts as 0: the error of the even form itself."""
+"""Velocity at the release over amplitude and w0 that is 0 within the error of the even quartic."""
 
 
 @dataclasses.dataclass(frozen=True)
 class End:
-    """The end of a half cycle."""
+    """End of a half cycle."""
 
     time: float  # s
     angle: float  # rad
     stderr_time: float
     stderr_angle: float
     kind: str  # release, turn, clipped or stop
-    window: float = 0.0  # half width, s
+    window: float = 0.0  # half-width of the fitted window, s
 
     def resolved_from(self, before: End) -> bool:
-        """Whether its angle differs from that of the end before it by more than their errors.
+        """Return whether the angle differs significantly from that of the end before.
 
-        A clipped end, whose error is infinite, is never compared.
+        Always true for a clipped end, whose error is infinite.
         """
         error = math.hypot(before.stderr_angle, self.stderr_angle)
         return not math.isfinite(error) or abs(self.angle - before.angle) > _RESOLVED * error
 
     def late(self, theta_r: float) -> End:
-        """Return the turn without the lateness that friction gives a quartic's turn.
+        """Return the turn corrected for the delay of a quartic's extreme by friction.
 
-        It is ``5/32 h theta_r / sin A`` for a window of half width ``h``. Its uncertainty (by the
-        law of friction, and the next order) counts as error.
+        The delay is ``5/32 h theta_r / sin A`` for a window of half-width ``h``. Its uncertainty
+        (from the law of friction, and the next order) is added to the error.
         """
         size = abs(self.angle)
         bend = math.sin(min(max(size, 2 * theta_r + 1e-9), 3.0))
         shift = _LATENESS * self.window * theta_r / bend
-        # The next order is larger by theta_r / A: near the end it dominates.
+        # The relative size of the next order is theta_r / A, which is large near the end.
         unsure = shift * min(_DOUBT + theta_r / max(size, 1e-9), 1.0)
         error = math.hypot(self.stderr_time, unsure)
         return dataclasses.replace(self, time=self.time - shift, stderr_time=error)
@@ -179,11 +179,11 @@ class End:
 def release(
     time: Floats, theta: Floats, sigma: float, scale: tuple[float, float], course: Outline
 ) -> End | None:
-    """Return the release from rest at which the record begins, if it does.
+    """Return the release from rest at the beginning of a record; None if it begins in motion.
 
     Either the first sample is the release (then the angle is even about it), or the pendulum was
-    held (then a level part joins a falling one without a step of the velocity). ``scale`` holds the
-    rough natural frequency, rad/s, and the half width of a window, s.
+    held (then a constant angle is followed by a fall with continuous velocity). ``scale`` is the
+    approximate natural frequency, rad/s, and the half-width of a window, s.
     """
     if course.left == 0:
         return None
@@ -199,7 +199,7 @@ def release(
     moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
     if even is None or moving is None:
         return None
-    # A record with a velocity, or a bend away from the middle, begins in motion.
+    # With a velocity, or a curvature away from the middle, the record begins in motion.
     (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
     speed, speed_gain = moving.at(float(time[0]), 1)
     slack = _STILL * abs(angle) * w0
@@ -211,7 +211,7 @@ def release(
 def stop(
     time: Floats, theta: Floats, sigma: float, course: Outline, before: list[End]
 ) -> End | None:
-    """Return where the pendulum stopped in the half cycle after the last turn, if it is seen."""
+    """Return the stop in the half cycle after the last turn; None if it is not resolved."""
     if course.rest is None or not before:
         return None
     last, rests = before[-1], float(time[course.rest])
@@ -227,9 +227,9 @@ def stop(
 def _joined(
     time: Floats, theta: Floats, sigma: float, where: tuple[float, float, float], kind: str
 ) -> End | None:
-    """Fit a level that goes over into ``level + b s^2 + d s^4``, s the time since it left.
+    """Fit a constant level followed by ``level + b s^2 + d s^4``, with the time s since its end.
 
-    ``where`` holds the begin of the level, about when it is left, and how far to look on.
+    ``where`` is the start of the level, its approximate end, and the length of the fit after it.
     """
     begin, leaves, half = where
     use = (time >= begin) & (time <= leaves + half)
@@ -245,7 +245,7 @@ def _joined(
         residual = x - rows @ coefficients
         return float(residual @ residual), coefficients, inverse
 
-    # The sum of squares has flat parts and ripples: a scan precedes the search.
+    # The sum of squares has flat parts and local minima: a scan precedes the search.
     scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
     nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
     low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
@@ -260,20 +260,20 @@ def _joined(
     return End(at, float(coefficients[0]), min(error, half), level_error, kind)
 
 
-FEWEST_SWINGS: Final = 2  # Half swings that a start needs
-QUIET: Final = 10.0  # Standard errors within which readings at rest lie
+FEWEST_SWINGS: Final = 2  # Fewest half swings from which starting values are estimated
+QUIET: Final = 10.0  # Greatest range of readings at rest, standard errors
 
 
 def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
-    """Return starting values of ``w0``, ``c_over_m`` and ``Tr``, None of fewer than two swings.
+    """Return starting values of ``w0``, ``c_over_m`` and ``Tr``; None with fewer than two swings.
 
     A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
-    next the energy ``w0**2 (1 - cos A)`` falls by ``c_over_m w0 8 (E(m) - (1 - m) K(m))`` (the
-    integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are left
-    out.
+    next the energy ``w0**2 (1 - cos A)`` falls by ``c_over_m w0 8 (E(m) - (1 - m) K(m))`` (from the
+    integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are
+    excluded.
     """
     tail = theta[-max(len(theta) // 10, 1) :]
-    # The mean of a motion that continues at the end is not its centre.
+    # Only the mean of readings at rest is their centre.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
     half = swings(time, theta - centre, least=4.0 * sigma)
     peaks = np.minimum(np.abs(half.peak), math.pi - 1e-3)
@@ -284,17 +284,17 @@ def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] |
     if len(peaks) < FEWEST_SWINGS + 1:
         return {"w0": w0, "c_over_m": 0.02 * w0, "Tr": 1e-3 * w0**2}
     viscous, friction = rough_damping(peaks)
-    # Neither begins at 0, where a step may be too large.
+    # Starting values are above 0, where a step of the search may be too large.
     return {"w0": w0, "c_over_m": max(viscous, 1e-4) * w0, "Tr": max(friction, 1e-5) * w0**2}
 
 
 def rough_damping(peaks: Floats) -> tuple[float, float]:
-    """Return ``c_over_m / w0`` and ``Tr / w0^2`` (rad), 0 or more, from 3 peaks or more."""
+    """Return non-negative ``c_over_m / w0`` and ``Tr / w0^2`` (rad) from at least 3 peaks."""
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     action = 8 * (ellipe(m) - (1 - m) * ellipk(m))
     columns = np.stack([0.5 * (action[1:] + action[:-1]), peaks[1:] + peaks[:-1]], axis=1)
     lost = np.diff(np.cos(peaks))
-    # The error of an energy is about A sigma: small swings count more.
+    # The error of an energy is about A sigma: small swings have larger weights.
     weight = 1 / (peaks[1:] + peaks[:-1])
     (viscous, friction), _ = nnls(columns * weight[:, None], lost * weight)
     return float(viscous), float(friction)

@@ -1,4 +1,4 @@
-"""Standard errors and intervals of quantities computed from numbers with errors."""
+"""Propagation of errors: standard errors and intervals of derived quantities."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distributi
 
 
 def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats) -> Floats:
-    """Return derivatives by central differences, shape (M, N), with half differences ``steps``.
+    """Return derivatives by central differences, shape (M, N), with increments ``steps``.
 
-    A tenth of a standard error is small for the function and large for rounding. A step of 0 leaves
-    its column 0.
+    A tenth of a standard error is a good increment. A column with increment 0 is 0.
     """
     base = function(values)
     result = np.zeros((base.size, values.size))
@@ -49,9 +48,10 @@ def bootstrap(
     draws: int = 1000,
     seed: int = 0,
 ) -> Floats:
-    """Return a function of normally scattered values, shape (draws, M); NaN where it fails.
+    """Return a function of normally distributed values, shape (draws, M); NaN where it fails.
 
-    Valid where the function is nonlinear within the errors, which the delta method ignores.
+    The parametric bootstrap is valid for functions that are nonlinear within the errors, unlike
+    the delta method.
     """
     rng = np.random.default_rng(seed)
     scattered = values + stderr * rng.standard_normal((draws, values.size))
@@ -66,7 +66,7 @@ def estimates(
     *,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> dict[str, Estimate]:
-    """Return numbers with standard errors, and normal 95 % intervals where none are given."""
+    """Return estimates with standard errors, and normal 95 % intervals unless they are given."""
     given = intervals or {}
     result = {}
     for j, name in enumerate(names):
@@ -77,9 +77,9 @@ def estimates(
 
 
 def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:
-    """Fit ``y = c_0 + c_1 x`` with weights: coefficients, covariance, misfit.
+    """Return coefficients, covariance and misfit of a weighted fit ``y = c_0 + c_1 x``.
 
-    The misfit is chi^2 per degree of freedom; the covariance is widened by it where it is above 1.
+    The misfit is chi^2 per degree of freedom; the covariance is multiplied by it if it is above 1.
     """
     rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
@@ -96,7 +96,7 @@ def chain_covariance(
 
     Differences of successive peaks share a peak and its error; ``variance``, shape (P,), is that of
     the peaks, which are independent. The rows are the diagonal and the subdiagonal (last entry
-    unused), the form of scipy's banded solvers.
+    unused), in the format of scipy's banded solvers.
     """
     result = np.zeros((2, pairs.size))
     result[0] = left**2 * variance[pairs] + right**2 * variance[pairs + 1]
@@ -108,10 +108,10 @@ def chain_covariance(
 def chain_least_squares(
     rows: Floats, y: Floats, covariance: Floats
 ) -> tuple[Floats, Floats, float]:
-    """Fit ``y = rows @ values`` by generalised least squares: values, covariance, misfit.
+    """Return values, covariance and misfit of ``y = rows @ values`` by generalized least squares.
 
-    ``covariance`` is that of :func:`chain_covariance`. The misfit is chi^2 per degree of freedom;
-    the covariance of the values, shape (M, M), is widened by it where it is above 1.
+    ``covariance`` is from :func:`chain_covariance`. The misfit is chi^2 per degree of freedom; the
+    covariance of the values, shape (M, M), is multiplied by it if it is above 1.
     """
     factor = (cholesky_banded(covariance, lower=True), True)
     weighted = cho_solve_banded(factor, rows)

@@ -1,8 +1,8 @@
 """Search for an exponent, with all other parameters fitted at each value.
 
-An effect's size and its exponent make a narrow, bent valley of the sum of squares. This follows its
-floor by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413): the next exponent
-follows from how the readings change with it, less what the other parameters can compensate.
+The sum of squares has a narrow, curved valley in an effect's size and exponent. The search follows
+it by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413): the step of the
+exponent is computed from its derivatives, orthogonal to those of the other parameters.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 STAGES: Final = 8  # Most exponents tried
 
-REACH: Final = 0.2  # Longest step of an exponent: less than the spacing of the scan
+REACH: Final = 0.2  # Initial longest step of an exponent, less than the spacing of the scan
 
 FARTHEST: Final = 3.0  # Largest change of the logarithm of a size in one step
 
-SHORTER: Final = 0.25  # Factor on the reach after a step that made the fit worse
+SHORTER: Final = 0.25  # New longest step, over a step that made the fit worse
 
-SHORTEST: Final = 0.01  # Least reach: the search ends below it
+SHORTEST: Final = 0.01  # Longest step below which the search ends
 
 PROMISED: Final = 0.01  # Expected gain in the sum of squares below which the search ends
 
@@ -47,10 +47,10 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
     *,
     target: float = math.inf,
 ) -> TrajectoryFit:
-    """Return a fit in which an exponent, which is not fitted, is near its best value.
+    """Return a fit with an exponent, fixed in each fit, near its best value.
 
     ``again`` fits a model from given starting values, with the windows of a fit. The search ends
-    where the sum of squares ``target`` is out of reach.
+    when the sum of squares ``target`` is out of reach.
     """
     reach = REACH
     for _ in range(STAGES):
@@ -61,7 +61,7 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
             break
         step = math.copysign(min(abs(step), reach), step)
         start = {name: e.value - step * follow[name] for name, e in fit.estimates.items()}
-        # A size depends exponentially on its exponent; a size near 0 has no derivative by it.
+        # A size depends exponentially on its exponent, so its logarithm is extrapolated.
         power = max(-FARTHEST, min(-step * follow[size] / fit[size], FARTHEST))
         start[size] = fit[size] * math.exp(power)
         try:
@@ -79,7 +79,7 @@ def nearer(  # noqa: PLR0913 (what to fit, and how)
 def _step(
     fit: TrajectoryFit, runs: Sequence[FitRun], exponent: str
 ) -> tuple[float, float, dict[str, float]]:
-    """Return an exponent's step, its expected gain, and the others' derivatives by the exponent."""
+    """Return an exponent's step, its expected gain, and derivatives of the other parameters."""
     seen = sensitivities(fit, runs, [exponent], fit.model)
     place = seen.names.index(exponent)
     own, others = seen.columns[:, place], np.delete(seen.columns, place, axis=1)

@@ -1,4 +1,4 @@
-"""Records of experiments: read, converted to SI and checked; no file is written."""
+"""Reading of experimental records, conversion to SI and checks; no file is written."""
 
 from __future__ import annotations
 

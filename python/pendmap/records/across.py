@@ -1,7 +1,7 @@
-"""Checks across the runs of an experiment: copied readings and unlike rigs.
+"""Checks across the runs of an experiment: duplicated readings and different rigs.
 
-Readings are copied where consecutive readings equal those of another run up to a factor and a zero,
-within the written digits. Two recordings of one motion differ by their noise.
+Consecutive readings are duplicates if they equal those of another run up to a factor and an offset,
+within their resolution. Two recordings of one motion, in contrast, differ by their noise.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-ONE_RIG: Final = 0.05  # Relative difference of small-swing periods that shows several rigs
-FEWEST_SHARED: Final = 50  # Readings of a copy, and of a run without its copies, at least
-LEAST_SHARE: Final = 0.1  # Share of the shorter run: fewer shared readings are no copy
-LEAST_LEVELS: Final = 20  # Sensor steps that shared readings span at least; fewer agree by chance
-AGREEING: Final = 0.99  # Share of shared readings that agree within half a step; 1 % may be edited
-FACTOR_ERROR: Final = 1e-6  # Relative error of a conversion factor between units as people write it
-OFF_STEP: Final = 1e-2  # Steps by which distances of readings may miss whole multiples of a step
-MOST_THINNED: Final = 10  # Readings of which a copy keeps one, at most, to be found
+ONE_RIG: Final = 0.05  # Relative difference of small-swing periods above which rigs differ
+FEWEST_SHARED: Final = 50  # Fewest readings of a duplicate, and of a run without its duplicates
+LEAST_SHARE: Final = 0.1  # Least share of the shorter run in a duplicate
+LEAST_LEVELS: Final = 20  # Least span of a duplicate, sensor steps: smaller ones agree by chance
+AGREEING: Final = 0.99  # Least share of readings that agree within half a step; 1 % may be edited
+FACTOR_ERROR: Final = 1e-6  # Relative rounding error of a written factor between units
+OFF_STEP: Final = 1e-2  # Tolerance, in steps, for differences that are multiples of a step
+MOST_THINNED: Final = 10  # Greatest decimation factor of a duplicate that is searched for
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
-    """Return runs in which each reading counts once, and the findings across runs."""
+    """Return runs without duplicated readings, and the findings across runs."""
     made, found = once_each(runs), list[Finding]()
     swings = {
         run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
@@ -60,7 +60,7 @@ class _Motion:
     first: int
     theta: Floats
     step: float
-    tick: NDArray[np.int64]  # time in whole intervals; lost readings leave ticks empty
+    tick: NDArray[np.int64]  # time in sampling intervals; lost readings leave ticks empty
     interval: float
 
     @classmethod
@@ -75,9 +75,9 @@ class _Motion:
 
 
 def once_each(runs: Sequence[Run]) -> list[Run]:
-    """Return runs in which each reading counts once.
+    """Return runs without duplicated readings.
 
-    Of two runs that share readings, the held-out run gives way, else the shorter, else the later.
+    Of two runs that share readings, the held-out run loses them, else the shorter, else the later.
     """
     made = list(runs)
     motions = [_Motion.of(run) for run in runs]
@@ -92,12 +92,12 @@ def once_each(runs: Sequence[Run]) -> list[Run]:
 
 
 def _digit(theta: Floats) -> float:
-    """Return the step in which readings are written or counted; 0 where none is seen."""
+    """Return the resolution of written or counted readings; 0 if none is found."""
     apart = np.diff(np.unique(np.round(theta, 12)))
     if not apart.size:
         return 0.0
     step = float(apart.min())
-    # Written digits round multiples of a count: the mean of many steps is exact enough.
+    # Written digits round the multiples of a count; averaging many steps reduces this error.
     near = apart[apart < 1.5 * step]
     step = float(near.mean())
     multiples = apart / step
@@ -106,7 +106,7 @@ def _digit(theta: Floats) -> float:
 
 
 def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
-    """Return the first copied reading of ``other`` and their number; None without a copy."""
+    """Return the first duplicated reading of ``other`` and their number; None without any."""
     size = min(one.theta.size, other.theta.size)
     least = max(FEWEST_SHARED, round(LEAST_SHARE * size))
     for mine, its in _ticks(one, other) if size >= least else ():
@@ -119,7 +119,7 @@ def _shared(one: _Motion, other: _Motion) -> tuple[int, int] | None:
 
 
 def _ticks(one: _Motion, other: _Motion) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Return the ways to place both runs on one clock: one after another, and by time."""
+    """Return indices of the readings of both runs on a common clock: by order, and by time."""
     in_a_row = np.arange(one.theta.size), np.arange(other.theta.size)
     ratio = other.interval / one.interval
     times = round(max(ratio, 1 / ratio))
@@ -139,7 +139,7 @@ def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
 
 
 def _lags(a: Floats, b: Floats, least: int) -> set[int]:
-    """Return the lags, in ticks, at which ``b`` is most like ``a`` or its mirror image."""
+    """Return the lags, in ticks, at which ``b`` is closest to ``a`` and to its mirror image."""
     wide = 1 << (a.size + b.size - 1).bit_length()
     middle = float(np.nanmean(a))
     lags = np.arange(1 - b.size, a.size)
@@ -161,16 +161,16 @@ def _lags(a: Floats, b: Floats, least: int) -> set[int]:
     mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
     own = (product(two_a, there_b) + product(there_a, two_b)) / count - mean_a**2 - mean_b**2
     both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
-    # The variance of the difference, and that of the sum.
+    # The variance of the difference, and of the sum.
     found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
     return {int(lags[k]) for k in found}
 
 
 def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
-    """Return whether ``b`` is ``a`` up to a factor and a zero, within half a step of either."""
+    """Return whether ``b`` equals ``a`` up to a factor and an offset, within half a step."""
     columns = np.column_stack([a, np.ones(a.size)])
     away = np.zeros(a.size)
-    # Edited readings move the first line: a second one is fitted without them.
+    # Edited readings distort the first line: a second one is fitted without them.
     for _ in range(2):
         near = away <= np.quantile(away, AGREEING)
         (factor, zero), *_ = np.linalg.lstsq(columns[near], b[near], rcond=None)
@@ -178,13 +178,13 @@ def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
     steps = max(abs(factor) * step, other)
     if float(np.ptp(b)) <= LEAST_LEVELS * steps:
         return False
-    # The error of the line is a step over the root of the number of readings.
+    # The error of the line is a step over the square root of the number of readings.
     allowed = (0.5 + a.size**-0.5) * steps + FACTOR_ERROR * float(np.ptp(b))
     return bool(np.mean(away <= allowed) >= AGREEING)
 
 
 def _without(run: Run, other: Run, first: int, count: int) -> Run:
-    """Return a run in which ``count`` readings from ``first`` on do not count: copies."""
+    """Return a run in which ``count`` duplicated readings from ``first`` on are excluded."""
     trusted = run.trusted.copy()
     before = int(trusted.sum())
     trusted[first : first + count] = False

@@ -1,4 +1,4 @@
-"""The angle of a record: read, integrated, or computed from pixels or an acceleration."""
+"""Angle of a record: read, integrated, or computed from pixels or an acceleration."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 
 TURN: Final = 2 * math.pi
-WRAPPED_SPAN: Final = 1.01  # Turns that wrapped readings span at most: one turn and some noise
-WRAP_JUMP: Final = 0.75  # Turns between neighbours from which a jump is a wrap
-LARGEST_ANGLE: Final = 1e5  # Largest number in rad that can be an angle: ten thousand turns
-MOST_HUGE: Final = 0.5  # Share of larger numbers from which the column is refused
-GAUSS_NEWTON_STEPS: Final = 50  # Steps of the circle fit at most; five are enough
-RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius from which it is reported
-FEWEST_PEAKS: Final = 6  # Readings that show a pattern of turning points at least
-KEEP_PATTERN: Final = 0.9  # Share of the readings that must keep to the pattern
-PEAK_RISE: Final = 0.02  # Relative rise from one amplitude to the next that reading errors explain
-PERIOD_CHANGE: Final = 0.15  # Relative change between neighbouring periods at most
-CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which they are those of a clock
+WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
+WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
+LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
+MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
+GAUSS_NEWTON_STEPS: Final = 50  # Most iterations of the circle fit; five usually suffice
+RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
+FEWEST_PEAKS: Final = 6  # Fewest readings in which a pattern of turning points is recognized
+KEEP_PATTERN: Final = 0.9  # Least share of readings that follow the pattern
+PEAK_RISE: Final = 0.02  # Greatest rise from one amplitude to the next, over the greatest amplitude
+PERIOD_CHANGE: Final = 0.15  # Greatest relative change between successive periods
+CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which sampling is by a clock
 
 
 def make(work: Work) -> None:
-    """Make the angle from the channels; leave out rows without one."""
+    """Compute the angle from the channels; remove rows without one."""
     if "peaks" in work.extra and "angle" not in work.columns:
         work.theta = work.extra.pop("peaks")
         work.peaks_only = True
@@ -60,7 +60,7 @@ def make(work: Work) -> None:
 
 
 def _finite(work: Work, what: str, *values: Floats) -> None:
-    """Leave out rows in which a needed channel has no number."""
+    """Remove rows in which a required channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
         raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
@@ -69,7 +69,7 @@ def _finite(work: Work, what: str, *values: Floats) -> None:
 
 
 def _derived(work: Work) -> None:
-    """Make the angle from pixels, a velocity or an acceleration, in this order."""
+    """Compute the angle from pixels, a velocity or an acceleration, in this order."""
     if "pixel_x" in work.extra:
         _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
         _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
@@ -88,7 +88,7 @@ def _derived(work: Work) -> None:
 
 
 def _accelerated(work: Work) -> None:
-    """Make the angle from an acceleration alone; its place on the rod must be known."""
+    """Compute the angle from an acceleration alone; the sensor's position must be known."""
     sensor, why = work.accelerometer, ""
     if sensor is None:
         why = (
@@ -123,7 +123,7 @@ def _accelerated(work: Work) -> None:
 
 
 def _unwrap(work: Work) -> None:
-    """Undo the jumps of a sensor that shows the angle within one turn."""
+    """Unwrap the readings of a sensor that reads the angle modulo one turn."""
     steps = np.diff(work.theta)
     jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * TURN)
     span = float(np.ptp(work.theta))
@@ -139,16 +139,16 @@ def _unwrap(work: Work) -> None:
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
-    """Make the angle of points on a circle, from downward, toward positive x.
+    """Compute the angle of points on a fitted circle, 0 downward, positive toward positive x.
 
-    Down is along y, on the side where the bob is quickest. Raises InputError without a circle.
+    Down is along y, on the side where the bob is fastest. Raises InputError without a circle.
     """
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
         raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
-    # Kasa's circle, by least squares of u^2 + v^2, is the start.
+    # Initial circle: Kasa's algebraic fit, by least squares of u^2 + v^2.
     columns = np.column_stack([u, v, np.ones(u.size)])
     solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
     a, b = float(solution[0]) / 2, float(solution[1]) / 2
@@ -185,7 +185,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
 def _geometric(
     u: Floats, v: Floats, a: float, b: float, radius: float
 ) -> tuple[float, float, float, float, float]:
-    """Return the circle of least distances, the standard error of its radius, and the rms."""
+    """Return the circle of least squared distances, its radius' standard error, and the rms."""
     for _ in range(GAUSS_NEWTON_STEPS):
         distance = np.maximum(np.hypot(u - a, v - b), 1e-12)
         slope = np.column_stack([-(u - a) / distance, -(v - b) / distance, -np.ones(u.size)])
@@ -201,9 +201,9 @@ def _geometric(
 
 
 def check_peaks(work: Work) -> None:
-    """Report angles of a free record that look like turning points; leave them out of fits.
+    """Report angles of a free record that look like turning points; exclude them from fits.
 
-    Turning points alternate in sign, or have one sign; their sizes fall, their intervals are alike.
+    Turning points alternate in sign or have one sign; amplitudes decrease, intervals are similar.
     """
     if work.plan.kind != "free" or "angle" not in work.columns:
         return
@@ -221,7 +221,7 @@ def check_peaks(work: Work) -> None:
 
 
 def _pattern(time: Floats, theta: Floats) -> str:
-    """Return the pattern of turning points that readings show; empty for a motion."""
+    """Return the pattern of turning points that readings follow; empty for a sampled motion."""
     if theta.size < FEWEST_PEAKS:
         return ""
     steps, size = np.diff(time), np.abs(theta)

@@ -1,4 +1,4 @@
-"""Which column is which channel, in SI; which columns no channel is read from."""
+"""Assignment of a table's columns to channels, in SI, and report of unused columns."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-_MOST_NAMED: Final = 8  # Columns that a message lists at most
-# Channels from which an angle can be made
+_MOST_NAMED: Final = 8  # Most columns listed in a message
+# Channels from which an angle can be computed
 ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
 POSITION_NAME: Final = "pos(ition)?"
-POSITION_AGREES: Final = 0.9  # Correlation that makes a position the integral of a velocity
+POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
 MOTOR_NAMES: Final = re.compile(
     r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
 )
@@ -36,21 +36,21 @@ MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
 PIVOT_NAMES: Final = re.compile(
     r"\b(pivot|cart|carriage|trolley|slider?|shaker|stage|base|platform|support|suspension|wagen)\b"
 )
-# Units of a pivot's column by words in its name
+# Default unit of a pivot's column by words in its name
 PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
 ANGLE_NAMES: Final = re.compile(r"pos(ition)?|.*(angle|winkel|theta|encoder).*")
-MOST_UNUSED: Final = 12  # Names of unused columns that a message lists at most
+MOST_UNUSED: Final = 12  # Most unused columns listed in a message
 
 
 def channels_of(  # noqa: C901 (a step each)
     table: Table, description: Description, plan: RunPlan, where: str
 ) -> Work:
-    """Return a record with its channels: of columns named in [columns], by default, or alike."""
+    """Return a record's channels, from columns named in [columns], default or similar names."""
     asked = description.columns
     places: dict[str, int] = {}
     for channel, column in asked.items():
         name = column.name or CHANNELS[channel].default
-        # Without a name it is unit, scale or zero of a column that is found by its usual names.
+        # Without a name it gives unit, scale or zero of a column that is found by its usual names.
         if column.name is not None or name in table.names:
             places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
     for channel, kind in CHANNELS.items():
@@ -112,7 +112,7 @@ def channels_of(  # noqa: C901 (a step each)
 
 
 def _place(name: str, table: Table, where: str) -> int:
-    """Return the place of a column by its heading, or by its name without the unit."""
+    """Return the index of a column by its heading, with or without the unit."""
     if name in table.names:
         return table.names.index(name)
     bare = [name_and_unit(head)[0] for head in table.names]
@@ -133,13 +133,13 @@ def _names(table: Table) -> str:
 
 
 def _listed(names: Sequence[str], most: int) -> str:
-    """Return the first of some names, and how many there are."""
+    """Return the text of the first names, with the number of all if some are omitted."""
     more = f", ... ({len(names)} in all)" if len(names) > most else ""
     return ", ".join(map(repr, names[:most])) + more
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
-    """Refuse a table without times or angles, or with one column for two channels."""
+    """Raise InputError for a table without times or angles, or a column with two channels."""
     advice = "experiment.toml names others in [columns]"
     if "time" not in places and not timed:
         raise InputError(
@@ -162,7 +162,7 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     channel: str, raw: Floats, head: str, column: Column, counts: int | None, where: str
 ) -> Floats:
-    """Return the values of a column in SI: scaled as declared, or by its unit."""
+    """Return the values of a column in SI, by its declared scale or its unit."""
     if column.scale is not None:
         return (raw - column.zero) * column.scale
     unit = column.unit
@@ -180,7 +180,7 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
 def _pivot(
     table: Table, plan: RunPlan, where: str
 ) -> tuple[dict[str, Floats], str | None, list[int]]:
-    """Return the pivot's channels in SI, their unit, and the places of their columns."""
+    """Return the pivot's channels in SI, their unit, and the indices of their columns."""
     if plan.pivot is None:
         return {}, None, []
     unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
@@ -195,7 +195,7 @@ def _pivot(
 
 
 def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
-    """Use the coordinates of a picture if the angle beside them is constant."""
+    """Assign the pixel coordinates of a table whose angle column is constant."""
     found = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
     place = places.get("angle", found.get("angle"))
     both = found | places
@@ -212,13 +212,13 @@ def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) 
 
 
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Find missing channels by names like the usual ones; without names by position."""
+    """Assign missing channels by common column names, or by position without names."""
     if not table.headed:
         return _by_position(table, places, timed=timed)
     guessed = _by_name(table, places)
     if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
         guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # The angle beside a picture's coordinates was made from them.
+    # An angle given with pixel coordinates was computed from them.
     pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
     if "angle" in places or "angle" in guessed or not pair:
         guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
@@ -236,9 +236,9 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns for the channels that have none, by names like the usual ones.
+    """Return columns with common names for channels that have none.
 
-    Of the axes of a sensor it is the one that moves most, of all else the first.
+    Of several axes of a sensor, the one with the greatest variance; of other columns, the first.
     """
     guessed: dict[str, int] = {}
     for channel, kind in CHANNELS.items():
@@ -254,7 +254,7 @@ def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
 
 
 def _fitting(table: Table, channel: str, names: str) -> list[int]:
-    """Return the columns with such a name and a unit of the channel, or none."""
+    """Return the columns whose name matches and whose unit, if any, is one of the channel's."""
     split = [name_and_unit(head) for head in table.names]
     return [
         k
@@ -264,10 +264,10 @@ def _fitting(table: Table, channel: str, names: str) -> list[int]:
 
 
 def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Find time and angle in a table without headings."""
+    """Assign time and angle in a table without headings."""
     free = [k for k in range(table.values.shape[1]) if k not in places.values()]
     said = []
-    if not timed:  # the rate is known: what counts the readings tells nothing
+    if not timed:  # the rate is known: ignore columns that number the readings
         free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
     if "time" not in places and free:
         k = next((k for k in free if _rises(table.values[:, k])), None)
@@ -283,7 +283,7 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
 
 
 def _orders(values: Floats) -> bool:
-    """Return whether numbers may be times out of order: sorted, they are evenly spaced."""
+    """Return whether values may be times out of order: evenly spaced once sorted."""
     steps = np.diff(np.sort(values[np.isfinite(values)]))
     usual = float(np.median(steps)) if steps.size else 0.0
     return usual > 0 and bool(np.mean(np.abs(steps - usual) < 0.5 * usual) > 0.5)
@@ -296,9 +296,9 @@ def _rises(values: Floats) -> bool:
 
 
 def position_of(table: Table, places: Mapping[str, int]) -> int | None:
-    """Return the column called position that is the angle, or None.
+    """Return the column named position if it is the angle, or None.
 
-    A velocity beside it must be its slope: a cart has a position, too.
+    It must correlate with the integrated velocity, if any, since a cart has a position, too.
     """
     from scipy.signal import detrend
 
@@ -321,7 +321,7 @@ def head_of(table: Table, place: int) -> str:
 
 
 def changes(values: Floats) -> bool:
-    """Return whether a column has two different numbers."""
+    """Return whether a column has at least two different values."""
     seen = values[np.isfinite(values)]
     return bool(seen.size) and float(np.ptp(seen)) > 0
 
@@ -339,12 +339,12 @@ def _unused(
     for k in rest:
         if changes(table.values[:, k]):
             findings += _asked(head_of(table, k), channels, plan)
-    seen = {found.what: found for found in reversed(findings)}  # the first of each kind is enough
+    seen = {found.what: found for found in reversed(findings)}  # the first of each kind
     return names, list(reversed(seen.values()))
 
 
 def _asked(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
-    """Return what a heading suggests: a motor, an angle or a pivot."""
+    """Return the finding that a heading suggests: a motor, an angle or a pivot."""
     name, unit = name_and_unit(head)
     name, unit = plain(name), spelling(unit or "")
     said = plain(head)

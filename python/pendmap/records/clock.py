@@ -1,7 +1,7 @@
-"""The clock: stamps that are missing, repeated, backwards or jittering, and slips of time.
+"""Clock errors: missing, repeated, decreasing or jittering time stamps, and clock slips.
 
-At a slip, readings are lost while the stamps go on: the reading jumps by the velocity times the
-interval. A polynomial with a term ``d v`` from each sample on, fitted around it, shows the slip d.
+At a slip, readings are lost while the stamps continue: the reading jumps by the velocity times the
+lost time. The slip ``d`` is estimated with a local polynomial plus a term ``d v`` from a sample on.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices
 
 
-RESTART: Final = 10  # Intervals that a restarted clock falls back by; samples that each part has
-REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals from which jitter is reported
-MOST_UNORDERED: Final = 0.3  # Share of unordered stamps from which the record is refused
-STOPPED_READINGS: Final = 50  # Readings with one stamp that stop a clock, and 10 times the usual
-COARSE_STAMPS: Final = 0.2  # Share of repeated stamps that makes a clock coarse
+RESTART: Final = 10  # Least decrease at a clock's restart, intervals; fewest samples of each part
+REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals above which jitter is reported
+MOST_UNORDERED: Final = 0.3  # Share of unordered stamps above which the record is refused
+STOPPED_READINGS: Final = 50  # Most readings with one stamp (or ten times the usual number)
+COARSE_STAMPS: Final = 0.2  # Least share of repeated stamps of a coarse clock
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
-# Seconds after which counters of 16 and 32 bits in us, ms or s wrap
+# Overflow times of 16- and 32-bit counters in us, ms or s, in seconds
 COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
-SLIP_DEGREE: Final = 7  # Degree of the polynomials that slips are seen with
-SLIP_PHASE: Final = 2.0  # Radians of phase to either side that it follows within 6e-3
-SHORTEST_SIDE: Final = 8  # Samples to either side of a slip at least, to know both velocities
-LONGEST_SIDE: Final = 150  # Samples to either side of a slip at most
-FEWEST_SLIPS: Final = 3  # Slips of one size that make it a fault of the clock
-CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)  # Standard errors of a slip in each pass
-MOST_INTERVALS: Final = 4  # Intervals of the longest slip
-SLOW_POWER: Final = 1e-3  # Power over its median below which the motion is too slow to show a slip
-OFF_INTERVAL: Final = 0.25  # Intervals by which a slip may miss a whole number
-MOST_OTHER_JUMPS: Final = 0.2  # Share of the jumps that may be no slips
+SLIP_DEGREE: Final = 7  # Degree of the polynomials with which slips are detected
+SLIP_PHASE: Final = 2.0  # Half-width of the polynomials, rad of phase; their error is below 6e-3
+SHORTEST_SIDE: Final = 8  # Fewest samples on either side of a slip, for both velocities
+LONGEST_SIDE: Final = 150  # Most samples on either side of a slip
+FEWEST_SLIPS: Final = 3  # Fewest slips by whole intervals for which the clock is corrected
+CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)  # Least slip in each pass, standard errors
+MOST_INTERVALS: Final = 4  # Longest slip, intervals
+SLOW_POWER: Final = 1e-3  # Power over its median below which motion is too slow to detect a slip
+OFF_INTERVAL: Final = 0.25  # Relative tolerance for slips by whole intervals
+MOST_OTHER_JUMPS: Final = 0.2  # Greatest share of jumps that are not slips
 _BLOCK: Final = 4000  # Windows that are solved at a time
 
 
 def mend(work: Work) -> None:
-    """Make the times strictly increasing and report it; raise InputError if none increase."""
+    """Make the times strictly increasing and report changes; InputError if this is impossible."""
     missing = ~np.isfinite(work.time)
     if missing.all():
         raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
@@ -66,7 +66,7 @@ def mend(work: Work) -> None:
 
 
 def cut_at_pauses(work: Work) -> None:
-    """Keep the side with more samples of a pause longer than the rest of the record."""
+    """Keep the larger side, by samples, of a pause longer than the rest of the record."""
     while work.time.size > 2:
         steps = np.diff(work.time)
         at = int(np.argmax(steps)) + 1
@@ -85,14 +85,14 @@ def cut_at_pauses(work: Work) -> None:
 
 
 def _stopped(work: Work) -> None:
-    """Leave out readings that continue while the clock stands still."""
+    """Remove readings that continue while the clock is stopped."""
     edges = np.flatnonzero(np.diff(work.time, prepend=np.nan, append=np.nan) != 0)
     each = np.diff(edges)
     usual = int(np.median(each))
     stops = np.flatnonzero(each > max(STOPPED_READINGS, RESTART * usual))
     if not stops.size or stops.size == each.size:
         return
-    # After a step backwards not even the first of the equal stamps is right.
+    # After a decrease even the first of the equal stamps is wrong.
     own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
     begin, end = edges[stops] + usual * own, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
@@ -106,7 +106,7 @@ def _stopped(work: Work) -> None:
 
 
 def _wrapped(work: Work) -> None:
-    """Continue a counter of the clock that wrapped to 0."""
+    """Unwrap a clock counter that overflowed."""
     steps = np.diff(work.time)
     usual = float(np.median(np.abs(steps)))
     for wrap in COUNTER_WRAPS:
@@ -120,11 +120,11 @@ def _wrapped(work: Work) -> None:
 
 
 def _restarted(work: Work) -> None:
-    """Keep the longest stretch of a clock that starts again."""
+    """Keep the longest part of a record whose clock restarts."""
     steps = np.diff(work.time)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
     falls = (np.flatnonzero(steps < -RESTART * usual) + 1).tolist()
-    # A single false stamp is no restart: the stamps after it continue those before.
+    # A single wrong stamp is no restart: the stamps after it continue those before.
     edges = [0]
     for low, high in itertools.pairwise([*falls, work.time.size]):
         part, before = work.time[low:high], work.time[edges[-1] : low]
@@ -146,7 +146,7 @@ def _restarted(work: Work) -> None:
 
 
 def _coarse(work: Work) -> None:
-    """Spread stamps evenly where several samples share each of them."""
+    """Space stamps evenly if several samples share each of them."""
     steps = np.diff(work.time)
     same = np.mean(steps == 0) if steps.size else 0.0
     if not 0 < same < 1 or np.any(steps < 0):
@@ -164,7 +164,7 @@ def _coarse(work: Work) -> None:
     slope, start = np.polyfit(place, work.time - work.time[0], 1)
     tick = float(np.median(steps[steps > 0]))
     away = work.time - work.time[0] - (start + slope * place)
-    if slope > 0 and np.max(np.abs(away)) <= 1.5 * tick:  # no samples are lost besides
+    if slope > 0 and np.max(np.abs(away)) <= 1.5 * tick:  # no samples are missing
         work.time = work.time[0] + start + slope * place
         share = f"{100 * same:.0f} % of the stamps repeat the one before"
         text = f"{share}: spread evenly, {1 / slope:.6g} Hz"
@@ -172,7 +172,7 @@ def _coarse(work: Work) -> None:
 
 
 def _ordered(work: Work) -> None:
-    """Reverse, sort or leave out rows whose times do not increase."""
+    """Reverse, sort or remove rows whose times do not increase."""
     # Stamps that differ by rounding alone are equal.
     near = 2 * float(np.spacing(np.max(np.abs(work.time))))
     steps = np.diff(work.time)
@@ -207,18 +207,18 @@ def _ordered(work: Work) -> None:
 
 
 def _smoother(theta: Floats, at: Indices) -> bool:
-    """Return whether moved samples fit between their new neighbours as all others do."""
+    """Return whether reordered samples are as smooth in their new places as the others."""
     if theta.size < 5 or not np.all(np.isfinite(theta)):
         return False
     bend = np.abs(np.diff(theta, 2))
     usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
-    if not usual:  # most were moved: a motion has bends that are small against its way
+    if not usual:  # most were moved: a motion has second differences small against its range
         return bool(np.median(bend) < 0.1 * np.ptp(theta))
     return bool(np.all(bend[np.clip(at - 1, 0, bend.size - 1)] <= 3 * usual))
 
 
 def _longest_rising(time: Floats) -> Indices:
-    """Return the places of the longest strictly rising subsequence."""
+    """Return the indices of the longest strictly increasing subsequence."""
     tails: list[float] = []
     ends: list[int] = []
     before = np.full(time.size, -1, np.intp)
@@ -264,23 +264,23 @@ def _spacing(work: Work) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Slips:
-    """Where a clock slipped, the corrected times, and the mean slip of one interval."""
+    """Slips of a clock: corrected times, positions, and mean slip per interval."""
 
     time: Floats  # corrected, s
     places: Indices  # first sample after each slip
-    slip: float  # s
-    stderr: float  # s
+    slip: float  # mean size per interval, s
+    stderr: float  # standard error of the mean size, s
 
 
 def slips_of(time: Floats, theta: Floats) -> Slips | None:
-    """Return the slips of a clock by whole intervals; None where the readings show none."""
+    """Return the slips of a clock by whole intervals; None if the readings show none."""
     from scipy.interpolate import CubicSpline
 
     interval = float(np.median(np.diff(time)))
     reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
     if reach < SHORTEST_SIDE or time.size < 20 * reach:
         return None
-    # Apparent sizes of slips of 1, 2, ... intervals: a jump spoils the velocity.
+    # Apparent sizes of slips of 1, 2, ... intervals, biased since a jump perturbs the velocity.
     place = np.arange(-3 * reach, 3 * reach + 1)
     tried = [_tried(place + k * (place >= 0.0), reach) for k in range(1, MOST_INTERVALS + 1)]
     shown = np.array([gain[3 * reach] / power[3 * reach] for gain, power in tried])
@@ -307,7 +307,7 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
 
 
 def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
-    """Return the first samples after slips, and the apparent slips in intervals."""
+    """Return the first samples after slips, and the apparent sizes in intervals."""
     from scipy.ndimage import maximum_filter1d
 
     gain, power = _tried(values, reach)
@@ -322,7 +322,7 @@ def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
 
 
 def _tried(values: Floats, reach: int) -> tuple[Floats, Floats]:
-    """Return gain and power of a slip before each sample; their ratio is the least-squares slip."""
+    """Return numerator and denominator of the least-squares slip before each sample."""
     _, weights = even_weights(SLIP_DEGREE, 2 * reach + 1)
     speed = np.zeros(values.size)
     speed[reach:-reach] = np.correlate(values, weights, "valid")

@@ -1,8 +1,9 @@
-"""Checks of channels against each other: velocity, acceleration and pivot against the angle.
+"""Consistency checks of channels: velocity, acceleration and pivot against the angle.
 
-A swing alone does not tell the distance of a tangential sensor from the sense of its axis: it reads
-``(g - r w0**2) sin(th)``. A step ``s`` of a pivot's places read every ``h`` seconds is one of
-``s / h^2`` in its acceleration (1000 m/s^2 for 1 mm at 1 kHz): there cubics are fitted.
+A tangential accelerometer at distance ``r`` reads ``(g - r w0**2) sin(th)``, so a swing leaves its
+distance and the sense of its axis ambiguous. A step ``s`` of a pivot's position sampled every ``h``
+seconds is one of ``s / h^2`` in its acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions
+are smoothed by cubics.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-SAME_MOTION: Final = 0.8  # Correlation from which two channels show the same motion
-GAIN_OFF: Final = 0.1  # Relative error of a gain that the filter of a channel may cause
-CERTAIN_SIGN: Final = 8.0  # Standard errors from which a coefficient has the wrong sign
-FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Largest span
-DERIVATIVE_SPAN: Final = 0.12  # Periods over which derivatives are taken
-# Why an acceleration beside an angle is not used
+SAME_MOTION: Final = 0.8  # Least correlation of two channels of the same motion
+GAIN_OFF: Final = 0.1  # Greatest relative error of a gain that a channel's filter may cause
+CERTAIN_SIGN: Final = 8.0  # Standard errors above which a coefficient has the wrong sign
+FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
+DERIVATIVE_SPAN: Final = 0.12  # Window of the polynomials that give derivatives, periods
+# Text on the role of an acceleration recorded with an angle
 CHECK_ONLY: Final = "a check, not fitted: the angle is"
-PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Derivatives from a unit of the pivot to an acceleration
-NOISE_SHARE: Final = 0.05  # Noise of the pivot's acceleration over its largest value, at most
-STEPS_PASSED: Final = 4.0  # Steps that a moving pivot passes within a window at least
-LONGEST_WINDOW: Final = 0.2  # Seconds of a window of more than five readings at most
-MOVING_SHARE: Final = 0.2  # Speed over the largest from which the pivot moves
+PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
+NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
+STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
+LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
+MOVING_SHARE: Final = 0.2  # Speed, over the largest, above which the pivot is moving
 
 
 def check(work: Work) -> None:
-    """Turn channels that run against the angle; report those that do not follow it."""
+    """Invert channels with the opposite sign of the angle; report inconsistent channels."""
     if "velocity" in work.extra:
         _velocity(work)
     if "acceleration" in work.extra:
@@ -60,7 +61,7 @@ def check(work: Work) -> None:
 
 
 def _velocity(work: Work) -> None:
-    """Compare a velocity with the slope of the angle: turn it, rescale it or leave it out."""
+    """Compare a velocity with the angle's derivative: invert, rescale or remove it."""
     velocity = work.extra["velocity"]
     missing = int(np.count_nonzero(~np.isfinite(velocity)))
     if missing:
@@ -95,7 +96,7 @@ def _velocity(work: Work) -> None:
 
 
 def _turn(work: Work, channel: str) -> None:
-    """Change the sign of a channel that runs against the angle."""
+    """Invert a channel with the opposite sign of the angle, and report it."""
     work.extra[channel] = -work.extra[channel]
     text = f"the {channel} has the other sign than the angle: turned round, the angle counts"
     work.say("sign-turned", text, mended=True)
@@ -105,7 +106,7 @@ def _drive_sign(work: Work) -> None:
     """Regress the second derivative of the angle on gravity and on the pivot's acceleration.
 
     th'' = -w0^2 sin th - (a_vertical / l) sin th + (-a_lateral / l) cos th: both coefficients are
-    negative where upward and toward positive theta are positive.
+    negative if upward and toward positive theta are positive.
     """
     from scipy.signal import savgol_filter
 
@@ -133,7 +134,7 @@ def _drive_sign(work: Work) -> None:
     variance = float(np.sum(rest**2)) / count * (count / worth)
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
     if answer[0] > 0:
-        return  # no pendulum about 0: nothing to tell a sign by
+        return  # no oscillation about theta = 0: the sign is undetermined
     for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
             said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
@@ -143,7 +144,7 @@ def _drive_sign(work: Work) -> None:
 
 
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
-    """Return the accelerations of the pivot, or a(t) of the drive, at even times."""
+    """Return the accelerations of the pivot, or a(t) of the drive, at equally spaced times."""
     found: dict[str, Floats] = {}
     drive = work.plan.drive or {}
     p, phi = drive.get("p"), drive.get("phi")
@@ -162,7 +163,7 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
 
 @dataclasses.dataclass(frozen=True)
 class _Motion:
-    """Smoothed angle and derivatives where they are known, and the measured acceleration."""
+    """Smoothed angle, derivatives and measured acceleration at the samples that have all."""
 
     theta: Floats
     velocity: Floats
@@ -171,7 +172,7 @@ class _Motion:
     w0: float
 
     def expected(self, sensor: Accelerometer) -> Floats:
-        """Return the readings that the motion of the angle would cause."""
+        """Return the accelerometer readings predicted from the angle."""
         r, g = sensor.distance_m, sensor.gravity
         if sensor.direction == "radial":
             return np.asarray(r * self.velocity**2 + g * np.cos(self.theta))
@@ -179,7 +180,7 @@ class _Motion:
 
 
 def _acceleration(work: Work) -> None:
-    """Compare an acceleration with the angle beside it; turn it if its sign is the other."""
+    """Compare an acceleration with the angle; invert it if it has the opposite sign."""
     if work.made_of is not None:
         return
     motion = None if work.plan.kind == "forced" else _motion(work)
@@ -195,7 +196,7 @@ def _acceleration(work: Work) -> None:
 
 
 def _motion(work: Work) -> _Motion | None:
-    """Return the derivatives of the angle by polynomials through a part of a period."""
+    """Return derivatives of the angle from local polynomials; None if they are unreliable."""
     from scipy.signal import savgol_filter
 
     measured = work.extra["acceleration"]
@@ -210,7 +211,7 @@ def _motion(work: Work) -> _Motion | None:
     crossings = np.count_nonzero(np.diff(np.sign(theta[inside] - np.median(theta[inside]))))
     if crossings < 4:
         return None
-    # Noise crosses the middle, too: this is a lower bound of the period.
+    # Noise adds crossings of the median: this is a lower bound of the period.
     period = 2 * float(np.count_nonzero(inside)) * interval / crossings
     window = max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
     if window > count // 4:
@@ -236,14 +237,14 @@ def _slope(x: Floats, y: Floats) -> float:
 
 
 def _alike(one: Floats, other: Floats) -> float:
-    """Return the correlation of two channels; 0 where one is constant."""
+    """Return the correlation of two channels; 0 if one is constant."""
     if float(np.std(one)) == 0 or float(np.std(other)) == 0:
         return 0.0
     return float(np.corrcoef(one, other)[0, 1])
 
 
 def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
-    """Report how an acceleration compares with the readings expected at its place."""
+    """Report the agreement of an acceleration with the readings predicted at its position."""
     expected = motion.expected(sensor)
     alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
     angular = sensor.direction == "angular"
@@ -272,7 +273,7 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
 
 
 def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
-    """Return the distance that the readings show, m, for the given gravity and direction."""
+    """Return the estimated distance of a sensor from the pivot, m, of known direction."""
     measured = sign * motion.measured
     if sensor.direction == "radial":
         return _slope(motion.velocity**2, measured - sensor.gravity * np.cos(motion.theta))
@@ -280,7 +281,7 @@ def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
 
 
 def _unplaced(work: Work, motion: _Motion) -> None:
-    """Report where an accelerometer of unknown place seems to be."""
+    """Report the estimated direction and distance of an accelerometer of unknown position."""
     gravity = float(work.known.get("gravity", GRAVITY))
     sine = _alike(np.sin(motion.theta), motion.measured)
     radial = _alike(motion.velocity**2, motion.measured)
@@ -307,7 +308,7 @@ def _unplaced(work: Work, motion: _Motion) -> None:
 
 
 def smooth_pivot(work: Work) -> None:
-    """Replace places or speeds of the pivot that come in steps by smooth accelerations."""
+    """Replace stepwise positions or velocities of the pivot by smooth accelerations."""
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     known = all(np.isfinite(values).all() for values in work.pivot.values())
     if not order or work.time.size < 20 or not known:
@@ -338,7 +339,7 @@ def smooth_pivot(work: Work) -> None:
 
 
 def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:
-    """Return the number of readings that a cubic is fitted to: 5 where none is needed."""
+    """Return the number of readings to which a cubic is fitted: 5 if no smoothing is needed."""
     from scipy.signal import savgol_coeffs, savgol_filter
 
     time = interval * np.arange(values.size, dtype=np.float64)

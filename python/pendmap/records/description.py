@@ -1,4 +1,4 @@
-"""``experiment.toml``: the description of an experiment."""
+"""Description of an experiment, ``experiment.toml``: its fields and their checks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Direction = Literal["tangential", "radial", "angular"]
 NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 _DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
-# Names of measured quantities of a drive, which are refused with advice
+# Names of dimensional quantities of a drive, which are refused with advice
 _MEASURED_DRIVE: Final = (
     *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
     *("frequency_hz", "frequency", "f_hz", "f"),
@@ -30,13 +30,13 @@ _MEASURED_DRIVE: Final = (
 _PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
 _MOST_SKIPPED: Final = 1_000_000
 _MOST_COUNTS: Final = 10**9
-_LARGEST: Final = 1e12  # Largest number of a description
-_FARTHEST: Final = 100.0  # Distance of a sensor from the pivot at most, m
+_LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
+_FARTHEST: Final = 100.0  # Greatest distance of a sensor from the pivot, m
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Where a channel is read from; the place of an accelerometer, the edge of a trigger."""
+    """Column of a channel; position of an accelerometer, edge and phase of a trigger."""
 
     name: str | None = None
     unit: str | None = None
@@ -51,7 +51,7 @@ class Column:
 
 @dataclasses.dataclass(frozen=True)
 class Reader:
-    """How files are written, where they do not show it."""
+    """Format of the files, as far as it cannot be inferred from them."""
 
     delimiter: str | None = None
     decimal: str | None = None
@@ -60,7 +60,7 @@ class Reader:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """One ``[[run]]``; ``pivot_scale`` is the signed pivot unit per unit of its columns."""
+    """Fields of one ``[[run]]``; ``pivot_scale`` is the signed factor from columns to unit."""
 
     file: str
     kind: Kind = "free"
@@ -75,7 +75,7 @@ class RunPlan:
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """Content of the file; ``rate_hz`` is the clock of records without times, Hz."""
+    """Content of the file; ``rate_hz`` is the sampling rate of records without times, Hz."""
 
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
@@ -85,7 +85,7 @@ class Description:
 
 
 def read_description(path: Path) -> Description:
-    """Read an ``experiment.toml``; raise InputError, with the path, for what is not allowed."""
+    """Read an ``experiment.toml``; raise InputError, with the path, for invalid content."""
     content = read_toml(path)
     try:
         return _description(content)
@@ -94,7 +94,7 @@ def read_description(path: Path) -> Description:
 
 
 def _description(content: dict[str, Any]) -> Description:
-    """Return the description that the tables of the file make."""
+    """Return the checked description from the file's tables."""
     _refuse_unknown(
         content, ("rig", "columns", "reader", "run"), "", "[rig], [columns], [reader] and [[run]]"
     )
@@ -114,7 +114,7 @@ def _description(content: dict[str, Any]) -> Description:
 
 
 def _table(where: str, value: object, example: str = "") -> dict[str, Any]:
-    """Return a value that must be a table."""
+    """Return a value if it is a table; raise InputError if not."""
     if not isinstance(value, dict):
         like = f" like {example}" if example else ""
         raise InputError(f"{where} must be a table{like}, got {short_repr(value)}")
@@ -124,7 +124,7 @@ def _table(where: str, value: object, example: str = "") -> dict[str, Any]:
 def _refuse_unknown(
     table: Mapping[str, Any], known: Iterable[str], where: str, among: str = ""
 ) -> None:
-    """Refuse unknown keys and suggest the nearest known one."""
+    """Raise InputError for unknown keys, with the nearest known one."""
     known = list(known)
     for key in table:
         if key in known:
@@ -154,7 +154,7 @@ def _number(name: str, value: object) -> float:
 
 
 def _number_that(allowed: Callable[[float], bool], wanted: str) -> Callable[[str, object], float]:
-    """Return the check of a number that is allowed."""
+    """Return a check that a number satisfies a condition."""
 
     def check(name: str, value: object) -> float:
         number = _number(name, value)
@@ -177,7 +177,7 @@ def _text(name: str, value: object) -> str:
 
 
 def _one_of(*texts: str) -> Callable[[str, object], str]:
-    """Return the check of a value that is one of some texts."""
+    """Return a check that a value is one of some texts."""
     quoted = [f'"{text}"' for text in texts]
     known = " or ".join(quoted) if len(texts) < 3 else f"one of {', '.join(quoted)}"
 

@@ -1,4 +1,4 @@
-"""An experiment: runs, and the findings about them."""
+"""Data classes of an experiment: its runs, their segments, and the findings about them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
     from pendmap.signal import Floats, Mask
 
-# Findings of runs without anything to fit
+# Findings about runs without samples for fitting
 NOTHING_TO_FIT: Final = frozenset(("no-motion", "peaks-undeclared"))
 
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """A fault or an assumption about a record.
+    """Fault of a record, or assumption made about it.
 
     Parameters
     ----------
     what : str
         Stable key, like ``"time-gap"``.
     text : str
-        One line for people.
+        One line of plain text.
     mended : bool
         Whether the arrays of the run are corrected; otherwise they are as in the file.
     where : str
-        Run, rows of the file or times, as far as they are known.
+        Run, rows of the file or times, if known.
     from_s, to_s : float or None
         Time span, s, if the finding has one.
     """
@@ -48,7 +48,7 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """A stretch of a record with one state of the pendulum.
+    """Interval of a record with one state of the pendulum.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ class Segment:
         ``"held"`` before a release, ``"motion"``, ``"rest"`` after it, ``"handled"`` between two
         releases.
     from_s, to_s : float
-        Its first and last time, s.
+        First and last time, s.
     used : bool
-        Whether its samples are for fitting.
+        Whether the samples are for fitting.
     """
 
     what: str
@@ -69,35 +69,35 @@ class Segment:
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One record in SI, corrected where the correction is unambiguous.
+    """One record in SI, corrected if the correction is unambiguous.
 
     Parameters
     ----------
     name : str
         Name in messages.
     file : str
-        File that it is read from.
+        Source file.
     kind : str
         ``"free"`` or ``"forced"``.
     time : ndarray, shape (N,)
-        s, as in the file, strictly increasing.
+        Times of the file, s, strictly increasing.
     theta : ndarray, shape (N,)
-        rad, from the downward rest, unwrapped, finite.
+        Angle from the downward rest, rad, unwrapped, finite.
     trusted : ndarray of bool, shape (N,)
-        False where a sample is not for fitting: outlier, missed count, clipped, held by hand, at
-        rest, handled between two releases; everywhere where nothing moves.
+        False for samples that are not for fitting: outlier, missed count, clipped, held by hand, at
+        rest, handled between two releases; all samples of a record without motion.
     lab_time_s : float
         Start of the run on the laboratory's clock, s.
     hold_out : bool
-        Whether it is kept back from fits.
+        Whether the run is held out of fits.
     velocity : ndarray, shape (N,), or None
-        rad/s, where it was measured.
+        Measured velocity, rad/s, if any.
     acceleration : ndarray, shape (N,), or None
-        m/s^2 (or rad/s^2), where it was measured.
+        Measured acceleration, m/s^2 (or rad/s^2), if any.
     accelerometer : Accelerometer or None
-        Place of the accelerometer, if the angle was made from it alone.
+        Position of the accelerometer, if the angle was computed from it alone.
     gyroscope : Gyroscope or None
-        The gyroscope, if the angle was made from it alone.
+        The gyroscope, if the angle was computed from it alone.
     drive : mapping or None
         ``p``, ``Omega`` and ``phi`` (``None``: to be fitted) of a(t) = p cos(Omega t + phi).
     pivot : mapping of str to ndarray, or None
@@ -108,17 +108,17 @@ class Run:
     findings : tuple of Finding
         Findings about this run.
     peaks_only : bool
-        Whether the samples are turning points alone.
+        Whether the samples are turning points only.
     segments : tuple of Segment
-        Its stretches in order.
+        Segments in order of time.
     channels : mapping of str to str
         Column of each channel.
     unused : tuple of str
         Columns without a channel.
     count_rad : float
-        Smallest step of the readings, rad; 0 where none can be seen.
+        Resolution of the readings, rad; 0 if none is found.
     sha256 : str
-        Of the file.
+        SHA-256 of the file.
     """
 
     name: str
@@ -151,23 +151,23 @@ class Run:
 
     @property
     def copied(self) -> bool:
-        """Whether its readings are copies of another run, where they count."""
+        """Whether the readings are duplicates of another run's, which includes them."""
         return not self.moves and any(found.what == "same-record" for found in self.findings)
 
     @property
     def rod_sensor(self) -> Accelerometer | Gyroscope | None:
-        """The accelerometer or gyroscope whose readings a fit compares instead of the angle."""
+        """Accelerometer or gyroscope whose readings are fitted instead of the angle."""
         return self.accelerometer or self.gyroscope
 
     @property
     def read(self) -> Floats:
-        """The readings that a fit compares, in the unit of their sensor, shape (N,)."""
+        """Readings that are fitted, in the unit of their sensor, shape (N,)."""
         made_of = self.acceleration if self.accelerometer else self.velocity
         return self.theta if self.rod_sensor is None or made_of is None else made_of
 
     @property
     def rate_hz(self) -> float:
-        """Sampling rate of the whole record without its gaps, Hz."""
+        """Sampling rate of the record, gaps excluded, Hz."""
         from pendmap.signal.robust import intervals_of
 
         return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
@@ -180,16 +180,16 @@ class Experiment:
     Parameters
     ----------
     path : Path
-        The file or folder.
+        File or folder.
     runs : tuple of Run
-        In the order of the experiment.
+        Runs in the order of the experiment.
     known : mapping
         Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``; the limits
         ``max_angle`` (rad), ``max_velocity`` and ``max_frequency`` (rad/s).
     findings : tuple of Finding
         Findings about the experiment or a whole file with several releases.
     sha256 : mapping of str to str
-        Of each file that was read.
+        SHA-256 of each file that was read.
     """
 
     path: Path
@@ -200,13 +200,13 @@ class Experiment:
 
     @property
     def w0(self) -> float | None:
-        """The ``w0`` of ``[rig]``, rad/s; None if a record has an unlike period."""
+        """``w0`` of ``[rig]``, rad/s; None if not given or inconsistent with a record's period."""
         doubtful = any(f.what == "period-unlike-rig" for f in self._said())
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
 
     @property
     def gravity(self) -> float:
-        """The ``gravity`` of ``[rig]``, m/s^2; 9.81 by default."""
+        """``gravity`` of ``[rig]``, m/s^2; 9.81 by default."""
         return float(self.known.get("gravity", GRAVITY))
 
     def refuse_still(self, runs: Iterable[Run]) -> None:

@@ -1,8 +1,9 @@
-"""An angle from an accelerometer alone: the start of a fit and the angle in pictures.
+"""Angle from an accelerometer alone, as initial guess of a fit and for figures.
 
 A free swing has ``th'' = -w0**2 sin(th)`` without damping: a tangential sensor reads
-``(g - r w0**2) sin(th)``, an angular acceleration is ``-w0**2 sin(th)``. A half swing beyond a
-quarter turn has two humps with a dip between, where the angle is ``pi - arcsin``.
+``(g - r w0**2) sin(th)``, an angular acceleration is ``-w0**2 sin(th)``. The readings of a half
+swing beyond a quarter turn have two maxima with a dip between, in which the angle is
+``pi - arcsin``.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Stretch
 
 
-FEWEST_HALF_SWINGS: Final = 4  # Half swings from which a period is taken
+FEWEST_HALF_SWINGS: Final = 4  # Fewest half swings from which a period is estimated
 CERTAIN_DIP: Final = 0.3  # Relative dip that noise cannot cause
-LARGEST_READING: Final = 1.15  # Reading over the largest of a swing: place or unit is wrong
+LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
 ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-BLIND_SPOT: Final = 0.05  # Relative distance from the centre of oscillation that shows no swing
-WEAK_SPOT: Final = 0.2  # Relative distance from it within which a swing is seen weakly
-QUARTER_TURN_PERIOD: Final = 1.18  # Period of a swing of a quarter turn over that of a small one
-LEAST_DIP: Final = 0.01  # Relative dip between two humps at least
-DIP_NOISE: Final = 4.0  # Standard errors of a dip at least
-LEAST_HUMP: Final = 0.75  # Hump beside a dip over the largest reading, there the sine is 1
+BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
+WEAK_SPOT: Final = 0.2  # Relative distance to the centre of oscillation that gives a warning
+QUARTER_TURN_PERIOD: Final = 1.18  # Period at an amplitude of a quarter turn, over that at 0
+LEAST_DIP: Final = 0.01  # Least relative dip between two maxima
+DIP_NOISE: Final = 4.0  # Least dip, standard deviations of the noise
+LEAST_HUMP: Final = 0.75  # Least maximum beside a dip, over the greatest reading (sine 1)
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:
-    """Make the angle that an acceleration shows; return the doubt about it.
+    """Compute the angle from an acceleration; return a text on its uncertainty, or "".
 
-    Raises InputError if the readings are not those of a swing at this place: too few half swings,
-    all on one side, too large, over the top, or at the centre of oscillation.
+    Raises InputError if the readings are inconsistent with a swing at this position: too few half
+    swings, all on one side, too large, over the top, or at the centre of oscillation.
     """
     time, reading, where = work.time, work.extra["acceleration"], work.where
     noise = noise_of(time, reading).sigma
@@ -83,7 +84,7 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
 
 
 def _refuse_radial(reading: Floats, middle: float, sensor: Accelerometer, where: str) -> None:
-    """Refuse readings of an axis along the rod, which have one sign."""
+    """Raise InputError for readings of an axis along the rod, which have one sign."""
     low, high = (float(x) for x in np.quantile(reading, (0.02, 0.98)))
     sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
     if not sided or sensor.direction == "angular":
@@ -116,7 +117,7 @@ def _frequency(waves: list[Wave], sensor: Accelerometer) -> float:
 
 
 def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak: bool) -> str:
-    """Refuse a place at the centre of oscillation; return the doubt about one near it."""
+    """Raise InputError for a sensor at the centre of oscillation; return a warning near it."""
     if not sensor.gravity:
         return ""
     length = sensor.gravity / sensor.w0**2
@@ -129,7 +130,7 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
         if (1 - BLIND_SPOT) * lengths[0] < sensor.distance_m < (1 + BLIND_SPOT) * lengths[1]:
             length, away = min(lengths, key=lambda x: abs(x - sensor.distance_m)), 0.0
     if away < BLIND_SPOT:
-        # Weak readings give an uncertain frequency, and with it an uncertain centre of oscillation.
+        # Weak readings give an uncertain frequency and thus centre of oscillation.
         raise InputError(
             f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
             " g/w0^2 from the pivot, where gravity and the swing cancel: only damping is"
@@ -146,7 +147,7 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
 
 
 def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> None:
-    """Refuse readings larger than those of any swing, and turns over the top."""
+    """Raise InputError for readings larger than those of any swing, and for rotations."""
     top = float(np.quantile([wave.top for waves in each for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > LARGEST_READING * most:
@@ -181,7 +182,7 @@ def _unfolded(
     for (begin, _), whole in zip(free, each, strict=True):
         waves = list(whole)
         if waves and waves[0].low > begin + 2:
-            # A swing released beyond a quarter turn begins in a dip.
+            # Readings of a swing released beyond a quarter turn begin in a dip.
             start = wave_of(values, begin, waves[0].low, noise)
             if not start.folded(most) and waves[0].folded(most):
                 start = dataclasses.replace(start, humps=(begin, start.humps[1]), dip=waves[0].dip)
@@ -197,7 +198,7 @@ def _unfolded(
 
 @dataclasses.dataclass(frozen=True)
 class Wave:
-    """Readings between two crossings of the middle: humps, height and relative dip."""
+    """Readings between two crossings of the middle: maxima, height and relative dip."""
 
     low: int
     high: int
@@ -207,7 +208,7 @@ class Wave:
     half_period: float = math.nan
 
     def folded(self, gain: float) -> bool:
-        """Return whether the swing went beyond a quarter turn."""
+        """Return whether the amplitude exceeds a quarter turn."""
         return self.dip > 0 and self.top > LEAST_HUMP * abs(gain)
 
     def amplitude(self, gain: float) -> float:
@@ -232,7 +233,7 @@ def waves_of(time: Floats, values: Floats, part: Stretch, noise: float) -> list[
 def wave_of(
     values: Floats, low: int, high: int, noise: float, half_period: float = math.nan
 ) -> Wave:
-    """Return the half swing between two places."""
+    """Return the half swing between two indices."""
     size = np.abs(values[low:high])
     # The mean of three samples removes dips of single samples.
     smooth = np.convolve(np.pad(size, 1, mode="edge"), np.ones(3) / 3, mode="valid")
@@ -246,6 +247,6 @@ def wave_of(
     if min(before[at], after[at]) < 0.7 * height or depth[at] < max(
         LEAST_DIP * height, DIP_NOISE * noise
     ):
-        dip, ends = 0.0, (top, top)  # one hump: what noise does on its slope is no dip
+        dip, ends = 0.0, (top, top)  # one maximum: fluctuations on its slope are noise
     humps = (low + ends[0], low + ends[1])
     return Wave(low, high, humps, height, min(dip, 1.0), half_period)

@@ -1,7 +1,8 @@
 """Noise that grows with speed: ``sigma^2 = still^2 + (tau v)^2``.
 
-A clock whose instants miss their stamps by ``tau`` adds ``tau v`` to the noise ``still`` of the
-sensor. Both are fitted to squared residuals of local polynomials by the normal likelihood.
+Timing jitter, a random difference of sampling instants and stamps with standard deviation ``tau``,
+adds ``tau v`` in quadrature to the sensor's noise ``still``. Both are fitted to squared residuals
+of local polynomials by the normal likelihood.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
     from pendmap.signal.local_polynomial import LocalFit
 
 
-SPEED_REACH: Final = 0.7  # Radians of phase to either side from which a speed is taken
-FALSE_READING: Final = 8.0  # Standard deviations from the median of five that replace a reading
-CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` from which it is reported
-LEAST_GROWTH: Final = 0.1  # Reported ``(tau v)^2`` at the quickest over ``still^2``
+SPEED_REACH: Final = 0.7  # Half-width of the polynomials that give speeds, rad of phase
+FALSE_READING: Final = 8.0  # Standard deviations from a median of five that replaces a reading
+CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` above which it is significant
+LEAST_GROWTH: Final = 0.1  # Least ``(tau v)^2`` at the greatest speed, over ``still^2``
 DITHERED: Final = 0.55  # Noise over count below which slow readings do not show the noise
-FEWEST_RESIDUALS: Final = 200  # Residuals from which two numbers are fitted
-ROUNDS: Final = 30
-BEND_REACH: Final = 0.5  # Radians of phase to either side from which a second derivative is taken
+FEWEST_RESIDUALS: Final = 200  # Fewest residuals to which ``still`` and ``tau`` are fitted
+ROUNDS: Final = 30  # Most iterations of the weights
+BEND_REACH: Final = 0.5  # Half-width of second differences, rad of phase
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,8 +36,8 @@ class SpeedLaw:
     """Noise as a function of speed, ``sigma^2 = still^2 + (tau v)^2``."""
 
     still: float  # standard deviation of readings at rest, rad
-    tau: float  # standard deviation of the instants of sampling, s
-    stderr: float  # of tau, s
+    tau: float  # standard deviation of the sampling instants, s
+    stderr: float  # standard error of tau, s
     fastest: float  # largest phase velocity of the motion, rad/s
     grows_with: str = "speed"
 
@@ -52,9 +53,9 @@ class SpeedLaw:
         return np.hypot(self.still, self.tau * speed_of(time, theta, self.fastest))
 
     def shift(self, time: Floats, theta: Floats) -> Floats:
-        """Return the mean difference of readings from the motion, rad, shape (N,).
+        """Return the bias of readings by jitter, rad, shape (N,).
 
-        ``E theta(t + d) - theta(t) = tau^2 theta'' / 2``: jitter makes a swing look smaller.
+        ``E theta(t + d) - theta(t) = tau^2 theta'' / 2``: jitter reduces apparent amplitudes.
         """
         calm = _calm(theta)
         lag = _lag(time, BEND_REACH / self.fastest)
@@ -67,10 +68,10 @@ class SpeedLaw:
 
 
 def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
-    """Return the size of the velocity at every stamp, rad/s, from slopes of quartics.
+    """Return the speed at every stamp, rad/s, from slopes of local quartics.
 
-    ``fastest`` is the largest phase velocity, rad/s. Slopes of quartics are odd about the middle:
-    their noise is independent of the residual there. Single false samples are replaced before.
+    ``fastest`` is the largest phase velocity, rad/s. The slope's weights are odd about the middle:
+    its noise is independent of the residual there. Single outliers are replaced before.
     """
     reach = max(_lag(time, SPEED_REACH / fastest), 3)
     if time.size <= 2 * reach:
@@ -78,21 +79,21 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
     middle, weights = even_weights(4, 2 * reach + 1)
 
     def adapted(values: Floats, by: Floats) -> Floats:
-        """Quartics by the number of the sample, as ``by`` weighs their values."""
+        """Return local quartics in the sample number, evaluated with the weights ``by``."""
         padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
         return np.correlate(padded, by, "valid")
 
     slope = adapted(time, weights)
     speed = adapted(_calm(theta), weights) / slope
-    # A fit by sample number gives the speed at the regular instant. The weight of a reading needs
-    # the speed at its stamp, or the fit is biased. The offset of a stamp is predicted from its
-    # neighbours without the stamp itself, and limited beside a gap.
+    # A fit in the sample number gives the speed at the regular instant. The weight of a reading
+    # needs the speed at its stamp, or the fit is biased. The offset of a stamp is predicted from
+    # its neighbours without the stamp itself, and limited next to gaps.
     off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
     return np.asarray(np.abs(speed + off * np.gradient(speed)))
 
 
 def _calm(theta: Floats) -> Floats:
-    """Return readings, single false ones replaced by the median of their neighbours."""
+    """Return readings with single outliers replaced by the median of their neighbours."""
     padded = np.concatenate((theta[:1], theta[:1], theta, theta[-1:], theta[-1:]))
     middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     off = np.abs(theta - middle)
@@ -100,20 +101,20 @@ def _calm(theta: Floats) -> Floats:
 
 
 def _lag(time: Floats, seconds: float) -> int:
-    """Return the samples in a time, at least 1."""
+    """Return the number of sampling intervals in a duration, at least 1."""
     return max(int(seconds / float(np.median(np.diff(time)))), 1)
 
 
 def law_of(
     fit: LocalFit, square: Floats, *, fastest: float, count: float = 0.0, interval: float = 0.0
 ) -> SpeedLaw | None:
-    """Return how the noise of a fit grows with speed; None where that does not show.
+    """Return the growth of a fit's noise with speed; None if it is not significant.
 
-    ``square`` holds the squared speed of each residual, (rad/s)^2.
+    ``square`` is the squared speed of each residual, (rad/s)^2.
     """
     found = _adapted(fit.residual, square, fit.sum_of_squares, count)
     if found is not None and count and found[0] < DITHERED * count:
-        # Slow readings that share a count have one error, which residuals do not show.
+        # Slow readings that share a count have a common error, absent from residuals.
         quick = square >= (count / interval) ** 2
         found = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
     return None if found is None else SpeedLaw(*found, fastest)
@@ -122,9 +123,10 @@ def law_of(
 def _adapted(
     residual: Floats, square: Floats, worth: float, count: float
 ) -> tuple[float, float, float] | None:
-    """Return ``still``, ``tau`` and its error; None where tau does not show.
+    """Return ``still``, ``tau`` and its standard error; None if tau is not significant.
 
-    Fits ``E r^2 = a + b v^2`` by iterated weights ``1 / (a + b v^2)^2``.
+    Fits ``E r^2 = a + b v^2`` by iteratively reweighted least squares, weights
+    ``1 / (a + b v^2)^2``.
     """
     if residual.size < FEWEST_RESIDUALS:
         return None
@@ -142,7 +144,7 @@ def _adapted(
         inverse = np.asarray(np.linalg.pinv(rows.T @ weighted), np.float64)
         last, coefficients = coefficients, inverse @ (weighted.T @ power)
         if coefficients[0] < least:
-            # At the lower bound, which the count sets, only the slope is fitted.
+            # At the lower bound, set by the count, only the slope is fitted.
             slope = float(weighted[:, 1] @ (power - least)) / float(weighted[:, 1] @ rows[:, 1])
             coefficients = np.array([least, slope])
         coefficients[1] = max(coefficients[1], 0.0)
@@ -150,7 +152,7 @@ def _adapted(
         if np.allclose(coefficients, last, rtol=1e-4, atol=0.0):
             break
     still, growth = math.sqrt(coefficients[0]), float(coefficients[1])
-    # Errors from the scatter itself: noise need not be normal.
+    # Standard errors from the observed scatter, as the noise need not be normal.
     weighted = rows / variance[:, None] ** 2
     pull = weighted * (power - variance)[:, None]
     error = math.sqrt(max(float((inverse @ (pull.T @ pull) @ inverse)[1, 1]) * worth, 0.0))

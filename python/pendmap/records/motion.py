@@ -1,4 +1,4 @@
-"""Stretches of a free record: held, released, swinging, at rest, released again."""
+"""Segmentation of a free record: held, swinging, at rest, handled between releases."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Stretch
 
-STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
-NOISE_SPAN: Final = 0.1  # Radians within which readings as rough as noise show no motion
-MOST_LISTED: Final = 6  # Releases whose times a message lists at most
-CERTAIN_OFFSET: Final = 4.0  # Standard errors from which an offset is reported
+STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
+NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
+MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
+CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported
 
 
 def moves(work: Work) -> bool:
-    """Return whether anything moves; report rest; raise InputError for a constant angle."""
+    """Return whether the pendulum moves; report rest; InputError for a constant angle."""
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
@@ -51,7 +51,7 @@ def moves(work: Work) -> bool:
 
 
 def _measure_noise(work: Work) -> None:
-    """Set the noise of an angle; of an integrated one, its random walk over a period."""
+    """Set the noise of the angle; of an integrated angle, its random walk over a period."""
     if work.integrated:
         rate = work.extra["velocity"]
         seen = gyroscope_of(work.time, work.theta, rate)
@@ -59,16 +59,16 @@ def _measure_noise(work: Work) -> None:
         work.noise = normal_scale(local_fit(work.time, rate).residual) * walk
     else:
         work.noise = normal_scale(local_fit(work.time, work.theta).residual)
-    # The residuals of slow sampling contain motion, which must not count as noise.
+    # With slow sampling the residuals contain motion, so the limit is bounded by the range.
     reach = 0.4 * float(np.ptp(work.theta))
     work.limit = min(reach, max(STILL_SPAN * work.noise, 2.5 * work.count))
 
 
 def check(work: Work) -> None:
-    """Divide a free record into stretches and trust those that swing freely."""
+    """Divide a free record into segments and trust those of free swings."""
     if work.plan.kind != "free":
         return
-    # An angle made of an acceleration folds: its readings over the gain are used instead.
+    # An angle computed from an acceleration is folded: its readings over the gain are used.
     told = work if work.made_of is None else _felt(work, work.made_of)
     _measure_noise(told)
     good = told.theta[told.trusted]
@@ -101,7 +101,7 @@ def check(work: Work) -> None:
 
 
 def _felt(work: Work, sensor: Accelerometer) -> Work:
-    """Return a record with its accelerometer's readings over the gain in place of the angle."""
+    """Return a record with accelerometer readings over the gain in place of the angle."""
     readings = work.extra["acceleration"].copy()
     bad = ~work.trusted
     readings[bad] = np.interp(work.time[bad], work.time[~bad], readings[~bad])
@@ -109,7 +109,7 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
 
 
 def _let_swing(told: Work, span: Stretch) -> list[Stretch]:
-    """Return the stretches of free swings that an accelerometer shows."""
+    """Return the stretches of free swings in accelerometer readings."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
     free, _ = swinging(time, readings, noise)
@@ -133,7 +133,7 @@ def _period(work: Work, middle: float) -> float | None:
 
 
 def _still(work: Work, span: Stretch) -> list[Stretch]:
-    """Return stretches within ``span`` of a period and more in which nothing moves."""
+    """Return the stretches without motion, a period or longer, within ``span``."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
@@ -178,12 +178,12 @@ def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -
 
 
 def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
-    """Report which releases are used, and which are too short."""
+    """Report the releases that are used and those that are too short."""
     spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in parts]
     taken = [span for span, use in zip(spans, used, strict=True) if use]
     short = [span for span, use in zip(spans, used, strict=True) if not use]
     each = "each taken as a run" if len(taken) > 1 else "one is used"
-    # The times are those of the used samples; holds end late rather than early.
+    # The times are those of the used samples; ends of holds are estimated conservatively.
     text = f"{counted(len(parts), 'release')}, used from {listed(taken, MOST_LISTED)}: {each}"
     if short:
         text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
@@ -192,7 +192,7 @@ def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
-    """Return the segment of a stretch without a swing, if it has samples: rest, held, handled."""
+    """Return the rest, held or handled segment of a stretch without a swing, if not empty."""
     level = work.theta[slice(*part)]
     if not level.size:
         return []
@@ -209,9 +209,9 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
 
 
 def check_zero(work: Work) -> None:
-    """Report the rest of a free run, or the middle of its swing, if it is not 0."""
+    """Report a rest angle, or middle of the swings, of a free run that is not 0."""
     if work.plan.kind != "free" or not work.releases or work.made_of is not None or work.integrated:
-        return  # of a sensor on the rod: the middle was taken for 0 as the angle was made
+        return  # an angle from a sensor on the rod has its zero at the middle
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]
@@ -228,7 +228,7 @@ def check_zero(work: Work) -> None:
         middles = swings(time[start:], theta[start:], least=work.limit).middle
         if middles.size < 6:
             return
-        middles = middles[middles.size // 2 :]  # small swings: no friction's asymmetry, no turns
+        middles = middles[middles.size // 2 :]  # small swings: no asymmetry by friction, no turns
         value = float(np.median(middles))
         error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
         error = max(error, work.count / math.sqrt(12 * middles.size))
@@ -239,5 +239,5 @@ def check_zero(work: Work) -> None:
 
 
 def _folded(angle: float) -> float:
-    """Return an angle within half a turn of 0."""
+    """Return an angle modulo a turn, in [-pi, pi]."""
     return angle - 2 * math.pi * round(angle / (2 * math.pi))

@@ -1,16 +1,16 @@
-"""The noise of a record, without a model of the pendulum.
+"""Noise of a record, estimated without a model of the pendulum.
 
-Polynomials through neighbouring samples follow the motion; the residual over the filter's gain is
-noise. Three faults are treated:
+The noise is the residual of local polynomials over the filter's gain. Three faults are treated:
 
-- Slow sampling leaves motion in the residual: the degree rises until a higher one leaves no less.
-- Readings that share a coarse count err alike: samples at least a count apart are taken instead.
-  Slower motion shows only count/sqrt(12), the least that is reported. At rest the shares of the
-  counts show more (:func:`pendmap.records.resolution.still_noise`).
-- Outliers beyond eight robust standard deviations, among samples of similar speed, are left out
-  with their windows; the noise is the root mean square of the others.
+- Slow sampling leaves motion in the residual: the degree is raised until the residual no longer
+  decreases.
+- Readings that share a coarse count have equal errors: samples at least a count apart are fitted
+  instead. For slower motion the estimate is count/sqrt(12), the lower bound. At rest it is derived
+  from the frequencies of the counts (:func:`pendmap.records.resolution.still_noise`).
+- Windows with outliers beyond eight robust standard deviations, among samples of similar speed, are
+  excluded; the noise is the root mean square of the others.
 
-Correlated noise is underestimated: ``colour`` shows how the reading depends on the filter.
+Correlated noise is underestimated: ``colour`` is the dependence of the estimate on the filter.
 """
 
 from __future__ import annotations
@@ -36,31 +36,31 @@ if TYPE_CHECKING:
     from pendmap.signal.local_polynomial import LocalFit
 
 
-SLOW_SAMPLING: Final = 0.06  # Radians of phase between samples that quartics do not follow
-WAY_PHASE: Final = 0.25  # Radians of phase over which a way is measured, if longer than an interval
-DITHERED: Final = 0.55  # Noise over count above which neighbouring readings err independently
-CLEAR_WAY: Final = 4  # Counts of way from which a speed is taken
-TOO_FEW: Final = 0.3  # Radians of phase between samples that no polynomial follows
-SPEED_RANGES: Final = 4  # Ranges of speed with equally many samples
-OUTLIER: Final = 8.0  # Standard deviations from which a residual is an outlier
-FEWEST_RESIDUALS: Final = 40  # Residuals from which a standard deviation is taken
-OUTLIER_RANGES: Final = 16  # Ranges of speed with equally many samples and own outliers
-CLEARLY_LESS: Final = 1.02  # Ratio of two noise readings from which one is less
-DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))  # Degrees and samples, as tried
-FARTHEST: Final = 0.25  # Radians of phase between samples that coarse counts move apart, at most
-MORE_STRIDES: Final = 4  # Strides beyond the shortest that are read too
-STIFF_STRIDE: Final = 2.0  # Factor by which samples of the highest degree may be farther apart
+SLOW_SAMPLING: Final = 0.06  # Phase between samples, rad, above which quartics leave motion
+WAY_PHASE: Final = 0.25  # Phase over which displacements are measured, rad, unless one interval
+DITHERED: Final = 0.55  # Noise over count above which neighbouring errors are independent
+CLEAR_WAY: Final = 4  # Least displacement from which a speed is computed, counts
+TOO_FEW: Final = 0.3  # Phase between samples, rad, above which polynomials fail: upper bound only
+SPEED_RANGES: Final = 4  # Ranges of speed, with equally many samples each, with a reported noise
+OUTLIER: Final = 8.0  # Standard deviations above which a residual is an outlier
+FEWEST_RESIDUALS: Final = 40  # Fewest residuals from which a standard deviation is estimated
+OUTLIER_RANGES: Final = 16  # Most ranges of speed with separate outlier limits
+CLEARLY_LESS: Final = 1.02  # Least ratio of two noise estimates that differ
+DEGREES: Final = ((4, 9), (6, 11), (8, 13), (10, 15))  # Degrees and samples, in the order tried
+FARTHEST: Final = 0.25  # Greatest phase between samples a count apart, rad
+MORE_STRIDES: Final = 4  # Number of strides beyond the shortest that are pooled
+STIFF_STRIDE: Final = 2.0  # Factor on FARTHEST for the highest degree
 
 
 @dataclasses.dataclass(frozen=True)
 class SpeedRange:
-    """Noise among samples of similar speed."""
+    """Noise of samples of similar speed."""
 
     speed_from: float  # rad/s
     speed_to: float  # rad/s
     sigma: float  # rad
     stderr: float  # rad
-    samples: int  # residuals that it comes from
+    samples: int  # number of residuals
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,20 +70,21 @@ class NoiseFloor:
     Parameters
     ----------
     sigma, stderr : float
-        rad, rounding to counts included; ``nan`` where there are too few samples.
+        Noise and its standard error, rad, including rounding to counts; ``nan`` with too few
+        samples.
     by_speed : tuple of SpeedRange
-        From slow to fast.
+        Noise in ranges of speed, from slow to fast.
     limited_by_count : bool
-        Whether ``sigma`` is count/sqrt(12) because the record cannot show less.
+        Whether ``sigma`` is count/sqrt(12), the lower bound set by the resolution.
     colour : float
-        Reading of the quartic over that of the next degree: 1 for white noise, more where noise
+        Estimate of the quartic over that of the next degree: 1 for white noise, more if the noise
         is correlated from sample to sample or the motion is not followed.
     samples : int
         Number of residuals.
     law : SpeedLaw or None
-        Growth of the noise with speed, where the record shows it.
+        Growth of the noise with speed, if it is significant.
     bound : bool
-        Whether ``sigma`` is an upper bound: few samples a period leave some motion in it.
+        Whether ``sigma`` is an upper bound: few samples per period leave some motion in it.
     """
 
     sigma: float
@@ -97,10 +98,10 @@ class NoiseFloor:
 
 
 def noise_floor(run: Run) -> NoiseFloor:
-    """Return the noise of a run, without a model of the pendulum.
+    """Return the noise of a run, estimated without a model of the pendulum.
 
-    Polynomials through neighbouring trusted samples follow the motion; the root mean square of
-    their residuals, over the filter's gain, is the noise. If no sample is trusted, all are used.
+    Polynomials are fitted to neighbouring trusted samples; the noise is the root mean square of
+    their residuals over the filter's gain. If no sample is trusted, all are used.
 
     Parameters
     ----------
@@ -110,8 +111,8 @@ def noise_floor(run: Run) -> NoiseFloor:
     Returns
     -------
     NoiseFloor
-        In rad against the speed in rad/s; of a gyroscope alone in rad/s against its change in
-        rad/s^2. ``nan`` where only turning points are known or there are too few samples.
+        Noise in rad against the speed in rad/s; of a gyroscope alone in rad/s against its change in
+        rad/s^2. ``nan`` if only turning points are known or there are too few samples.
 
     Examples
     --------
@@ -145,8 +146,8 @@ def noise_of(
 ) -> NoiseFloor:
     """Return the noise of readings, shape (N,), of any smooth motion.
 
-    Windows with untrusted samples are left out unless too few remain. ``count`` is the step of the
-    readings, rad; 0 for none.
+    Windows with untrusted samples are excluded unless too few remain. ``count`` is the resolution
+    of the readings, rad; 0 for none.
     """
     bad = np.zeros(time.size, bool) if trusted is None else ~trusted
     found = _noise(time, theta, bad, count)
@@ -205,7 +206,7 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
     """Return the largest phase velocities, rad/s.
 
-    The first counts large swings as rotations, whose bends are as sharp; the second does not.
+    The first treats large swings as rotations, whose curvature is similar; the second does not.
     """
     interval = float(np.median(np.diff(time)))
     lag = 1
@@ -219,7 +220,7 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
     length = min(reach, 1.0) if float(np.ptp(theta)) > math.pi else reach
     slowest = 1.0 / float(time[-1] - time[0])
     phase = max(way / (lag * interval * length), slowest)
-    # Noise between neighbours looks like speed: longer ways reduce it.
+    # Noise adds to the displacement between neighbours: longer lags reduce its effect.
     while lag < (longer := min(int(WAY_PHASE / (phase * interval)), theta.size // 8)):
         lag = longer
         way = float(np.quantile(np.abs(theta[lag:] - theta[:-lag]), 0.98))
@@ -229,7 +230,7 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
 
 
 def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
-    """Return the noise in ranges of speed; below ``slowest`` it is that of the count."""
+    """Return the noise in ranges of speed; below ``slowest``, that of the count."""
     speed = np.abs(fit.slope)
     number = max(min(SPEED_RANGES, fit.middle.size // FEWEST_RESIDUALS), 1)
     edges = np.quantile(speed, np.linspace(0, 1, number + 1))
@@ -248,7 +249,7 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
 def check(work: Work) -> None:
     """Report noise that grows with speed."""
     if work.integrated:
-        return  # a late reading of a rate errs with the acceleration
+        return  # the noise by jitter of a rate grows with the acceleration
     count = 0.0 if work.edges else work.count
     law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
     if law is not None:
@@ -257,7 +258,7 @@ def check(work: Work) -> None:
 
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
-    """Leave out windows with bad samples, then those with outliers among similar speeds."""
+    """Return a fit without windows that have bad samples or outliers among similar speeds."""
     fit = fit.only(~_near(bad, fit.neighbours)[fit.middle])
     false = np.zeros(speed.size, bool)
     sizes = np.abs(fit.residual)
@@ -265,14 +266,14 @@ def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
     order = np.argsort(speed[fit.middle], kind="stable")
     ranges = max(min(OUTLIER_RANGES, order.size // (5 * FEWEST_RESIDUALS)), 1)
     for part in np.array_split(order, ranges):
-        # Noise that grows with speed is largest among the quickest samples.
+        # Noise that grows with speed is largest for the fastest samples.
         scale = max(whole, broad_scale(sizes[part]))
         false[fit.middle[part[sizes[part] > OUTLIER * scale]]] = scale > 0
     return fit.only(~_near(false, fit.neighbours)[fit.middle])
 
 
 def _near(marked: Mask, reach: int) -> Mask:
-    """Return which places are within ``reach`` of a marked one."""
+    """Return the mask of indices within ``reach`` of a marked one."""
     sums = np.concatenate([[0], np.cumsum(marked)])
     place = np.arange(marked.size)
     low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
@@ -287,7 +288,7 @@ def less(fit: LocalFit, other: LocalFit) -> bool:
 
 
 def followed(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
-    """Return the fit of the lowest degree above which no degree leaves less."""
+    """Return the fit of the lowest degree whose residual the next degree does not reduce."""
     chosen = first
     for degree, points in DEGREES[1:]:
         higher = fitted(degree=degree, points=points)
@@ -304,14 +305,14 @@ def apart(
     swing: float,
     nearest: LocalFit | None,
 ) -> tuple[LocalFit, float] | None:
-    """Return a fit of samples at least a count apart, and the slowest speed where they are.
+    """Return a fit of samples at least a count apart, and the least speed at which they are.
 
-    ``nearest`` is the fit of neighbours that follows the motion where sampling is slow.
+    ``nearest`` is the fit of neighbours if sampling is slow, else None.
     """
     most = max(int(FARTHEST / (swing * interval)), 1)
     stride = 1
     while True:
-        # Neighbours of slower motion are within a count and have equal errors.
+        # At lower speeds neighbours are within a count and have equal errors.
         slowest = count / (stride * interval)
         fit = fitted(degree=6, points=11, stride=stride)
         if stride == 1 and nearest is not None and less(nearest, fit):
@@ -332,7 +333,7 @@ def apart(
         np.concatenate([getattr(each, name) for each in found])
         for name in ("middle", "residual", "slope")
     )
-    # All residuals together are worth those of the first fit.
+    # Overlapping residuals: the pooled fit has the effective number of the first one.
     worth = found[0].sum_of_squares * middle.size / found[0].middle.size
     pooled = dataclasses.replace(
         found[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth

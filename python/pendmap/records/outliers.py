@@ -1,8 +1,8 @@
-"""Outliers, and jumps that stay: missed counts of an encoder, slipped turns.
+"""Outliers and persistent jumps: missed counts of an encoder, slipped turns.
 
-A push changes the velocity of a pendulum, never its angle at once: a jump that stays is the
-sensor's, one that returns is an outlier. A jump makes one difference between samples false, an
-outlier two. Samples at an end of a record or a gap are predicted from those further in.
+A push changes the velocity of a pendulum, but its angle is continuous: a jump that persists is an
+error of the sensor, one that returns an outlier. A jump makes one difference between samples wrong,
+an outlier two. Samples at an end of a record or a gap are predicted from those further inside.
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ if TYPE_CHECKING:
     _Group = slice | Indices
 
 
-SUSPECT: Final = 10.0  # Local standard deviations of a residual from which it is examined
-SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is taken
-PASSES: Final = 8  # Searches for false samples; each may uncover one beside another
-MOST_OUTLIERS: Final = 0.1  # Share of samples above which they are no outliers
-SIDE: Final = 10  # Samples on each side by which a sample is judged
-MOST_TOGETHER: Final = 6  # Neighbouring false samples that can be told from the motion
-WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute distances
-CERTAIN_JUMP: Final = 7.0  # Standard errors from which a step is a jump
-OFF_COUNT: Final = 0.25  # Counts by which a jump may miss a whole number and be corrected
-MOST_JUMPS: Final = 20  # Jumps above which no counts were missed
+SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
+SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
+PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
+MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
+SIDE: Final = 10  # Samples on each side from which a sample is judged
+MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished from the motion
+WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
+CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
+OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
+MOST_JUMPS: Final = 20  # Most jumps that are corrected
 TURN: Final = 2 * math.pi
-OFF_TURN: Final = 0.1  # Radians by which a jump may miss whole turns
-OTHER_RECORD: Final = 0.5  # Radians of a jump from which two recordings may stand in one file
-END_SAMPLES: Final = 10  # Samples of each end that are judged by prediction
-END_GAP: Final = POINTS // 2  # Intervals without a sample that no window crosses
-PREDICTIONS: Final = 40  # Predictions further in that show the usual error
+OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
+OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
+END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
+END_GAP: Final = POINTS // 2  # Longest gap, intervals, that windows cross
+PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
 END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 @dataclasses.dataclass(frozen=True)
 class _Jump:
-    """The zero moves by ``size`` +- ``error`` rad before sample ``at``."""
+    """Change of the zero by ``size`` +- ``error`` rad before sample ``at``."""
 
     at: int
     size: float
@@ -58,13 +58,13 @@ class _Jump:
 
 
 def find(work: Work) -> None:
-    """Mark outliers; correct jumps by whole counts, of others keep the longest part."""
+    """Mark outliers; correct jumps by whole counts or keep the longest part between jumps."""
     theta, bad = work.theta.copy(), ~work.trusted
     if theta.size < 2 * POINTS or bad.all():
         return
     _bridge(work.time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[_Jump]()
-    # The motion has corners beside clipped or frozen samples.
+    # The motion has corners next to clipped or frozen samples.
     # (mode="same" would return the length of the window for a shorter record.)
     corner = np.convolve(bad, np.ones(2 * SIDE + 1))[SIDE : SIDE + bad.size] > 0.5
     seen = corner.copy()
@@ -96,14 +96,14 @@ def find(work: Work) -> None:
 
 
 def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> None:
-    """Mark outliers and report how far they are away."""
+    """Mark outliers and report the greatest deviation."""
     worst = float(np.max(np.abs(away[at]), initial=0.0))
     text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
     work.distrust(at, "outliers", text)
 
 
 def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
-    """Replace false samples by straight lines."""
+    """Replace outliers by linear interpolation, in place."""
     if not false.all():
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
@@ -111,9 +111,9 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
 def _told(
     work: Work, theta: Floats, at: Indices, scale: Floats
 ) -> list[tuple[int, _Group, _Jump | None]]:
-    """Return the suspects that can be judged, with their false samples.
+    """Return the suspects that can be judged, with their outliers and jumps.
 
-    Suspects and jumps beside another false sample are judged again once that one is corrected.
+    Suspects and jumps next to another outlier are judged again after its correction.
     """
     verdicts = [
         (k, *_judge(work.time, theta, k, sigma, work.count))
@@ -147,9 +147,9 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
 
 
 def _highest(fit: LocalFit) -> Mask:
-    """Return which residuals are the largest of all windows that share a sample with them.
+    """Return the mask of residuals that are the largest of all overlapping windows.
 
-    A false reading changes every window that contains it, its own the most.
+    An outlier changes every window that contains it, its own the most.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -160,7 +160,7 @@ def _highest(fit: LocalFit) -> Mask:
 def _judge(
     time: Floats, theta: Floats, k: int, sigma: float, count: float
 ) -> tuple[_Group, _Jump | None]:
-    """Return the false samples around ``k``, and the jump there or None."""
+    """Return the outliers around ``k``, and the jump there or None."""
     low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
     t, part = time[low:high] - time[k], theta[low:high] - theta[k]
     step = np.diff(t)
@@ -180,7 +180,7 @@ def _judge(
     group = slice(low + first + 1, low + last + 1)
     before, after = slice(0, first + 1), slice(last + 1, part.size)
     if min(first + 1, part.size - last - 1) < 4:
-        # An end is too short to tell a jump from an outlier: the shorter side is false.
+        # Near an end a jump cannot be distinguished from outliers: mark the shorter side.
         if low == 0 and first + 1 < 4:
             return slice(0, group.stop), None
         return slice(group.start, theta.size) if high == theta.size else group, None
@@ -189,7 +189,7 @@ def _judge(
     jumped = np.concatenate([np.zeros(first + 1), np.ones(part.size - last - 1)])
     columns = np.column_stack([np.vander(x, 4), jumped])
     values = np.concatenate([part[before], part[after]])
-    # Least absolute distances tolerate other false samples nearby.
+    # Least absolute deviations tolerate other outliers nearby.
     answer = _least_absolute(columns, values)
     rest = normal_scale(values - columns @ answer)
     gain = math.sqrt(float(np.linalg.pinv(columns.T @ columns)[-1, -1]))
@@ -197,7 +197,7 @@ def _judge(
     size = float(answer[-1])
     if abs(size) > CERTAIN_JUMP * error:
         return group, _Jump(low + last + 1, size, error)
-    # Samples between two outliers may be right.
+    # Samples between two outliers may be correct.
     inner = slice(first + 1, last + 1)
     off = np.abs(_smooth(t, part))
     far = 5 * max(sigma, normal_scale(off), count / math.sqrt(12)) + count
@@ -205,13 +205,13 @@ def _judge(
 
 
 def _smooth(x: Floats, y: Floats) -> Floats:
-    """Return the distance of ``y`` from the cubic of least absolute distances."""
+    """Return the residual of ``y`` from the cubic of least absolute deviations."""
     columns = np.vander(x / max(float(np.max(np.abs(x))), 1e-300), 4)
     return y - columns @ _least_absolute(columns, y)
 
 
 def _least_absolute(columns: Floats, y: Floats) -> Floats:
-    """Return coefficients of least absolute distances, by iterated weights."""
+    """Return coefficients of least absolute deviations, by iteratively reweighted fits."""
     weights = np.ones(y.size)
     answer = np.zeros(columns.shape[1])
     for _ in range(WEIGHT_STEPS):
@@ -226,7 +226,7 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
 
 
 def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
-    """Correct the clock where jumps are its slips; return the other jumps."""
+    """Correct the clock for jumps that are its slips; return the other jumps."""
     found = slips_of(work.time, theta) if jumps else None
     if found is None:
         return jumps
@@ -241,7 +241,7 @@ def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
 
 
 def _moved(work: Work, jumps: list[_Jump]) -> None:
-    """Correct jumps by whole turns or counts; of others keep the longest part."""
+    """Correct jumps by whole turns or counts, or keep the longest part between jumps."""
     if not jumps:
         return
     places = np.asarray([jump.at for jump in jumps], np.intp)
@@ -276,7 +276,7 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
 
 
 def _whole(jump: _Jump, count: float) -> int:
-    """Return the counts of a jump, 0 where they are not certain."""
+    """Return the number of counts of a jump, 0 if it is uncertain."""
     if not count or jump.error > OFF_COUNT * count:
         return 0
     number = round(jump.size / count)
@@ -286,8 +286,8 @@ def _whole(jump: _Jump, count: float) -> int:
 def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[Stretch]) -> None:
     """Mark readings of an accelerometer or gyroscope far from their neighbours.
 
-    Jumps that stay are ignored: friction causes them, and a hand at the ends of the ``free``
-    swings. Nothing outside of these is fitted.
+    Persistent jumps are ignored: friction causes them, and a hand at the ends of the ``free``
+    swings. Readings outside of these are not fitted.
     """
     if work.time.size < 2 * POINTS:
         return
@@ -309,9 +309,9 @@ def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[Stretch]) 
 
 
 def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: float) -> Mask:
-    """Return which readings at the ends of a record and of its gaps are outliers, shape (N,).
+    """Return the mask of outliers at the ends of a record and of its gaps, shape (N,).
 
-    ``limit`` is in usual errors of prediction; ``count`` is the step of the readings, rad.
+    ``limit`` is in usual errors of prediction; ``count`` is the resolution of the readings, rad.
     """
     false = np.zeros(theta.size, bool)
     good = np.flatnonzero(trusted)
@@ -330,7 +330,7 @@ def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: 
 
 
 def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
-    """Judge the first readings, inner ones first; outliers are replaced by predictions."""
+    """Return the mask of outliers among the first readings, tested from the inside outward."""
     inner = np.arange(END_SAMPLES, lag.size - POINTS)
     tried = {
         degree: normal_scale(theta[inner] - _before(lag, theta, inner, degree))
@@ -347,7 +347,7 @@ def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Ma
 
 
 def _before(lag: Floats, theta: Floats, places: Indices, degree: int) -> Floats:
-    """Return the predictions from polynomials through the nine samples behind each place."""
+    """Return predictions from polynomials fitted to the nine samples after each index."""
     behind = places[:, None] + np.arange(1, POINTS + 1)
     x = lag[behind] - lag[places, None]
     powers = (x / x[:, -1:])[:, :, None] ** np.arange(degree + 1)

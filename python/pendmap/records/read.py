@@ -1,4 +1,4 @@
-"""From a path to an experiment."""
+"""Reading of a file or folder as an experiment, with all checks in order."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
 
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
-LEAST_RATE: Final = 1e-3  # Sampling rate at least, Hz
-MOST_RATE: Final = 1e9  # Sampling rate at most, Hz
+LEAST_RATE: Final = 1e-3  # Least sampling rate, Hz
+MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
-    """Return the files that an experiment is read from, without reading a record.
+    """Return the files from which an experiment is read, without reading any record.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     Returns
     -------
     list of Path
-        The file, or ``experiment.toml`` and the files that it names, which need not exist; without
-        one all files that may be records.
+        The file; or ``experiment.toml`` and the files that it names, which need not exist; or, in a
+        folder without one, all files that may be records.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     Parameters
     ----------
     path : str or path
-        The file or folder.
+        File or folder.
     rate_hz : float, optional
         Sampling rate, Hz, of files without a column of times: ``t = k / rate_hz``. It overrides
         ``rate_hz`` of [columns].
@@ -89,12 +89,12 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     Returns
     -------
     Experiment
-        Its runs in SI: times in s, angles in rad from the downward rest.
+        Runs in SI: times in s, angles in rad from the downward rest.
 
     Raises
     ------
     InputError
-        If there is no record in it, on one line that names fault, place and what is allowed.
+        If there is no valid record, with one line that names fault, place and valid input.
     OSError
         If a file cannot be read.
 
@@ -134,7 +134,7 @@ def _tables(folder: Path) -> list[Path]:
 
 
 def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
-    """Read a folder without a description: each of its files is one free run."""
+    """Read a folder without a description, in which each file is one free run."""
     files = _tables(folder)
     runs: list[Run] = []
     text = f"no {NAME}: each file is taken for one free run, in the order of the names"
@@ -174,7 +174,7 @@ def _described(folder: Path, description: Description) -> tuple[list[Run], list[
 
 
 def _names(files: list[str]) -> list[str]:
-    """Return run names: stems of files, made distinct where several files share one."""
+    """Return distinct run names: file stems, with suffix or number if files share a stem."""
     stems = {file: file.rsplit(".", 1)[0] for file in files}
     alike, every, before = Counter(stems.values()), Counter(files), Counter[str]()
     names = []
@@ -192,7 +192,7 @@ def _runs(  # noqa: C901 (a step each)
     tables: dict[str, tuple[Table, str]],
     name: str,
 ) -> tuple[list[Run], list[Finding]]:
-    """Return the runs of a file, one a release, and the findings that belong to none of them."""
+    """Return the runs of a file, one per release, and the findings that belong to none."""
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
@@ -209,7 +209,7 @@ def _runs(  # noqa: C901 (a step each)
     if not work.peaks_only:
         resolution.put_on_edges(work)
     if work.peaks_only or work.edges:
-        # The intervals are periods of the pendulum or of the encoder's edges, no clock's.
+        # The intervals are those of turning points or encoder edges, not of a clock.
         work.findings = [found for found in work.findings if found.what not in clock.SPACING]
     if work.peaks_only:
         work.refuse_short()
@@ -240,7 +240,7 @@ def _runs(  # noqa: C901 (a step each)
 
 
 def _run(work: Work, name: str, digest: str) -> Run:
-    """Return the run of a record that is read and checked."""
+    """Return the run of a checked record."""
     plan = work.plan
     gyroscope = None
     if work.integrated:

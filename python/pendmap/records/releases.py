@@ -1,4 +1,4 @@
-"""Releases of a free record: where a motion begins and ends that no hand touches."""
+"""Releases of a free record: detection of the free motions between holds and touches by hand."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask, Stretch
 
 
-RELEASE_RISE: Final = 0.1  # Growth of a swing over the largest that only a hand causes
-HELD_LONGER: Final = 1.5  # Delay over that of a release from rest from which a hold is seen
-NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to see
-HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))  # Periods before a motion
-FEWEST_HELD: Final = 10  # Samples of a hold from which quiet is judged
-FEWEST_HALF_CYCLES: Final = 5  # Half cycles from which a release is a run: three swings from a hand
-HAND_SHARE: Final = 0.3  # Torque over the greatest restoring torque nearby that only a hand adds
-DERIVATIVE_SPAN: Final = 0.2  # Periods over which a second derivative is taken
-CERTAIN_HAND: Final = 6.0  # Standard deviations of the second derivative from which it is no noise
-USUAL_REMAINDER: Final = 4.0  # Median remainders from which a hand acts
-FEWEST_A_PERIOD: Final = 20.0  # Samples a period from which a second derivative is taken
-FREE_SHARE: Final = 0.6  # Share of the samples that least trimmed squares keep
-CONCENTRATIONS: Final = 12  # Concentration steps; half as many are enough
-SHORTEST_HOLD: Final = 0.5  # Periods that a hand holds at least
+RELEASE_RISE: Final = 0.1  # Growth of a swing, over the largest, that only a hand causes
+HELD_LONGER: Final = 1.5  # Delay, over that of a release from rest, above which there is a hold
+NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to detect
+HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))  # Windows before a motion tested for a hold, periods
+FEWEST_HELD: Final = 10  # Fewest samples of a hold
+FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
+HAND_SHARE: Final = 0.3  # Least torque by a hand, over the greatest restoring torque nearby
+DERIVATIVE_SPAN: Final = 0.2  # Window of the polynomials that give second derivatives, periods
+CERTAIN_HAND: Final = 6.0  # Least acceleration by a hand, standard deviations of its noise
+USUAL_REMAINDER: Final = 4.0  # Least acceleration by a hand, over the median residual
+FEWEST_A_PERIOD: Final = 20.0  # Fewest samples per period from which second derivatives are taken
+FREE_SHARE: Final = 0.6  # Share of the samples kept by least trimmed squares
+CONCENTRATIONS: Final = 12  # Number of concentration steps; half as many usually suffice
+SHORTEST_HOLD: Final = 0.5  # Shortest hold by a hand, periods
 
 
 def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
-    """Return the stretches of motions ``parts`` that nobody touches, in order."""
+    """Return the stretches of motions ``parts`` that are not touched by a hand, in order."""
     hand = touched(work, parts)
     free = without_hand(work.time, parts, hand, work.period)
     free = [(_let_go(work, part, hand), part[1]) for part in free]
@@ -41,7 +41,7 @@ def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
 
 
 def _let_go(work: Work, part: Stretch, hand: Mask) -> int:
-    """Return where a motion that begins with a quiet hold has clearly left it."""
+    """Return the index at which a motion has certainly left the quiet hold before it."""
     low, high = part
     for shares in HOLD_WINDOWS:
         times = work.time[low] - np.array(shares) * work.period
@@ -59,7 +59,7 @@ def _let_go(work: Work, part: Stretch, hand: Mask) -> int:
 
 
 def _quiet(work: Work, low: int, high: int) -> float | None:
-    """Return the level of quiet readings; None if they are not quiet."""
+    """Return the median of constant readings; None if they drift or scatter beyond the noise."""
     hold = work.theta[low:high][work.trusted[low:high]]
     if hold.size < FEWEST_HELD:
         return None
@@ -73,12 +73,12 @@ def _quiet(work: Work, low: int, high: int) -> float | None:
 
 
 def _seen(work: Work) -> float:
-    """Return the distance from a hold that none of its readings has, rad."""
+    """Return the distance from a hold above which a reading is not part of it, rad."""
     return max(6 * work.noise, 1.5 * work.count, 1e-4)
 
 
 def _left(work: Work, part: Stretch, level: float) -> int | None:
-    """Return where three readings in a row begin to be off a level, on one side."""
+    """Return the first index of three consecutive readings off a level, on one side; or None."""
     good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
     off, seen = work.theta[good] - level, _seen(work)
     away = np.where(off > seen, 1, np.where(off < -seen, -1, 0))
@@ -92,14 +92,14 @@ def enough(work: Work, part: Stretch) -> bool:
     if not good.size:
         return False
     theta = work.theta[good] - work.middle
-    theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # carried round once
+    theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # remove whole turns
     start = after_turns(theta)
     half = swings(work.time[good][start:], theta[start:], least=work.limit)
     return half.peak.size >= FEWEST_HALF_CYCLES
 
 
 def grown(work: Work, part: Stretch) -> list[Stretch]:
-    """Divide a motion where the swing grows: a hand took the pendulum and released it again."""
+    """Divide a motion at growing swings: a hand took the pendulum and released it again."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
     if good.size < 5:
@@ -131,9 +131,9 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
 
 
 def held_short(work: Work, part: Stretch) -> int | None:
-    """Return where a motion left a level at which it was held for less than a period.
+    """Return the index at which a motion leaves a hold of less than a period.
 
-    Returns None where it leaves as soon as a release from rest does.
+    Returns None if it leaves its first level as early as after a release from rest.
     """
     low = part[0]
     if not work.trusted[low : low + 5].all():
@@ -156,10 +156,10 @@ def held_short(work: Work, part: Stretch) -> int | None:
 
 
 def touched(work: Work, parts: list[Stretch]) -> Mask:
-    """Return which samples of a free record a hand moves, shape (N,).
+    """Return the mask of samples of a free record that a hand moves, shape (N,).
 
-    The remainder of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large there; the
-    coefficients are least trimmed squares over the moving ``parts``.
+    There the residual of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large; the
+    coefficients are estimated by least trimmed squares over the moving ``parts``.
     """
     from scipy.ndimage import binary_dilation, maximum_filter1d
     from scipy.signal import savgol_filter
@@ -185,7 +185,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
         return none
     rest = np.abs(bend + columns @ fitted)
     pull = np.abs(columns[:, :2] @ fitted[:2])
-    # The smaller of the torques of the swings before and after: a hand separates unlike swings.
+    # The smaller of the torques of the half swings before and after, which may differ by a hand.
     half = round(period / interval / 2)
     sides = [
         maximum_filter1d(pull, 2 * half + 1, mode="nearest", origin=side * half) for side in (-1, 1)
@@ -196,7 +196,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
     error = max(noise, work.count / math.sqrt(12)) * math.sqrt(720 / window**5) / interval**2
     usual = USUAL_REMAINDER * float(np.median(rest[moving]))
     moved = rest > np.maximum(np.maximum(HAND_SHARE * restoring, CERTAIN_HAND * error), usual)
-    # A gap has no readings that show a hand.
+    # In gaps there are no readings from which a hand can be detected.
     places = np.flatnonzero(good)
     gaps = np.flatnonzero(np.diff(work.time[good]) > window * interval / 4)
     for k in gaps:
@@ -213,7 +213,7 @@ def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
     """Return coefficients by least trimmed squares.
 
     Concentration steps of Rousseeuw & Van Driessen (2006), Data Mining and Knowledge Discovery 12,
-    29, from a pendulum of about the right period.
+    29, from a pendulum of approximately the right period.
     """
     answer = np.array([gravity, *[0.0] * (columns.shape[1] - 1)])
     for _ in range(CONCENTRATIONS):
@@ -227,14 +227,14 @@ def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) 
     """Return the stretches of motions in which no hand holds the pendulum."""
     touches: list[Stretch] = []
     for a, b in stretches(hand):
-        # A trembling hand lets go for a moment.
+        # Touches separated by less than half the shortest hold are one hold.
         if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:
             a, _ = touches.pop()  # noqa: PLW2901 (joined)
         touches.append((a, b))
     held = np.zeros(time.size, bool)
     for a, b in touches:
         if time[b - 1] - time[a] >= SHORTEST_HOLD * period:
-            # A carried pendulum may move like a free one for a moment.
+            # A carried pendulum may briefly move like a free one: join touches within a period.
             near = [
                 t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
             ]

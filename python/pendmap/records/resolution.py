@@ -1,11 +1,11 @@
-"""The resolution of readings: their step, encoder edges, and whether they suffice for a fit.
+"""Resolution of readings: their step, encoder edges, and whether they suffice for a fit.
 
 At rest, a sensor with noise ``s`` below a count shows two or three counts around the angle ``x``:
-``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. Their shares give ``x`` and
-``s``; the noise is averaged over uniform priors of ``x`` and ``log s``.
+``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. Their frequencies determine
+``x`` and ``s``; the noise is averaged over uniform priors of ``x`` and ``log s``.
 
-An encoder that writes a line at each edge has no readings between edges; the stamp has the error:
-``theta_k = (n_k - sign(n_k - n_(k-1)) / 2) * step``.
+An encoder that logs each edge has no readings between edges; its angles are exact, its stamps have
+errors: ``theta_k = (n_k - sign(n_k - n_(k-1)) / 2) * step``.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-NYQUIST: Final = 2.0  # Readings in a period of the drive that resolve it at least
-GAIN_KNOWN: Final = 0.1  # Half of the 95 % interval of the gain from which it is reported
-LEAST_USED: Final = 0.1  # Share of the readings in motion that a fit uses without a warning
+NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
+GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it is reported
+LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given
 RESTING: Final = ("held", "rest")  # Segments without motion
-ON_STEPS: Final = 0.12  # Root mean square distance from multiples of a step; chance gives 0.29
-SPREADS: Final = np.geomspace(0.02, 1.0, 80)  # Noise before rounding, in counts
-PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5  # Places of the angle in a count
-MOST_COUNTS: Final = 9  # Counts that readings at rest show at most
-REST_PARTS: Final = 4  # Parts of a record at rest whose means agree
-REST_DRIFT: Final = 4.0  # Standard errors by which such means may differ
-EDGE_SHARE: Final = 0.95  # Share of the lines that are one count from the line before, at edges
-FEWEST_EDGES: Final = 50  # Readings from which edges are recognised
+ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
+SPREADS: Final = np.geomspace(0.02, 1.0, 80)  # Grid of the noise before rounding, counts
+PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5  # Grid of the angle within a count, counts
+MOST_COUNTS: Final = 9  # Upper bound (exclusive) on the range of readings at rest, counts
+REST_PARTS: Final = 4  # Number of parts of a record at rest whose means are compared
+REST_DRIFT: Final = 4.0  # Greatest deviation of these means, standard errors
+EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
+FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
 
 
 def check(work: Work) -> None:
-    """Report too few readings for a fit or the drive, and swings too small for the gain."""
+    """Report too few readings for a fit or drive, and swings too small to determine the gain."""
     moving = np.ones(work.time.size, bool)
     for part in work.segments:
         if part.what in RESTING:
@@ -72,16 +72,16 @@ def check(work: Work) -> None:
 
 
 def step_of(theta: Floats) -> float:
-    """Return the step of readings, rad; 0 where none is seen.
+    """Return the step of readings, rad; 0 if there is none.
 
-    The least distance between different readings is refined by all; it is a step if readings repeat
-    and lie on its multiples.
+    The least distance of different readings is refined with all of them; it is a step if readings
+    repeat and are multiples of it.
     """
     values = np.unique(np.round(theta, 12))
     if values.size < 3 or values.size > 0.7 * theta.size:
         return 0.0
     apart = np.diff(values)
-    # Written digits round multiples of a step: neighbours differ by the step and a digit.
+    # Written digits round the multiples of a step: neighbours differ by the step to a digit.
     least = float(np.quantile(apart, 0.02))
     near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
     step = float(np.median(near)) if near.size else least
@@ -99,9 +99,9 @@ def step_of(theta: Floats) -> float:
 
 
 def levels_shared(theta: Floats, step: float) -> float:
-    """Return the factor by which a shared step increases the noise of a mean.
+    """Return the factor by which quantization increases the noise of a mean.
 
-    Readings on one step share an error: three independent ones are counted for each step.
+    Readings on one step share an error: each step is equivalent to three independent readings.
     """
     levels = np.unique(np.round(theta / step)).size
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
@@ -110,8 +110,8 @@ def levels_shared(theta: Floats, step: float) -> float:
 def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
     """Return the noise of readings at rest, rounding included, and its standard error, rad.
 
-    These are mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None where one
-    count alone is shown, or something moves.
+    They are posterior mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None if
+    the readings have a single count, too many or a drift.
     """
     from scipy.special import log_ndtr, logsumexp, ndtr
 
@@ -125,7 +125,7 @@ def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
         return None
     shown = np.bincount(steps - low)
     centre = int(np.argmax(shown)) + low
-    # Above the middle of a count the smaller tail is computed, which keeps digits.
+    # The smaller tail of the normal distribution is computed, to avoid cancellation.
     level = np.arange(low, high + 1)[:, None, None] - centre - PLACES[None, :, None]
     far, near = (np.abs(level) + side for side in (0.5, -0.5))
     spread = SPREADS[None, None, :]
@@ -141,7 +141,7 @@ def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
 
 
 def logs_edges(theta: Floats) -> bool:
-    """Return whether nearly every reading is one count from the one before it."""
+    """Return whether nearly every reading differs by one count from its predecessor."""
     good = theta[np.isfinite(theta)]
     step = step_of(good) if good.size >= FEWEST_EDGES else 0.0
     if not step:
@@ -150,7 +150,7 @@ def logs_edges(theta: Floats) -> bool:
 
 
 def spread_stamps(time: Floats) -> Floats:
-    """Return times of which those that share a stamp fill its tick evenly, s, shape (N,)."""
+    """Return times with those of equal stamps spread evenly over a clock tick, s, shape (N,)."""
     stamps, first, number = np.unique(time, return_index=True, return_counts=True)
     tick = float(np.min(np.diff(stamps))) if stamps.size > 1 else 0.0
     place = np.arange(time.size) - np.repeat(first, number)
@@ -159,7 +159,7 @@ def spread_stamps(time: Floats) -> Floats:
 
 
 def put_on_edges(work: Work) -> None:
-    """Put the readings of a log of edges on the edges."""
+    """Shift the readings of a log of edges by half a count to the edges."""
     if work.plan.pivot is not None or not logs_edges(work.theta):
         return
     work.edges, work.seen = True, step_of(work.theta)
@@ -167,4 +167,4 @@ def put_on_edges(work: Work) -> None:
     # A log of the edges themselves shows an edge twice at a turning point.
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
         work.theta -= 0.5 * work.seen * np.append(way[0], way)
-        work.trusted[0] = False  # it may be what stood there as the log began
+        work.trusted[0] = False  # it may be the initial count, not an edge

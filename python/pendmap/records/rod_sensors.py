@@ -1,4 +1,4 @@
-"""Accelerometers and gyroscopes on the rod, and what they read there.
+"""Accelerometers and gyroscopes on the rod, and their readings.
 
 An accelerometer measures acceleration less gravity. At the distance r from the pivot that is
 
@@ -6,8 +6,8 @@ An accelerometer measures acceleration less gravity. At the distance r from the 
     radial, toward the pivot             r th'^2 + g cos(th)
 
 and without g if the phone removes gravity ("linear acceleration"). An angular acceleration th''
-needs no place. A gyroscope reads th' and a bias; white noise of the rate is a random walk of its
-integral, so that a fit compares the rate.
+does not depend on the position. A gyroscope reads th' plus a bias; white noise of the rate is a
+random walk of its integral, so the rate itself is fitted.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask
 
 
-# Example of a place in [columns]
+# Example of a sensor's position in [columns]
 PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
 
-OVER_THE_TOP: Final = 4 * math.pi  # Radians from the middle from which a record turns over the top
-FEWEST_PEAKS: Final = 4  # Turning points from which a drift is taken
+OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
+FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift is estimated
 
 
 @dataclasses.dataclass(frozen=True)
 class Accelerometer:
-    """An accelerometer on the rod whose place is known."""
+    """Accelerometer on the rod at a known position."""
 
     direction: Direction  # toward positive theta, toward the pivot, or about it
-    distance_m: float  # from the pivot; 1 of an angular acceleration
-    gravity: float  # m/s^2; 0 where the readings are without it
-    w0: float = math.nan  # rad/s, from crossings; NaN where no angle was made
+    distance_m: float  # from the pivot; 1 for an angular acceleration
+    gravity: float  # m/s^2; 0 if removed from the readings
+    w0: float = math.nan  # rad/s, from crossings; NaN if no angle was computed
 
     @property
     def gain(self) -> float:
@@ -56,9 +56,9 @@ class Accelerometer:
 def accelerometer_of(
     column: Column, heading: str, unit: str | None, gravity: float
 ) -> tuple[Accelerometer | None, str]:
-    """Return the accelerometer of a column, or the keys that its place lacks.
+    """Return the accelerometer of a column, or None and the missing keys of its position.
 
-    ``heading`` may say "linear acceleration", without gravity; ``gravity`` is in m/s^2.
+    A ``heading`` like "linear acceleration" means without gravity; ``gravity`` is in m/s^2.
     """
     angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
     direction = column.direction or ("angular" if angular else None)
@@ -75,10 +75,10 @@ def accelerometer_of(
 
 @dataclasses.dataclass(frozen=True)
 class Gyroscope:
-    """A gyroscope from whose readings alone the angle was made."""
+    """Gyroscope from whose readings alone the angle was computed."""
 
     w0: float  # rad/s, from speeds in the middle of swings
-    bias: float = math.nan  # rad/s, from the drift of the angle; NaN without one
+    bias: float = math.nan  # rad/s, from the drift of the angle; NaN if unknown
 
     @property
     def gain(self) -> float:
@@ -94,8 +94,8 @@ class Gyroscope:
 def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:
     """Return the integral of a rate, rad, shape (N,); 0 is the middle of the swing.
 
-    The line that the bias adds is removed. Of a record over the top the last angle is 0. A spline
-    replaces readings that are not ``good``.
+    The linear drift by the bias is removed. For a record with rotations the last angle is 0.
+    Readings that are not ``good`` are interpolated by a cubic spline.
     """
     from scipy.interpolate import CubicSpline
 
@@ -117,16 +117,16 @@ def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Float
 
 
 def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
-    """Return the gyroscope that a rate and the angle of :func:`angle_of_rate` show."""
+    """Return the gyroscope with ``w0`` and bias estimated from a rate and its integral."""
     found = swings(time, theta)
     bias = math.nan
     if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and found.peak_time.size >= FEWEST_PEAKS:
-        # The removed line has the slope of the bias; the median ignores false readings.
+        # The removed line has the slope of the bias; the median is robust to outliers.
         bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
     speed, size = np.abs(rate - np.nan_to_num(bias)), np.abs(found.peak)
     swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
     if not np.any(swung):
-        # A pendulum turns over the top from a speed of 2 w0 on.
+        # A pendulum rotates if its greatest speed exceeds 2 w0.
         return Gyroscope(float(np.max(speed)) / 2 or 1.0, bias)
     # The energy of a swing gives th' = 2 w0 sin(A/2) in the middle.
     middle = (size[:-1] + size[1:]) / 2

@@ -1,7 +1,7 @@
-"""Samples that are no readings: drawn between readings, clipped, frozen; the step of readings.
+"""Samples that are not independent readings: interpolated, clipped, frozen; step of the readings.
 
-Between two readings a resampled record is a polynomial of low degree: differences of the next order
-vanish there, at the same places in every interval, and not across a reading.
+Between two readings an interpolated record is a polynomial of low degree: differences of the next
+order vanish, at the same samples of every interval, but not across a reading.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices
 
 
-EQUAL_READINGS: Final = 5  # Equal readings in a row that may be clipped or frozen
-FINEST: Final = 3e-5  # Steps in rad below which they are written digits
-BEYOND_FIT: Final = 3.0  # Residuals of a parabola by which a motion exceeds a clipped plateau
-CLEARLY_CUT: Final = 0.05  # Share of the span from which a motion beyond a plateau is clipped
+EQUAL_READINGS: Final = 5  # Fewest consecutive equal readings that may be clipped or frozen
+FINEST: Final = 3e-5  # Step below which it is the last written digit, rad
+BEYOND_FIT: Final = 3.0  # Excess over a clipped plateau, over the rms residual of its parabola
+CLEARLY_CUT: Final = 0.05  # Excess over a plateau, over the range, that is certainly clipped
 # Order of the differences that vanish between readings, by kind of interpolation
 VANISHING_ORDER: Final = {"held": 1, "straight lines": 2, "cubics": 4}
-VANISHED: Final = 0.1  # Differences between readings over those across from which they vanish
-FEWEST_SAMPLES: Final = 200  # Samples from which interpolation is searched
-INTERVALS: Final = 60  # Intervals between readings that are examined
-READINGS_A_PERIOD: Final = 5.0  # Readings a period at least; fewer confuse phases with places
-SMOOTH_NEIGHBOURS: Final = 0.3  # Noise of neighbours over the most that interpolation leaves
-INDEPENDENT: Final = 0.7  # Noise over the most at any spacing from which readings are independent
-DIGITS: Final = 3e-6  # Noise over the span below which it is that of digits
-FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic from which motion is left
-_EVEN: Final = 1e-3  # Relative error of an even interval
+VANISHED: Final = 0.1  # Differences between readings, over the largest, below which they vanish
+FEWEST_SAMPLES: Final = 200  # Fewest samples in which interpolation is searched for
+INTERVALS: Final = 60  # Number of intervals between readings that are examined
+READINGS_A_PERIOD: Final = 5.0  # Fewest readings per period of an interpolated record
+SMOOTH_NEIGHBOURS: Final = 0.3  # Greatest noise of interpolated neighbours, over the full noise
+INDEPENDENT: Final = 0.7  # Noise at a spacing, over the greatest, above which it is independent
+DIGITS: Final = 3e-6  # Noise, over the range, below which it is rounding of digits
+FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic above which motion remains
+_EVEN: Final = 1e-3  # Greatest relative deviation of an interval in an evenly sampled record
 
 
 def check(work: Work) -> None:
-    """Mark clipped, frozen and false samples, correct missed counts, and report all."""
+    """Mark clipped and frozen samples and outliers, correct missed counts, and report all."""
     if work.made_of is not None:
-        # The acceleration is checked: the angle made of it has corners.
+        # The acceleration is checked, since the angle computed from it has corners.
         readings = work.extra["acceleration"]
         free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
         find_spikes(work, readings, work.made_of.unit, free)
@@ -66,7 +66,7 @@ def check(work: Work) -> None:
 
 
 def _count(work: Work) -> float:
-    """Return the step of the readings as known or as seen, rad."""
+    """Return the step of the readings, rad, from the description or the readings."""
     counts = work.known.get("encoder_counts")
     if counts is None:
         return work.seen
@@ -75,7 +75,7 @@ def _count(work: Work) -> float:
 
 
 def say_steps(work: Work) -> None:
-    """Report the step of the readings, or that they are edges, once their unit is certain."""
+    """Report the step of the readings, or that they are edges; called once the unit is certain."""
     if work.integrated:
         return  # an integral has no steps
     turn = f"{2 * math.pi / (work.seen or math.inf):.5g}"
@@ -111,7 +111,7 @@ def _clipped(work: Work, unit: str) -> None:
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * EQUAL_READINGS):
             ends.append(f"{end:.4g}")
-            marked |= ended  # the shorter ones, too
+            marked |= ended  # including shorter plateaus
     at = np.flatnonzero(marked)
     text = f"the sensor ends at {' and '.join(ends)} {unit}: {counted(at.size, 'clipped sample')}"
     work.distrust(at, "clipped", f"{text} not for fitting")
@@ -138,7 +138,7 @@ def _cut_off(work: Work, low: int, high: int) -> bool:
 
 
 def _frozen(work: Work) -> None:
-    """Mark stretches without change in the middle of a motion."""
+    """Mark constant readings in the middle of a motion."""
     low, high = equal_runs(work.theta, EQUAL_READINGS)
     marked = np.zeros(work.theta.size, bool)
     change = np.diff(work.theta)
@@ -155,16 +155,16 @@ def _frozen(work: Work) -> None:
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
-    """Return whether a plateau is flatter than a turn can be.
+    """Return whether a plateau is flatter than any turning point.
 
-    With speed v beside it, a turn is within v tau/2 of its extreme after a time tau.
+    With speed v at its border, a turning point is within v tau/2 of its extreme after a time tau.
     """
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
     return _missed(work, low, high) > 2 * work.count + 3 * min(noise, 0.01)
 
 
 def _missed(work: Work, low: int, high: int) -> float:
-    """Return how far the motion goes during a plateau, by its speed beside it, rad."""
+    """Return the expected displacement during a plateau from the speeds at its borders, rad."""
     sides = (slice(max(low - 4, 0), low), slice(high, high + 4))
     slopes = [
         float(np.ptp(work.theta[side]) / np.ptp(work.time[side]))
@@ -176,17 +176,17 @@ def _missed(work: Work, low: int, high: int) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Resampled:
-    """Where the readings of a resampled record are."""
+    """Interpolation of a resampled record, and indices of its readings."""
 
-    made: str  # a key of VANISHING_ORDER; empty where only the noise shows it
-    ratio: int  # samples a reading
-    places: Indices
+    made: str  # a key of VANISHING_ORDER; empty if detected from the noise alone
+    ratio: int  # samples per reading
+    places: Indices  # indices of the readings
 
 
 def measured(time: Floats, theta: Floats) -> Resampled | None:
-    """Return where the readings of a record are, if most samples are drawn between them.
+    """Return the readings of a record whose other samples are interpolated.
 
-    Returns None where every sample may be a reading: uneven times, no whole ratio, equal
+    Returns None if every sample may be a reading: uneven times, no integer ratio, equal
     differences.
     """
     if theta.size < FEWEST_SAMPLES or np.ptp(theta) == 0:
@@ -199,7 +199,7 @@ def measured(time: Floats, theta: Floats) -> Resampled | None:
     most = int(min(math.tau / (READINGS_A_PERIOD * quickest * interval), theta.size / 20))
     begin = int(np.argmax(np.abs(theta - theta[0]) > 0.05 * np.ptp(theta)))
     for made, order in VANISHING_ORDER.items():
-        # Divisors of a ratio show it as well: the largest is taken.
+        # Divisors of the ratio are detected as well: the largest is used.
         for ratio in range(most, order, -1):
             if _share(theta[begin:], ratio, order)[0] < VANISHED:
                 share, first = _share(theta, ratio, order, blocks=theta.size)
@@ -210,7 +210,7 @@ def measured(time: Floats, theta: Floats) -> Resampled | None:
 
 
 def _share(theta: Floats, ratio: int, order: int, blocks: int = INTERVALS) -> tuple[float, int]:
-    """Return the difference within an interval over the largest; the place of the reading."""
+    """Return the difference within an interval over the largest, and the reading's index."""
     stride = ratio // (order + 1)
     change = theta[: blocks * ratio + order * stride]
     for _ in range(order):
@@ -228,7 +228,7 @@ def _share(theta: Floats, ratio: int, order: int, blocks: int = INTERVALS) -> tu
 
 
 def _independent(time: Floats, theta: Floats, farthest: float) -> int:
-    """Return the spacing in samples from which the noise no longer grows; 1 if it does not."""
+    """Return the spacing, in samples, at which noise is independent; 1 if neighbours' noise is."""
     strides = [1 << k for k in range(12) if 1 << k <= min(farthest, theta.size / FEWEST_SAMPLES)]
     noise, whole = [], []
     for stride in strides:
@@ -238,7 +238,7 @@ def _independent(time: Floats, theta: Floats, farthest: float) -> int:
             normal_scale(local_fit(t, x, degree=degree, points=points, stride=stride).residual)
             for degree, points in ((4, 9), (6, 11))
         )
-        # Motion is left by a quartic but not by a sextic.
+        # Motion remains in the residual of a quartic but not in that of a sextic.
         noise.append(high if low < FOLLOWED * high else 0.0)
         whole.append(high)
     most = max(noise, default=0.0)
@@ -252,7 +252,7 @@ def _independent(time: Floats, theta: Floats, farthest: float) -> int:
 
 
 def keep_readings(work: Work) -> None:
-    """Keep the readings of a record with samples drawn between them, and report it."""
+    """Keep only the readings of an interpolated record, and report it."""
     found = measured(work.time, work.theta)
     if found is None or not found.made:
         return
@@ -270,5 +270,5 @@ def keep_readings(work: Work) -> None:
 
 
 def _hertz(rate: float) -> str:
-    """Return a frequency in words."""
+    """Return a frequency as text."""
     return f"{rate / 1000:.4g} kHz" if rate >= 1000 else f"{rate:.4g} Hz"

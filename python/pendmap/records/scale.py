@@ -1,9 +1,9 @@
-"""Scale and zero of a record, from the period of a pendulum, which grows with its swing.
+"""Scale and zero of a record, from the period of a pendulum, which increases with amplitude.
 
     T(A) = T0 (2/pi) K(sin(A/2))
 
-A swing of 1 rad has a period 6.6 % longer than a small one. Degrees taken for radians show no
-growth, and sizes that no swing has.
+At an amplitude of 1 rad the period is 6.6 % longer than that of small swings. Degrees mistaken for
+radians give periods that hardly increase, and impossible amplitudes.
 """
 
 from __future__ import annotations
@@ -24,37 +24,37 @@ if TYPE_CHECKING:
 
 
 DEGREE: Final = math.pi / 180
-LONGEST_PERIOD: Final = 60.0  # Seconds of a pendulum period at most in a laboratory
-SHORTEST_PERIOD: Final = 0.02  # Seconds of a pendulum period at least: 0.1 mm of length
-SAMPLES_A_PERIOD: Final = 8.0  # Samples a period below which sampling is slow
-UNLIKE_RIG: Final = 0.25  # Relative difference of the period from that of [rig] that is reported
-FEWEST_PERIODS: Final = 6  # Periods from which a relation is taken
-LARGEST_SWING: Final = 3.0  # Swings in rad up to which the growth of the period is used
-LEAST_ERROR: Final = 1e-3  # Relative error of a factor at least
+LONGEST_PERIOD: Final = 60.0  # Longest period of a laboratory pendulum, s
+SHORTEST_PERIOD: Final = 0.02  # Shortest period, s: a length of 0.1 mm
+SAMPLES_A_PERIOD: Final = 8.0  # Samples per period below which slow sampling is reported
+UNLIKE_RIG: Final = 0.25  # Relative difference from the period of [rig] above which it is reported
+FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
+LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
+LEAST_ERROR: Final = 1e-3  # Least relative error of a scale factor
 Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
-FAR_ZERO: Final = 0.15  # Radians from 0 at which friction alone (Tr/w0^2) holds no pendulum
-OFF_QUARTER: Final = 0.1  # Radians by which a turned gauge may miss a multiple of 90 degrees
-CERTAIN_MIDDLE: Final = 10  # Half cycles about one middle that make it certain
-AT_REST: Final = 0.02  # Span of the last tenth over the whole, at rest
-BEFORE_REST: Final = 4  # Half cycles before a rest that is not a hold
-MIDDLES_AGREE: Final = 0.1  # Share of the swing within which its middles agree
+FAR_ZERO: Final = 0.15  # Rest angle, rad, above which friction (Tr/w0^2) cannot explain it
+OFF_QUARTER: Final = 0.1  # Greatest deviation of a rotated gauge from multiples of 90 degrees, rad
+CERTAIN_MIDDLE: Final = 10  # Fewest half cycles that determine the middle
+AT_REST: Final = 0.02  # Range of the last tenth of a record at rest, over the greatest angle
+BEFORE_REST: Final = 4  # Fewest half cycles before a rest; else it may be a hold
+MIDDLES_AGREE: Final = 0.1  # Greatest scatter of the middles, over the amplitude
 
 
 @dataclasses.dataclass(frozen=True)
 class Periods:
-    """Periods of a free swing against its size."""
+    """Periods of a free swing against its amplitude."""
 
-    amplitude: Floats  # of the reading, from its middle, shape (M,)
+    amplitude: Floats  # amplitude of the readings about their middle, shape (M,)
     period: Floats  # s, shape (M,)
 
     @property
     def small(self) -> float:
-        """The median period of the smallest third of the swings, s."""
+        """Median period of the smallest third of the swings, s."""
         return float(np.median(self.period[self._smallest]))
 
     @property
     def smallest(self) -> float:
-        """The period of vanishing swings, s: ``small`` less its growth, below half a turn."""
+        """Period of infinitesimal swings, s: ``small``, corrected for its amplitude if below pi."""
         if float(np.min(self.amplitude)) >= math.pi:
             return self.small
         growth = _growth(np.minimum(self.amplitude[self._smallest], 3.0))
@@ -66,7 +66,7 @@ class Periods:
 
 
 def check(work: Work) -> None:
-    """Correct milliseconds and degrees where nothing else is possible; report disagreements."""
+    """Convert milliseconds and degrees if these are the only explanation; report disagreements."""
     found = None
     if work.plan.kind == "free":
         middle = middle_of(work.time[work.trusted], work.theta[work.trusted])
@@ -82,7 +82,7 @@ def check(work: Work) -> None:
 
 
 def periods_of(work: Work, middle: float) -> Periods | None:
-    """Return the periods of a record about its middle; None where there are too few."""
+    """Return the periods of a record about its middle; None if there are too few."""
     good = work.trusted
     return _periods(work.time[good], work.theta[good] - middle, work.count)
 
@@ -90,7 +90,7 @@ def periods_of(work: Work, middle: float) -> Periods | None:
 def small_period(time: Floats, theta: Floats, count: float) -> float:
     """Return the period of small swings of a free record, s.
 
-    Returns NaN where there are too few swings, or none below half a turn.
+    Returns NaN if there are too few swings, or none with an amplitude below half a turn.
     """
     found = _periods(time, theta - (middle_of(time, theta) or 0.0), count)
     if found is None or float(np.min(found.amplitude)) >= math.pi:
@@ -99,7 +99,7 @@ def small_period(time: Floats, theta: Floats, count: float) -> float:
 
 
 def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
-    """Return the periods of readings about 0; None where there are too few."""
+    """Return the periods of readings about 0; None if there are too few."""
     start = after_turns(theta)
     time, theta = time[start:], theta[start:]
     if time.size < 4 * FEWEST_PERIODS:
@@ -124,7 +124,7 @@ def _periods(time: Floats, theta: Floats, count: float) -> Periods | None:
 
 
 def _seconds(work: Work, found: Periods) -> Periods:
-    """Convert times in milliseconds or less to seconds."""
+    """Convert times in milliseconds, microseconds or nanoseconds to seconds."""
     small = found.small
     for name, factor in (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)):
         if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
@@ -145,7 +145,7 @@ def _seconds(work: Work, found: Periods) -> Periods:
 
 
 def _radians(work: Work, found: Periods) -> Periods:
-    """Convert degrees to radians; report the scale that the periods show."""
+    """Convert degrees to radians; report a scale that the periods contradict."""
     largest = float(np.max(found.amplitude))
     if largest <= math.pi or float(np.median(found.amplitude)) <= 0:
         _curvature(work, found, largest)
@@ -166,7 +166,7 @@ def _radians(work: Work, found: Periods) -> Periods:
 
 
 def _curvature(work: Work, found: Periods, largest: float) -> None:
-    """Report periods that do not grow with the swing as a pendulum's do."""
+    """Report periods that do not increase with amplitude as a pendulum's do."""
     grown = _growth(found.amplitude)
     if largest > LARGEST_SWING or np.ptp(grown) < 2e-3 or found.period.size < FEWEST_PERIODS + 2:
         return
@@ -188,9 +188,9 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
 
 
 def _share(found: Periods, grown: Floats) -> tuple[float, float]:
-    """Return the growth of the periods over a pendulum's, and its standard error.
+    """Return the increase of the periods over a pendulum's, and its standard error.
 
-    It is 1 for radians; readings that are k times the angle show about 1/k^2.
+    It is 1 for radians, and about 1/k^2 for readings that are k times the angle.
     """
     columns = np.column_stack([np.ones(grown.size), grown - 1])
     answer, spread = _robust_line(columns, found.period)
@@ -198,9 +198,9 @@ def _share(found: Periods, grown: Floats) -> tuple[float, float]:
 
 
 def gain_of(work: Work) -> tuple[float, float] | None:
-    """Return the 95 % interval of reading over angle, by the periods of a free run; None without.
+    """Return the 95 % interval of reading over angle from the periods of a free run, or None.
 
-    The period alone depends on the scale: it grows with the square of the angle.
+    Only the period depends on the scale: it increases with the square of the angle.
     """
     good = work.trusted
     found = periods_of(work, middle_of(work.time[good], work.theta[good]) or 0.0)
@@ -213,7 +213,7 @@ def gain_of(work: Work) -> tuple[float, float] | None:
 
 
 def _factor(found: Periods) -> tuple[float, float]:
-    """Return the factor of the readings that gives a pendulum's periods, and its error."""
+    """Return the factor on the readings that gives a pendulum's periods, and its error."""
     best, least = 1.0, math.inf
     for factor in np.geomspace(0.01, 3.0 / float(np.max(found.amplitude)), 300).tolist():
         away = found.period / _growth(factor * found.amplitude)
@@ -232,7 +232,7 @@ def _factor(found: Periods) -> tuple[float, float]:
 
 
 def _growth(amplitude: Floats) -> Floats:
-    """Return T(A)/T0 by the arithmetic-geometric mean."""
+    """Return T(A)/T0, computed by the arithmetic-geometric mean."""
     a, b = np.ones_like(amplitude), np.abs(np.cos(amplitude / 2))
     for _ in range(8):
         a, b = (a + b) / 2, np.sqrt(a * b)
@@ -240,7 +240,7 @@ def _growth(amplitude: Floats) -> Floats:
 
 
 def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return coefficients and standard errors by Huber weights."""
+    """Return coefficients and standard errors of a robust linear fit with Huber weights."""
     weights = np.ones(values.size)
     for _ in range(8):
         root = np.sqrt(weights)[:, None]
@@ -253,7 +253,7 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _known(work: Work, found: Periods) -> None:
-    """Compare the period of small swings with that of [rig]."""
+    """Report a period of small swings that differs from that of [rig]."""
     known, expected = work.known, {}
     if "w0" in known:
         expected[f"w0 = {known['w0']:g} rad/s"] = 2 * math.pi / known["w0"]
@@ -268,7 +268,7 @@ def _known(work: Work, found: Periods) -> None:
 
 
 def _slow_sampling(work: Work, found: Periods | None) -> None:
-    """Report sampling that is slow against the motion."""
+    """Report a sampling rate too low for the motion."""
     number = found.small / float(np.median(np.diff(work.time))) if found else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
     if number < SAMPLES_A_PERIOD:
@@ -280,7 +280,7 @@ def _slow_sampling(work: Work, found: Periods | None) -> None:
 
 
 def middle_of(time: Floats, theta: Floats) -> float | None:
-    """Return the middle of the last quarter of a free swing, rad; None for larger swings."""
+    """Return the middle of the last quarter of a record, rad; None if it is short or rotates."""
     late = theta[time >= time[0] + 0.75 * (time[-1] - time[0])]
     if late.size < 20:
         return None
@@ -289,10 +289,10 @@ def middle_of(time: Floats, theta: Floats) -> float | None:
 
 
 def turn_to_rest(work: Work) -> None:
-    """Move a zero that is far from the rest of a free pendulum to it."""
+    """Shift the zero of the angle to the rest position if it is far from it."""
     good = work.trusted
     middle = middle_of(work.time[good], work.theta[good])
-    # Whole turns are those of a pendulum that went over the top.
+    # Whole turns are due to rotations over the top.
     turns = 2 * math.pi * round((middle or 0.0) / (2 * math.pi))
     off = (middle or 0.0) - turns
     if middle is None or abs(off) < FAR_ZERO:
@@ -316,7 +316,7 @@ def turn_to_rest(work: Work) -> None:
 
 
 def _certain(time: Floats, theta: Floats) -> bool:
-    """Return whether the middle of a free swing is certainly 0: at rest, or by many swings."""
+    """Return whether rest or many swings confirm that the middle of a record is 0."""
     start = after_turns(theta)
     time, theta = time[start:], theta[start:]
     if theta.size < 20:

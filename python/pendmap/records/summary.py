@@ -1,4 +1,4 @@
-"""Content of a record as JSON and as text."""
+"""JSON and text of an experiment's records, noise, segments and findings."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
 
-# Findings of a wrong unit or scale; unless corrected, results are wrong
+# Findings of a wrong unit or scale, which makes results wrong unless corrected
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
-# Findings that are reported before any number
+# Findings that are reported before any result
 DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
-SCALE_FINDING: Final = "angle-scale"  # The one of these that an effect can cause, too
+SCALE_FINDING: Final = "angle-scale"  # Unit finding that an effect can cause, too
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
     """Return the JSON object of ``pendmap look``.
 
-    The top level repeats the fields of one run; of several, the median rate, the largest noise, and
-    all channels, segments and findings with their run.
+    The top level repeats the fields of a single run; for several runs, it has the median rate, the
+    largest noise, and all channels, segments and findings with their run.
     """
     runs = [_run(run) for run in experiment.runs]
     whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
@@ -75,7 +75,7 @@ def _run(run: Run) -> dict[str, Any]:
 
 
 def as_text(experiment: Experiment) -> str:
-    """Return the content of a record as text."""
+    """Return the content of an experiment as text."""
     lines = []
     if experiment.known:
         known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
@@ -136,7 +136,7 @@ def _line(found: Finding) -> str:
 
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
-    """Return each doubt about a unit or the records."""
+    """Return the texts of all uncorrected findings that make results doubtful."""
     said = _findings(experiment, runs)
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
@@ -147,19 +147,19 @@ def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 
 def doubted(experiment: Experiment, *runs: Run) -> bool:
-    """Return whether a unit of these runs is wrong, or they are of several rigs."""
+    """Return whether runs have uncorrected doubtful findings other than their angle's scale."""
     said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
     return bool(said - {SCALE_FINDING})
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
-    """Return whether a unit of these runs is wrong, and with it the unit of any residual."""
+    """Return whether a unit of these runs is wrong, which makes residuals meaningless."""
     said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
     return bool(said & UNIT_FINDINGS - {SCALE_FINDING})
 
 
 def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a line for each finding that is no doubt."""
+    """Yield a line for each finding that is not in :func:`doubts`."""
     for where, found in _findings(experiment, runs):
         if not _doubted(found):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
@@ -172,7 +172,7 @@ def _findings(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str
 
 
 def _doubted(found: Finding) -> bool:
-    """Return whether a finding is a doubt."""
+    """Return whether a finding makes results doubtful and is not corrected."""
     return found.what in DOUBTFUL and not found.mended
 
 
@@ -182,13 +182,13 @@ def noise_unit(run: Run) -> str:
 
 
 def _bias(run: Run) -> float | None:
-    """Return the bias of a gyroscope, rad/s; None without one."""
+    """Return the bias of a gyroscope, rad/s; None if unknown."""
     bias = math.nan if run.gyroscope is None else run.gyroscope.bias
     return bias if math.isfinite(bias) else None
 
 
 def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
-    """Return the noise in words."""
+    """Return the noise as text."""
     if not math.isfinite(noise.sigma):
         return "unknown, too few samples"
     degrees = f"{math.degrees(noise.sigma):.2g} degrees{unit.removeprefix('rad')}"

@@ -1,7 +1,7 @@
-"""Free swings and holds of a pendulum, as an accelerometer on it shows them.
+"""Detection of free swings and holds in the readings of an accelerometer on a pendulum.
 
-An angle made of its readings folds at a quarter turn, so that holds are found in the readings: held
-they are constant, swinging they recur in nearly equal times and do not grow.
+The angle computed from the readings is folded at a quarter turn, so holds are found in the readings
+themselves: constant in a hold; in free swings, nearly periodic and not growing.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from pendmap.signal.robust import between, stretches
 if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask
 
-LEAST_SWING: Final = 5.0  # Standard errors below which a reading is no swing
-STILL_SPAN: Final = 8.0  # Standard deviations of noise within which a whole period shows no motion
-STILL_SCATTER: Final = 1.5  # Noise by which half a period may scatter without motion
-STEADY_HOLD: Final = 0.1  # Scatter of a trembling hold over its distance from the middle
-FEWEST_QUIET: Final = 10  # Samples of half a period from which quiet is judged
-FEWEST_HALF_SWINGS: Final = 3  # Half swings that are more than a hand on its way
-UNEVEN: Final = 0.15  # Relative difference in time of half swings of one side, at most
-GROWTH: Final = 1.1  # Half swing over the one of the same side before, at most
-DECAY: Final = 0.6  # Half swing over the one of the same side before, at least
-RELEASE_STEP: Final = 2.5  # Fastest changes of a free swing from which a step is a release
-DECAYED: Final = 0.05  # Swing over the largest below which a motion has decayed
+LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
+STILL_SPAN: Final = 8.0  # Range over a period below which there is no motion, over the noise
+STILL_SCATTER: Final = 1.5  # Scatter over half a period without motion, over the noise
+STEADY_HOLD: Final = 0.1  # Greatest scatter of a hold by hand, over its distance from the middle
+FEWEST_QUIET: Final = 10  # Fewest samples of half a period that are tested for scatter
+FEWEST_HALF_SWINGS: Final = 3  # Fewest half swings of a motion that is not by hand
+UNEVEN: Final = 0.15  # Greatest relative change in duration between half swings of one side
+GROWTH: Final = 1.1  # Greatest ratio of successive maxima on one side
+DECAY: Final = 0.6  # Least ratio of successive maxima on one side
+RELEASE_STEP: Final = 2.5  # Least step at a release, over the fastest change of a free swing
+DECAYED: Final = 0.05  # Amplitude, over the largest, below which a motion has decayed
 
 
 def swinging(time: Floats, reading: Floats, noise: float) -> tuple[list[Stretch], list[Stretch]]:
-    """Return the free swings and the quiet holds before a release that an acceleration shows."""
+    """Return the free swings and the quiet holds before releases in an acceleration."""
     from scipy.ndimage import median_filter
 
     least = max(LEAST_SWING * noise, 1e-12)
-    # A lone false reading is neither a step nor the end of a hold.
+    # A single outlier is neither a step nor the end of a hold.
     reading = np.asarray(median_filter(reading, 3, mode="nearest"))
     crossing = swings(time, reading - middle_over(time, reading, least), least=least).crossing
     if crossing.size < FEWEST_HALF_SWINGS:
@@ -61,7 +61,7 @@ def swinging(time: Floats, reading: Floats, noise: float) -> tuple[list[Stretch]
 
 
 def middle_over(time: Floats, reading: Floats, least: float) -> float:
-    """Return the mean over the later half of the whole swings: the sensor's bias."""
+    """Return the mean reading over the later half of the full swings, the sensor's bias."""
     middle = float(np.median(reading))
     for _ in range(3):
         crossing = swings(time, reading - middle, least=least).crossing
@@ -77,7 +77,7 @@ def middle_over(time: Floats, reading: Floats, least: float) -> float:
 
 
 def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[Stretch]:
-    """Return stretches in which nothing changes, in order."""
+    """Return the stretches of constant readings, in order."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
     interval = float(np.median(np.diff(time)))
@@ -98,7 +98,7 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[S
     limits = np.where(np.abs(away) > LEAST_SWING * noise, (STEADY_HOLD * away) ** 2, -1.0)
     found = []
     for low, high in stretches(still | _all_of(square - away**2 <= limits, width)):
-        # A hold without trembling shows the release to a sample.
+        # Without trembling, the release is located to a sample.
         sure = low + np.flatnonzero(still[low:high]) + 1
         exact = sure.size and sure[-1] > high - width // 2
         found.append((low, int(sure[-1]) if exact else high))
@@ -106,7 +106,7 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[S
 
 
 def _all_of(middles: Mask, width: int) -> Mask:
-    """Return which samples are in windows of ``width`` about places within the record."""
+    """Return the mask of samples in windows of ``width`` about marked samples."""
     from scipy.ndimage import binary_dilation
 
     half = width // 2
@@ -116,7 +116,7 @@ def _all_of(middles: Mask, width: int) -> Mask:
 
 
 def let_go(time: Floats, values: Floats, noise: float) -> int:
-    """Return where a hold ends that is too short to be seen quiet; 0 if there is none."""
+    """Return the end of a hold too short for :func:`_quiet`; 0 if there is none."""
     crossing = swings(time, values, least=max(LEAST_SWING * noise, 1e-12)).crossing
     if crossing.size < FEWEST_HALF_SWINGS + 3:
         return 0
@@ -129,25 +129,25 @@ def let_go(time: Floats, values: Floats, noise: float) -> int:
 
 
 def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
-    """Return where a free swing ends (exclusive): a hand may take the pendulum before.
+    """Return the end (exclusive) of a free swing, at which a hand may take the pendulum.
 
-    ``more`` is true if something quiet follows.
+    ``more`` is true if a quiet stretch follows.
     """
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
     slack = least if math.isfinite(least) else 0.0  # the noise of few samples is not known
 
     def follows(k: int) -> bool:
-        """Whether a half swing follows freely from the one of the same side before it."""
+        """Return whether a half swing is a free continuation of the last one on its side."""
         even = abs(halves[k] / halves[k - 2] - 1) < UNEVEN
         return bool(even and DECAY * tops[k - 2] - slack < tops[k] < GROWTH * tops[k - 2] + slack)
 
     last = tops.size - 1
-    # Two half swings together: a hand may cause a single one like those before.
+    # Two half swings are required: a hand may cause a single one similar to those before.
     while last > 2 and not (follows(last) and follows(last - 1)):
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
-        return time.size  # it decays to its rest
+        return time.size  # it decays to rest
     tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
     grown = np.max(np.abs(tail), initial=0.0) > tops[last - 1] * GROWTH + least
     whole = time[-1] - found.crossing[-1] < (1 + UNEVEN) * halves[last - 1]

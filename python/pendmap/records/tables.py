@@ -1,4 +1,4 @@
-"""Tables from files: text of loggers in all its spellings, Excel, Parquet."""
+"""Reading of tables from files: text in the formats of common loggers, Excel, Parquet."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from pendmap.records.description import Reader
     from pendmap.signal import Floats, Indices
 
-MOST_COLUMNS: Final = 1000  # Columns of a table at most
-MOST_BYTES: Final = 2**30  # Largest file, and bytes of its numbers, at most
-LONGEST_LINE: Final = 40 * MOST_COLUMNS  # Characters of the longest line that may be a row
-SAMPLE_LINES: Final = 400  # Lines, from all over a file, from which separators are found
-LEAST_ROWS: Final = 0.5  # Share of the lines that are rows of numbers at least
+MOST_COLUMNS: Final = 1000  # Most columns of a table
+MOST_BYTES: Final = 2**30  # Largest file, and largest table in memory, bytes
+LONGEST_LINE: Final = 40 * MOST_COLUMNS  # Longest line that may be a row, characters
+SAMPLE_LINES: Final = 400  # Number of lines, spread over a file, that determine separators
+LEAST_ROWS: Final = 0.5  # Least share of lines that are rows of numbers
 MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
 MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
 # Separators with decimal signs, in the order of preference
@@ -50,8 +50,8 @@ _LEVELS: Final = {
     **dict.fromkeys(("false", "low", "off"), "0"),
 }
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
-_HEADS: Final = 30  # Lines above the numbers of a short file at most
-LARGEST_READING: Final = 1e18  # Largest number of a reading; nanoseconds since 1970 are 2e18
+_HEADS: Final = 30  # Most lines above the numbers of a short file
+LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 1970) are missing
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -67,12 +67,12 @@ ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
 class Table:
     """Columns of numbers, and their rows in the file."""
 
-    names: tuple[str, ...]  # headings; empty texts without a header
-    values: Floats  # shape (rows, columns); NaN where there is no number
+    names: tuple[str, ...]  # headings; empty strings without a header
+    values: Floats  # shape (rows, columns); NaN for missing numbers
     rows: Indices  # lines of the file, from 1 (of a Parquet file: rows of the table)
     findings: tuple[Finding, ...] = ()
     headed: bool = True
-    # Stretch among the lines that are not empty: unreadable lines leave a place out.
+    # Index of each row among the lines that are not empty; unreadable lines leave gaps.
     order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
@@ -115,22 +115,22 @@ def _parquet(data: bytes, where: str) -> Table:
 
 
 def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
-    """Unpack the columns of a Parquet file within the bounds that it declares."""
+    """Return names and numbers of a Parquet file's columns, if its declared size is allowed."""
     import pandas as pd
     import pyarrow as pa
     from pyarrow import parquet
 
     file = parquet.ParquetFile(io.BytesIO(data))
-    # Sizes come from the row groups: asking a damaged column ends the process.
+    # Sizes are read from the row groups: reading a damaged column's may crash the process.
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
     size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
     refuse_large(where, columns=file.metadata.num_columns, size=size)
-    # Dictionaries unpack each text once, however many rows have it.
+    # Dictionary encoding stores each distinct text once.
     kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
     fields = list(file.schema_arrow)
     texts = [field.name for field in fields if any(kind(field.type) for kind in kinds)]
-    # Lists have no bound, and are no numbers. An error of a damaged file in a second thread would
-    # end the process, too.
+    # Nested columns are unbounded and no numbers. An error of a damaged file in a second thread
+    # would crash the process, too.
     flat = [field.name for field in fields if not pa.types.is_nested(field.type)]
     whole = parquet.ParquetFile(io.BytesIO(data), read_dictionary=texts, pre_buffer=False)
     frame = whole.read(columns=flat, use_threads=False).to_pandas()
@@ -152,7 +152,7 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
 
 
 def read_workbook(data: bytes, reader: Reader, where: str) -> Table:
-    """Return the table of the sheet with most numbers; raise InputError if there is none."""
+    """Return the table of the sheet with the most numbers; raise InputError if there is none."""
     import pandas as pd
 
     engine = ENGINES[data[:4]]
@@ -199,7 +199,7 @@ def _cell(cell: object) -> str:
     if cell is None or cell != cell:  # noqa: PLR0124 (what is no number or no date)
         return ""
     if isinstance(cell, dt.datetime):
-        # timestamp() would apply daylight saving time, which is no part of the record.
+        # timestamp() would apply daylight saving time, which the record does not contain.
         return repr((cell - dt.datetime(1970, 1, 1)).total_seconds())  # noqa: DTZ001
     if isinstance(cell, dt.time):
         return repr(3600 * cell.hour + 60 * cell.minute + cell.second + 1e-6 * cell.microsecond)
@@ -211,7 +211,7 @@ def _cell(cell: object) -> str:
 
 
 def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
-    """Return the text of a file, without NUL bytes, and findings; raise InputError for no text."""
+    """Return the text of a file, without NUL bytes, and findings; InputError for other data."""
     findings: list[Finding] = []
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
@@ -255,7 +255,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
             f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
             f"{LONGEST_LINE} characters"
         )
-    # A line that is too long is left out as unreadable.
+    # Lines that are too long are unreadable.
     lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
     delimiter, decimal, width = _way(lines, reader, where)
     cells, fits = list[str](), list[bool]()
@@ -316,7 +316,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _is_row(parts: list[str], decimal: str) -> int:
-    """Return the count of numbers of a line; 0 if anything in it is no number."""
+    """Return the number of numbers in a line; 0 if any part is neither number nor empty."""
     numbers = 0
     for part in parts if len(parts) <= MOST_COLUMNS else ():
         text = part if decimal == "." else part.replace(decimal, ".", 1) if "." not in part else "?"
@@ -328,9 +328,9 @@ def _is_row(parts: list[str], decimal: str) -> int:
 
 
 def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
-    """Return delimiter, decimal sign and width that make most lines rows."""
+    """Return delimiter, decimal sign and number of columns with which most lines are rows."""
     step = max(len(lines) // SAMPLE_LINES, 1)
-    # Uneven places: loggers of several sensors alternate rows of each kind.
+    # Uneven sampling, since loggers of several sensors alternate rows of each kind.
     places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
     sample = [lines[k][1] for k in places]
     found = _common(sample, reader, 2) or _common(sample, reader, 1)
@@ -352,14 +352,14 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
 
 
 def _fractions(sample: list[str]) -> bool:
-    """Return whether the digits behind the commas are decimals: some begin with 0."""
+    """Return whether the digits after the commas are decimals: some begin with 0."""
     parts = [row for line in sample if (row := _row(line, ",", ".", 2))]
     digits = all(re.fullmatch(r"\s*[+-]?\d+", a) and re.fullmatch(r"\d+\s*", b) for a, b in parts)
     return digits and any(b.startswith("0") and len(b.strip()) > 1 for _, b in parts)
 
 
 def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, int] | None:
-    """Return delimiter, decimal sign and width of most lines with ``least`` numbers."""
+    """Return the most common delimiter, decimal sign and width of lines with ``least`` numbers."""
     most, best = 0, None
     quoted = any('"' in line for line in sample)
     ways = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
@@ -378,19 +378,19 @@ def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, in
 
 
 def _row(line: str, delimiter: str, decimal: str, width: int) -> list[str] | None:
-    """Return the parts of a line that is a row of this width."""
+    """Return the parts of a line if it is a row of this width, else None."""
     parts = _split(line, delimiter)
     return parts if len(parts) == width and _is_row(parts, decimal) else None
 
 
 def _cut(cells: list[str]) -> bool:
-    """Return whether the last cell has fewer decimals than all before it."""
+    """Return whether the last cell is truncated: fewer decimals than all before it."""
     *before, last = (len(cell.replace(",", ".").partition(".")[2]) for cell in cells)
     return len(set(before)) == 1 and last < before[0]
 
 
 def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
-    """Return the names above the numbers, with a line of units below them."""
+    """Return the column names, with units from a separate line, and whether there are any."""
     heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
     heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1 or width == 1]
     if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:

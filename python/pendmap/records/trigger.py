@@ -1,4 +1,4 @@
-"""The trigger: edges that mark a release, or recur with the drive."""
+"""Trigger channel: edges that mark releases or recur with the drive."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
 
-BETWEEN_LEVELS: Final = 0.02  # Share of the samples between two levels at most
-DEAD_BAND: Final = 0.2  # Distance from the threshold over that of the levels, without edges
-RELEASES_APART: Final = 3.0  # Periods of small swings between releases at least
+BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels
+DEAD_BAND: Final = 0.2  # Half-width of the hysteresis band, over the distance of the levels
+RELEASES_APART: Final = 3.0  # Least time between releases, periods of small swings
 BOUNCE: Final = 0.3  # Drive periods within which a second edge is a bounce
-FEWEST_EDGES: Final = 4  # Edges from which the frequency of a drive is taken
-UNEVEN_EDGES: Final = 0.1  # Periods by which edges of a drive miss its beat, rms
-DIFFERENT: Final = 3.0  # Standard errors from which a given frequency or phase is another
+FEWEST_EDGES: Final = 4  # Fewest edges from which the frequency of a drive is estimated
+UNEVEN_EDGES: Final = 0.1  # Greatest rms deviation of edges from periodicity, drive periods
+DIFFERENT: Final = 3.0  # Standard errors above which a given frequency or phase is contradicted
 
 
 @dataclasses.dataclass(frozen=True)
 class Beat:
-    """Frequency and edges of a drive as its trigger shows them."""
+    """Frequency and edges of a drive, estimated from its trigger."""
 
     omega: float  # rad/s
-    stderr: float  # of omega, rad/s
-    time: Floats  # middles between the samples before and after each edge, s, shape (M,)
-    error: float  # standard error of one of them, s
-    left_out: int  # bounces
+    stderr: float  # standard error of omega, rad/s
+    time: Floats  # midpoints between the samples before and after each edge, s, shape (M,)
+    error: float  # standard error of one time, s
+    left_out: int  # number of bounces
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str] | None:
-    """Return the places of the first samples after each edge, and which edge it is.
+    """Return the first samples after each edge, and the direction of the edges.
 
-    The threshold is between the means of the two levels; missing values keep the level. By default
-    the rising edge counts, or the falling one if there is no other. Returns None without two
+    The threshold is midway between the means of the two levels; missing values keep the level. By
+    default rising edges are used, or falling ones if there are no others. Returns None without two
     levels.
     """
     seen = values[np.isfinite(values)]
@@ -66,7 +66,7 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str] | N
 
 
 def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
-    """Return the edges that do not follow a counted one within ``dead``, s."""
+    """Return the edges that do not follow an accepted one within ``dead``, s."""
     kept: list[int] = []
     for k in places.tolist():
         if not kept or time[k] - time[kept[-1]] > dead:
@@ -75,7 +75,7 @@ def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
 
 
 def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
-    """Return the motion after each edge of the trigger; ``parts`` where it shows no release."""
+    """Return the motion after each edge of the trigger; ``parts`` if it marks no release."""
     if "trigger" not in work.extra or not parts:
         return parts
     found = edges_of(work.extra["trigger"], work.edge)
@@ -97,7 +97,7 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
         after = [(max(a, low), min(b, high)) for a, b in parts if a < high and b > low]
         if after:
             a, b = max(after, key=lambda part: part[1] - part[0])
-            # The angle shows the release to a fraction of a swing, the trigger to a sample.
+            # The trigger locates the release to a sample, the angle to a fraction of a swing.
             motions.append((low if work.time[a] - work.time[low] < period else a, b))
     if not motions:
         work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
@@ -109,26 +109,26 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
 
 
 def _bounces(number: int) -> str:
-    """Return how many edges are left out as bounces."""
+    """Return the text on the number of edges excluded as bounces."""
     return f"; {counted(number, 'bounce')} left out" if number else ""
 
 
 def _none(found: tuple[Indices, str] | None) -> str:
-    """Return why there is no edge."""
+    """Return the reason why there is no edge, as text."""
     return "has no two levels" if found is None else f"has no {found[1]} edge"
 
 
 def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat | None:
-    """Return the frequency with which edges recur; None where they do not.
+    """Return the frequency of periodic edges; None if they are not periodic.
 
-    Each edge is between two samples, so that the edges bound the period by ``(t_j - t_i +- (d_i +
-    d_j) / 2) / (n_j - n_i)``, d the interval at an edge, n its number; the error is that of a
-    uniform distribution. Without such a period it is the least-squares line of t over n. ``omega``
-    is the expected frequency, rad/s, to recognise bounces.
+    Each edge is between two samples, so the edges bound the period by ``(t_j - t_i +- (d_i + d_j) /
+    2) / (n_j - n_i)``, with the interval d at an edge and its number n; the error is that of a
+    uniform distribution. If no period is within all bounds, it is the slope of the least-squares
+    line of t over n. ``omega`` is the expected frequency, rad/s, to recognize bounces.
     """
     if places.size < FEWEST_EDGES:
         return None
-    # Without a known frequency: bounces are many and short, periods few and long.
+    # Without a known frequency, long intervals are taken for periods, short ones for bounces.
     period = 2 * math.pi / omega if omega else float(np.quantile(np.diff(time[places]), 0.9))
     kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
     if kept.size < FEWEST_EDGES:
@@ -158,7 +158,7 @@ def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat |
 
 
 def check_drive(work: Work) -> None:
-    """Report the frequency that the trigger of a forced run shows; take its phase if stated."""
+    """Report the trigger's frequency of a forced run; set the drive's phase if it is unknown."""
     if work.plan.kind != "forced" or "trigger" not in work.extra:
         return
     found = edges_of(work.extra["trigger"], work.edge)
@@ -185,11 +185,11 @@ def check_drive(work: Work) -> None:
 
 
 def _phase(work: Work, beat: Beat, omega: float, phase: float) -> None:
-    """Take the drive's phase from the edges, ``phi = phase - Omega t``, if it is not given."""
+    """Set the drive's phase from the edges, ``phi = phase - Omega t``, or compare a given one."""
     drive = work.plan.drive or {}
     mean = np.mean(np.exp(1j * (phase - omega * beat.time)))
     phi = float(np.angle(mean))
-    # Edges in step with the sampling have one common error, which no mean reduces.
+    # Edges synchronous with the sampling have a common error, which averaging does not reduce.
     error = omega * beat.error
     told = drive["phi"]
     if told is None:

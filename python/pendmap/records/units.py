@@ -1,4 +1,4 @@
-"""Channels of a record, their units, and the names that tools give them."""
+"""Channels of a record, their units, and common column names."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ _SPEEDS: Final = {
     "rpm": _TURN / 60,
     **dict.fromkeys(("rev/s", "rps"), _TURN),
 }
-# Units of an acceleration that needs no place on the rod, in rad/s^2
+# Units of an angular acceleration, in rad/s^2
 ANGULAR_ACCELERATIONS: Final = {
     **dict.fromkeys(("rad/s2", "1/s2"), 1.0),
     **dict.fromkeys(("deg/s2", "°/s2"), _DEGREE),
@@ -92,7 +92,7 @@ _LENGTHS: Final = {
     "cm": 1e-2,
     "mm": 1e-3,
 }
-# By name, in the order in which columns are tried
+# Channels by name, in the order in which columns are assigned
 CHANNELS: Final = {
     "time": Channel(
         "s",
@@ -133,7 +133,7 @@ _BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$",
 
 
 def spelling(unit: str) -> str:
-    """Return a unit as the tables spell it."""
+    """Return a unit in the spelling of the tables of units."""
     text = unit.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
     text = text.replace("µ", "u").replace("μ", "u").replace("·", "").replace(" ", "")
     text = text.replace("º", "°").replace("s⁻¹", "/s").replace("s-1", "/s")
@@ -141,12 +141,12 @@ def spelling(unit: str) -> str:
 
 
 def plain(name: str) -> str:
-    """Return a name as the patterns spell it."""
+    """Return a name in the spelling of the patterns: lower case, single spaces."""
     return " ".join(name.strip().lower().replace("_", " ").replace("-", " ").split())
 
 
 def name_and_unit(header: str) -> tuple[str, str | None]:
-    """Split a heading into name and unit.
+    """Return name and unit of a heading; None without a unit.
 
     >>> name_and_unit("Time (s)"), name_and_unit("t/ms"), name_and_unit("theta_rad")
     (('Time', 's'), ('t', 'ms'), ('theta', 'rad'))
@@ -156,6 +156,6 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
         if match and any(c.has(match["unit"]) for c in CHANNELS.values()):
             return match["name"].strip(), match["unit"].strip()
     match = _IN_BRACKETS.match(header.strip())
-    if match:  # a unit that nobody knows is named when it is needed
+    if match:  # an unknown unit is reported when it is needed
         return match["name"].strip(), match["unit"].strip() or None
     return header.strip(), None

@@ -1,4 +1,4 @@
-"""A record between table and run: each check reads and may change it."""
+"""Mutable record between table and run, which checks read and correct."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.signal import Floats, Indices, Mask
 
-FEWEST_SAMPLES = 5  # Samples that a record must have
-_FEWEST_PEAKS = 3  # Turning points that a record of turning points must have
+FEWEST_SAMPLES = 5  # Fewest samples of a record
+_FEWEST_PEAKS = 3  # Fewest samples of a record of turning points
 
 
 @dataclasses.dataclass
 class Work:
-    """One record while it is read, in SI; all arrays have shape (N,)."""
+    """Record that is being read, in SI; all arrays have shape (N,)."""
 
     where: str
     plan: RunPlan
@@ -40,28 +40,28 @@ class Work:
     pivot: dict[str, Floats]  # recorded motion of the pivot by direction
     trusted: Mask
     findings: list[Finding]
-    columns: Mapping[str, str]  # the heading of each channel
-    unused: tuple[str, ...]  # headings of the columns that no channel is read from
+    columns: Mapping[str, str]  # heading of each channel
+    unused: tuple[str, ...]  # headings of columns without a channel
     segments: list[Segment] = dataclasses.field(default_factory=list)
-    count: float = 0.0  # step of the readings as known, rad; 0 for none
-    seen: float = 0.0  # step that the readings show, rad; 0 for none
+    count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
+    seen: float = 0.0  # step estimated from the readings, rad; 0 for none
     peaks_only: bool = False
     accelerometer: Accelerometer | None = None
     integrated: bool = False  # the angle is the integral of the velocity
-    place_missing: str = ""  # keys of [columns] that would place the accelerometer
+    place_missing: str = ""  # missing keys of [columns] on the accelerometer's position
     releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
-    edge: str | None = None  # edge of the trigger that counts
+    edge: str | None = None  # edge of the trigger that is used
     phase: float | None = None  # phase of the drive at that edge, rad
     edges: bool = False  # each reading is an edge of an encoder
     pivot_unit: str | None = None
-    middle: float = 0.0  # of the swing, rad
-    period: float = math.nan  # of small swings, s
-    noise: float = 0.0  # of a reading, rad
-    limit: float = 0.0  # span of readings within which nothing moves, rad
+    middle: float = 0.0  # middle of the swing, rad
+    period: float = math.nan  # period of small swings, s
+    noise: float = 0.0  # standard deviation of a reading, rad
+    limit: float = 0.0  # range of readings below which there is no motion, rad
 
     @property
     def made_of(self) -> Accelerometer | None:
-        """The accelerometer that the angle was made of; None where the angle was measured."""
+        """Accelerometer from which the angle was computed; None if it was not."""
         made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
         return self.accelerometer if made else None
 
@@ -86,29 +86,29 @@ class Work:
         self.findings.append(Finding(what, text, mended, where, low, high))
 
     def keep(self, which: NDArray[Any]) -> None:
-        """Keep some samples, in the order given."""
+        """Keep the selected samples, in the given order."""
         self.time, self.theta = self.time[which], self.theta[which]
         self.rows, self.trusted = self.rows[which], self.trusted[which]
         self.extra = {name: values[which] for name, values in self.extra.items()}
         self.pivot = {way: values[which] for way, values in self.pivot.items()}
 
     def leave_out(self, which: Mask, what: str, noun: str, why: str) -> None:
-        """Leave out samples, if any, and report how many and why."""
+        """Remove samples, if any, and report their number and the reason."""
         at = np.flatnonzero(which)
         if at.size:
             self.say(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
             self.keep(~which)
 
     def distrust(self, at: Indices, what: str, text: str) -> None:
-        """Take samples, if any, out of fits, and report them."""
+        """Exclude samples, if any, from fits, and report them."""
         if at.size:
             self.trusted[at] = False
             self.say(what, text, at=at)
 
     def apart(self) -> tuple[list[Work], list[Finding]]:
-        """Return a work for each release, and the findings that belong to none of them.
+        """Return a record for each release, and the findings that belong to none of them.
 
-        The first keeps what is before it, the last what is after it.
+        The first includes the samples before its release, the last those after it.
         """
         if len(self.releases) < 2:
             return [self], []

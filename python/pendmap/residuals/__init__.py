@@ -1,4 +1,4 @@
-"""Residuals of a fit: their noise with its colour, the torque that they lack, and its times."""
+"""Residuals of a fit: spectrum of their noise, residual torque, and its frequencies and times."""
 
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 

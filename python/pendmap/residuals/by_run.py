@@ -1,4 +1,4 @@
-"""Parameters run by run, and whether they differ between runs by more than noise."""
+"""Parameters estimated run by run, and the significance of their differences between runs."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
 CHANCE: Final = 1e-3  # Probability by noise alone below which a parameter differs between runs
 
 BLIND: Final = 1e-9
-"""Information, over the greatest of a run, below which a direction is not determined."""
+"""Information, over a run's greatest, below which a direction of parameters is undetermined."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunByRun:
-    """Parameters run by run."""
+    """Parameters estimated run by run, with a test of their homogeneity."""
 
-    # Value and standard error (SI) of each parameter in each run, the others fixed at the values of
-    # all runs; an infinite error where the run does not determine it.
+    # Value and standard error (SI) of each parameter in each run, with the other parameters fixed
+    # at the fit of all runs; the error is infinite if the run does not determine the parameter.
     coefficients: dict[str, list[tuple[float, float]]]
-    uneven: float  # Cochran's Q of all parameters less its degrees of freedom, over its deviation
-    chance: float  # Probability that noise alone gives that Q
+    uneven: float  # (Q - dof) / sqrt(2 dof), with Cochran's Q of all parameters
+    chance: float  # Probability that noise alone gives at least this Q
 
     def shown(self, name: str) -> list[tuple[float, float]]:
         """Return values and standard errors of a parameter in the runs that determine it, SI."""
         return [(v, e) for v, e in self.coefficients.get(name, []) if math.isfinite(e) and e > 0]
 
     def between(self, name: str) -> float:
-        """Return the standard deviation of a parameter between the runs beyond its errors, SI.
+        """Return the standard deviation of a parameter between runs beyond its errors, SI.
 
-        By DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 where fewer than two
-        runs determine it, or noise alone explains the difference (Cochran's Q).
+        Method of DerSimonian & Laird (1986), Controlled Clinical Trials 7, 177; 0 if fewer than two
+        runs determine the parameter or Cochran's Q is compatible with noise alone.
         """
         shown = self.shown(name)
         if len(shown) < 2:  # noqa: PLR2004 (nothing to compare)
@@ -62,7 +62,7 @@ class RunByRun:
 def parameters_by_run(
     runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise, level: float
 ) -> RunByRun:
-    """Return the parameters of each run, to first order (Cochran 1954, Biometrics 10, 101)."""
+    """Return first-order estimates of each run's parameters (Cochran 1954, Biometrics 10, 101)."""
     found = sensitivities(fit, runs, (), fit.model)
     sizes = np.linalg.norm(found.columns, axis=0)
     columns = found.columns / np.where(sizes > 0, sizes, 1.0)

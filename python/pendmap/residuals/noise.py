@@ -1,26 +1,26 @@
-"""Noise of residuals: its spectrum, the laws of its colour, and what exceeds it.
+"""Noise of residuals: its spectrum, models of its correlation, and the excess above it.
 
-Errors of a pendulum's model show at the frequency of the swing, at its lowest harmonics and below.
-Above these the spectrum shows noise alone. Its law is continued to low frequencies, where noise
-correlated from sample to sample is stronger. Spectra are cosine transforms window by window, which
-need no period, summed in bins that are narrow against the colour of any noise.
+Errors of a pendulum's model appear at the frequency of the swing, at its lowest harmonics and
+below. At higher frequencies the spectrum contains noise alone. The noise model fitted there is
+extrapolated to low frequencies, where noise correlated from sample to sample is stronger. Spectra
+are cosine transforms of each window, which need no period, summed in narrow bins of frequency.
 
-Correlated noise is a process of first order, AR(1), with the correlation ``rho``, plus white noise,
-as rounding makes it. The spectral density at the phase ``w`` from sample to sample is
+Correlated noise is a first-order autoregressive process, AR(1), with correlation ``rho``, plus
+white noise such as that of rounding. The spectral density at the frequency ``w``, rad/sample, is
 
 ``S(w) = scale (c (1 - rho^2) / (1 + rho^2 - 2 rho cos w) + 1 - c)``,
 
-with the coloured share ``c`` of the variance ``scale``. The white part over the least density of
-the coloured part is
+with the coloured share ``c`` of the variance ``scale``. The ratio of the white part to the least
+density of the coloured part is
 
 ``phi = (1 - c) / c (1 + |rho|) / (1 - |rho|)``.
 
 By Whittle's likelihood a squared amplitude ``P`` adds ``log S + P / S`` to the deviance. High
-frequencies alone determine ``rho`` and ``phi`` only together, so no law is chosen: each has its
-posterior probability, with a prior uniform in ``log phi`` and in ``arctanh rho``, a quarter of the
-logarithm of the ratio of the coloured densities at the lowest and the highest frequency. Rounding
-to counts of ``q`` has the variance ``q^2 / 12``: no law has less white noise, and laws with just
-that are more probable, since other white noise is rare.
+frequencies determine ``rho`` and ``phi`` only jointly, so results are averaged over a grid of
+models, called laws here, weighted by posterior probability. The prior is uniform in ``log phi`` and
+in ``arctanh rho``, a quarter of the logarithm of the ratio of the coloured densities at the lowest
+and the highest frequency. Rounding to counts of ``q`` has the variance ``q^2 / 12``, a lower bound
+on the white noise; laws with exactly that have a higher prior, since other white noise is rare.
 
 References
 ----------
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-CERTAIN: Final = 1e9  # Number of amplitudes that stands for a known noise level
+CERTAIN: Final = 1e9  # Number of amplitudes that represents an exactly known noise level
 
 ARITHMETIC: Final = 1e-4
 """Mean squared residual, in standard errors squared, below which residuals are rounding errors."""
@@ -57,19 +57,19 @@ ARITHMETIC: Final = 1e-4
 BINS: Final = 256  # Bins of frequency from 0 to half the sampling rate
 
 PHASES: Final = np.pi * (np.arange(BINS) + 0.5) / BINS
-"""Phase from sample to sample, rad, at the middle of each bin."""
+"""Frequency at the middle of each bin, rad/sample."""
 
 HARMONICS: Final = 4.0
-"""Frequency up to which errors of a model show, over that of swing or rotation."""
+"""Upper edge of the slow band, where model errors appear, over the swing or rotation frequency."""
 
 GAP: Final = 1.5
-"""Frequency from which noise is read, over the frequency up to which errors of a model show."""
+"""Lower edge of the quick band, where only noise appears, over the upper edge of the slow band."""
 
-WIDEST: Final = 0.4  # Greatest part of all frequencies that counts as slow
+WIDEST: Final = 0.4  # Greatest upper edge of the slow band, over the Nyquist frequency
 
-STATES: Final = 2  # Fitted numbers of each window: angle and velocity at its start
+STATES: Final = 2  # Initial conditions fitted in each window: angle and velocity
 
-LEAST: Final = 8  # Fewest samples of a window with a spectrum
+LEAST: Final = 8  # Fewest samples of a window for which a spectrum is computed
 
 COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))  # Correlations ``rho`` of the laws
 
@@ -78,36 +78,36 @@ FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])  # Ratios 
 RARE: Final = 0.0025  # Prior odds of all coloured laws together against white noise
 
 FAINT: Final = 1e-6
-"""Probability of a law, over that of the most probable one, below which it is left out."""
+"""Probability of a law, relative to the most probable one, below which it is discarded."""
 
-COUNTED: Final = 10.0  # Prior odds of a white part of rounding alone against any other
+COUNTED: Final = 10.0  # Prior odds of white noise from rounding alone against any other level
 
-OWN: Final = 50  # Fewest amplitudes from which the noise of one run is read by itself
+OWN: Final = 50  # Fewest amplitudes from which a run's own noise level is estimated
 
 
 @dataclasses.dataclass(frozen=True)
 class ResidualNoise:
-    """Noise of residuals, and what exceeds it, in units of the readings' standard errors."""
+    """Noise of residuals and the excess above it, in units of the readings' standard errors."""
 
-    level: float  # Spectral density of the noise where the motion is; 1 for white stated noise
+    level: float  # Spectral density of noise at the motion's frequencies; 1 for stated white noise
     colour: float  # Correlation from sample to sample, mean over all laws
-    excess: float  # Sum of squares of the slow part beyond noise, over the noise's density
+    excess: float  # Sum of squares of the slow part over the noise's density, less its expectation
     stderr: float  # Standard error of the excess, from the noise and its unknown law
     by_run: tuple[float, ...]  # Excess of each run over its standard error
-    # Probability that noise alone leaves the slow part of all runs or of any one: Fisher's F of the
-    # slow part over the rest, with Bonferroni's factor, mean over all laws.
+    # Probability that noise alone gives the slow part of all runs or of any one: F-test of the
+    # slow part against the quick part, with Bonferroni's factor, mean over all laws.
     chance: float
     laws: Floats = dataclasses.field(repr=False)  # Level and probability of each law, (2, laws)
     amplitudes: float = dataclasses.field(repr=False)  # Independent amplitudes of a level
-    # ``3 (sum P)^2 / sum P^2`` of squared amplitudes ``P``: the number of independent readings for
+    # Effective number of readings ``3 (sum P)^2 / sum P^2``, with squared amplitudes ``P``: all for
     # white noise, a few for residuals that oscillate.
     independent: float
 
     def chance_of(self, gain: float, count: int, least: float = 0.0) -> float:
-        """Return the probability that noise alone gains as much with ``count`` parameters.
+        """Return the probability of at least this gain from noise with ``count`` parameters.
 
-        By Fisher's F, mean over all laws; levels below ``least`` count as ``least``; 1 without
-        parameters. The gain is a fall of the sum of squares, in standard errors squared.
+        F-test, mean over all laws; levels are at least ``least``; 1 without parameters. The gain is
+        the decrease of the sum of squares, in standard errors squared.
         """
         if count == 0:
             return 1.0
@@ -116,16 +116,17 @@ class ResidualNoise:
 
     @property
     def z(self) -> float:
-        """The excess over its standard error."""
+        """Excess over its standard error."""
         return self.excess / self.stderr if self.stderr > 0 else 0.0
 
 
 def estimate_noise(
     fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int, floors: Sequence[float]
 ) -> ResidualNoise:
-    """Return the noise of a fit's residuals, given the number of its parameters.
+    """Return the noise of a fit's residuals.
 
-    ``floors`` is the share of rounding in the variance of each run's noise.
+    ``adapted`` is the number of the fit's parameters; ``floors`` the share of rounding in the
+    variance of each run's noise.
     """
     spectra = residual_spectra(fit, runs)
     if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
@@ -134,7 +135,7 @@ def estimate_noise(
     laws = noise_laws(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)
     degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
-    # Of each law and run: the slow part over its expectation from noise.
+    # Sum of squares of the slow part over the noise's density, shape (laws, runs).
     left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
     laws = _posterior(laws, left, degrees, sizes)
     parts = [slice(None), *(slice(k, k + 1) for k in range(len(runs)))]
@@ -144,7 +145,7 @@ def estimate_noise(
     ]
     (excess, stderr, _), *each = found
     chance = min(min(chance for *_, chance in found) * len(found), 1.0)
-    # The noise's density where the motion is.
+    # The noise's density, weighted by the spectrum of the motion.
     levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
     return ResidualNoise(
         float(laws.weights @ levels),
@@ -162,8 +163,8 @@ def estimate_noise(
 def _posterior(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws:
     """Return the laws weighted with the likelihood of the slow part.
 
-    Errors of a model only add to noise. With equal odds, the model errs and the likelihood is the
-    probability that noise leaves less, or it does not and the likelihood is the density.
+    Errors of a model only add to noise. The likelihood is the sum of two cases of equal prior odds:
+    the noise gives less than the slow part (the model is wrong) or exactly that (it is right).
     """
     free = float(degrees.sum())
     if laws.weights.size == 1 or free <= 0:
@@ -171,7 +172,7 @@ def _posterior(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws
     mean = left.sum(axis=1) / free
     others = _denominator_degrees(sizes, laws.sizes)
     weights = laws.weights * (fdtr(free, others, mean) + mean * stats.f.pdf(mean, free, others))
-    # All laws exceed the slow part where parameters took up noise: then only the quick part counts.
+    # If parameters were fitted to noise, all laws exceed the slow part: use the quick part alone.
     if not weights.sum() > 0:
         return laws
     return dataclasses.replace(laws, weights=weights / weights.sum())
@@ -185,9 +186,9 @@ def _denominator_degrees(sizes: Floats, quick: Floats) -> float:
 def _excess(
     left: Floats, degrees: Floats, sizes: Floats, weights: Floats, quick: Floats
 ) -> tuple[float, float, float]:
-    """Return the excess of runs over noise, its standard error, and the probability by chance.
+    """Return the excess of runs over noise, its standard error, and its p-value.
 
-    ``sizes`` and ``quick`` are the numbers of slow amplitudes and of those of the noise, by run.
+    ``sizes`` and ``quick`` are the numbers of slow and of quick amplitudes, by run.
     """
     number, free = float(sizes.sum()), float(degrees.sum())
     if number == 0 or free <= 0:
@@ -204,14 +205,14 @@ def _excess(
 class Spectra:
     """Squared amplitudes of residuals by run and bin, in standard errors squared."""
 
-    slow: Floats  # Sum in each bin where errors of a model show, shape (runs, BINS)
-    quick: Floats  # Sum in each bin where noise is alone, shape (runs, BINS)
+    slow: Floats  # Sum in each bin of the band of model errors, shape (runs, BINS)
+    quick: Floats  # Sum in each bin of the band of noise alone, shape (runs, BINS)
     slow_sizes: Floats  # Number of slow amplitudes, shape (runs, BINS)
     quick_sizes: Floats  # Number of quick amplitudes, shape (runs, BINS)
-    # Share of each bin in the slow part of the velocity, times samples: where parameters act.
+    # Share of each bin in the slow part of the velocity, times samples, shape (runs, BINS).
     motion: Floats
     states: Floats  # Number of fitted initial states, shape (runs,)
-    independent: float  # As in ResidualNoise
+    independent: float  # Effective number of readings, as in ResidualNoise
 
     @property
     def mean(self) -> float:
@@ -233,7 +234,7 @@ def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
             continue
         time = record.time[first:last][good]
         velocity = fit.curves[run][1][first:last][good]
-        # The angle of a rotation is a ramp, its velocity is not.
+        # The velocity: the angle of a rotation is a ramp, which has no line spectrum.
         rows = np.stack([residual[good], velocity - velocity.mean()])
         power, moved = np.asarray(dct(rows, type=2, norm="ortho"), np.float64) ** 2
         total, fourth = total + float(power.sum()), fourth + float(power @ power)
@@ -257,9 +258,9 @@ def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:
 
 @dataclasses.dataclass(frozen=True)
 class Laws:
-    """Laws of noise that a spectrum allows."""
+    """Noise models compatible with a spectrum, with their probabilities."""
 
-    weights: Floats  # Probability of each, shape (laws,)
+    weights: Floats  # Probability of each law, shape (laws,)
     colours: Floats  # ``rho``; 0 of white noise, shape (laws,)
     shares: Floats  # ``c``; 1 of white noise, shape (laws,)
     shapes: Floats  # Spectral density over the variance, shape (laws, BINS)
@@ -268,7 +269,7 @@ class Laws:
 
 
 def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
-    """Return the laws that spectra of noise allow.
+    """Return the noise models compatible with spectra of noise.
 
     ``power`` and ``sizes``, shape (runs, BINS), are the sum and the number of squared amplitudes in
     each bin; ``floors``, shape (runs,), the variance of rounding in standard errors squared.
@@ -294,7 +295,7 @@ def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
 
 @dataclasses.dataclass(frozen=True)
 class _LawGrid:
-    """All laws, white noise first."""
+    """Grid of all noise models, white noise first."""
 
     colours: Floats
     floors: Floats
@@ -318,14 +319,14 @@ def _law_grid() -> _LawGrid:
 
 
 def _least_density(rho: Floats) -> Floats:
-    """Return the least spectral density of a process of first order over its variance."""
+    """Return the least spectral density of an AR(1) process over its variance."""
     return np.asarray((1 - np.abs(rho)) / (1 + np.abs(rho)), np.float64)
 
 
 def _prior(grid: _LawGrid, rounding: Floats) -> Floats:
     """Return the prior probability of laws, given the share of rounding in each variance."""
     ratio = rounding / (grid.shares * _least_density(grid.colours))
-    # Steps from the floor of rounding up to that of the law.
+    # Grid steps from the floor of rounding to that of the law.
     steps = np.arange(FLOORS.size)
     place = np.interp(np.log(np.maximum(ratio, FLOORS[1])), np.log(FLOORS[1:]), steps[1:])
     place = np.minimum(place, ratio / FLOORS[1])

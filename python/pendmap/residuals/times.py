@@ -1,10 +1,10 @@
-"""Frequencies and instants at which residuals show a torque.
+"""Frequencies and instants of periodic and impulsive torques found in residuals.
 
 A torque ``f`` at time ``s`` moves the angle at ``t`` by ``(a(s) b(t) - b(s) a(t))/W(s)`` times
 ``f ds``, with the derivatives ``a`` and ``b`` of the angle by the initial angle and velocity, and
-their Wronskian ``W``, ``exp(-c t/m)`` with viscous damping alone. Products of the residuals with
-the response to a torque at each time thus need two cumulative sums, and those with a periodic
-torque their Fourier transform. They are divided by their variance from noise.
+their Wronskian ``W``, ``exp(-c t/m)`` with viscous damping alone. Inner products of the residuals
+with the response to a torque at each time are thus two cumulative sums, those with a periodic
+torque their Fourier transform. Gains are their squares over their variance from noise.
 """
 
 from __future__ import annotations
@@ -25,45 +25,45 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-KEPT: Final = 4  # Number of frequencies, or instants, that are kept; fewest readings of a window
+KEPT: Final = 4  # Number of frequencies or instants returned; fewest readings of a window
 
-FINE: Final = 4  # Frequencies tried within one over the duration of the records
+FINE: Final = 4  # Oversampling of the frequency grid, relative to one over the records' duration
 
 MOST: Final = 1 << 18  # Most frequencies tried
 
 GROWTH: Final = 30.0
-"""Growth of a change of the start, over the least of all windows, up to which motion is calm."""
+"""Growth of initial deviations, over the least of all windows, up to which a window is used."""
 
-LOOKED_AT: Final = 4  # Frequencies whose exact gain is computed, over the number kept
+LOOKED_AT: Final = 4  # Number of frequencies whose exact gain is computed, over KEPT
 
-DRAWS: Final = 32  # Draws of noise from which the variance of the products is estimated
+DRAWS: Final = 32  # Noise samples from which the variance of the products is estimated
 
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Response of the readings of a window to torques, by the formula at the head of the module."""
+    """Linear response of a window's readings to torques, by the formula of the module."""
 
-    time: Floats  # In the laboratory, s
-    cosine: Floats  # Of the angle
-    residual: Floats  # Over the standard errors, orthogonal to the basis
+    time: Floats  # Laboratory time, s
+    cosine: Floats  # Cosine of the angle
+    residual: Floats  # Residuals over the standard errors, orthogonal to the basis
     states: Floats  # Derivatives by the initial angle and velocity, over the standard errors
     kernel: Floats  # Factors ``-b/W`` and ``a/W`` of later ``a`` and ``b``
-    basis: Floats  # Orthonormal basis of the changes by the initial state
+    basis: Floats  # Orthonormal basis of the columns of ``states``
 
     def pull(self, residual: Floats) -> Floats:
-        """Return the product of residuals with the response to a torque at each time."""
+        """Return the inner product of residuals with the response to a torque at each time."""
         later = _later(self.states * residual[:, None])
         return np.asarray(np.einsum("nk,nk->n", self.kernel, later), np.float64)
 
     def answer(self, impulse: NDArray[np.complex128]) -> Floats:
-        """Return responses to real and imaginary part of impulses, with the start fitted."""
+        """Return responses to real and imaginary part of impulses, with fitted initial states."""
         parts = np.stack([impulse.real, impulse.imag], axis=1)
         sums = np.cumsum(self.kernel[:, :, None] * parts[:, None, :], axis=0)
         columns = np.einsum("nk,nkp->np", self.states, sums)
         return np.asarray(columns - self.basis @ (self.basis.T @ columns), np.float64)
 
     def information(self) -> Floats:
-        """Return the squared norm of the response to a torque at each time, the start fitted."""
+        """Return the squared norm of each time's response, orthogonal to the initial states."""
         gram = _later(np.einsum("nj,nk->njk", self.states, self.states))
         whole = np.linalg.pinv(self.states.T @ self.states, hermitian=True)
         free = gram - gram @ whole @ gram
@@ -71,22 +71,22 @@ class Response:
         return np.asarray(left, np.float64)
 
     def noise(self, rng: np.random.Generator) -> Floats:
-        """Return residuals of noise alone."""
+        """Return simulated residuals of white noise, orthogonal to the basis."""
         drawn = rng.standard_normal(self.residual.size)
         return np.asarray(drawn - self.basis @ (self.basis.T @ drawn), np.float64)
 
 
 def _later(values: Floats) -> Floats:
-    """Return the sums over all later samples."""
+    """Return the sum over all later samples at each sample."""
     return np.asarray(np.cumsum(values[::-1], axis=0)[::-1] - values, np.float64)
 
 
 def calm_responses(
     runs: Sequence[FitRun], windows: Sequence[WindowSlopes], damping: float
 ) -> list[Response]:
-    """Return the responses of windows in which a change of the start grows little.
+    """Return the responses of windows in which deviations of the initial state grow little.
 
-    In others the response is large, and wrong to first order. ``damping`` is ``c/m``, 1/s.
+    In other windows the linear response is inaccurate. ``damping`` is ``c/m``, 1/s.
     """
     every, growth = [], []
     for window in windows:
@@ -116,7 +116,7 @@ def calm_responses(
 
 
 def instants(responses: Sequence[Response]) -> list[float]:
-    """Return the times in the laboratory, s, of the impulses with the greatest gains."""
+    """Return the laboratory times, s, of the impulses with the greatest gains."""
     time, gain = [], []
     for own in responses:
         pull, information = own.pull(own.residual), own.information()
@@ -128,11 +128,10 @@ def instants(responses: Sequence[Response]) -> list[float]:
 
 
 def frequencies(responses: Sequence[Response], most: float) -> list[float]:
-    """Return the frequencies up to ``most``, rad/s, of the sways with the greatest gains.
+    """Return the frequencies up to ``most``, rad/s, of the pivot sways with the greatest gains.
 
     Each window has its products ``P`` with ``exp(i w t)`` in its own time, and their moments from
-    noise, ``E |P|^2`` and ``E P^2``; all three turn with the window's start in the laboratory and
-    add up.
+    noise, ``E |P|^2`` and ``E P^2``; they are shifted in phase to laboratory time and summed.
     """
     first = min(own.time[0] for own in responses)
     span = max(own.time[-1] for own in responses) - first
@@ -142,7 +141,7 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
     coarse = 2 * np.pi * np.fft.rfftfreq(size, spacing)
     count = min(int(FINE * most * span / (2 * np.pi)), MOST)
     omega = most * np.arange(1, count + 1) / max(count, 1)
-    # Less than one period in the records is a constant torque or a drift.
+    # With less than one period in the records a torque cannot be distinguished from a drift.
     omega = omega[omega >= 2 * np.pi / span]
     if omega.size < 3:  # noqa: PLR2004 (no peak)
         return []
@@ -170,7 +169,7 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
 
 
 def _exact_gain(responses: Sequence[Response], omega: float) -> float:
-    """Return the gain of a sway of one frequency, without draws of noise."""
+    """Return the gain of a pivot sway of one frequency, without simulated noise."""
     pull, information = np.zeros(2), np.zeros((2, 2))
     for own in responses:
         columns = own.answer(np.exp(1j * omega * own.time) * own.cosine * np.gradient(own.time))

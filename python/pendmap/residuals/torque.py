@@ -1,15 +1,15 @@
-"""The torque that a model lacks, over angle, velocity, amplitude, drive phase and time.
+"""Residual torque of a model against angle, velocity, amplitude, drive phase and time.
 
-A small torque ``u(s)`` per moment of inertia that the model lacks moves its readings, to first
+A small torque ``u(s)`` per moment of inertia that the model lacks changes the readings, to first
 order (variation of constants), by
 
 ``e(t) = int_0^t (b(t) a(s) - a(t) b(s)) / W(s) u(s) ds``,   ``W = a b' - a' b``,
 
 with the derivatives ``a`` and ``b`` of the angle by the initial angle and velocity. A constant
-torque in one bin of the angle thus has a column like a parameter, at the price of two running
-integrals. Bins of all quantities are fitted together, orthogonal to the model's parameters and
-initial states: the result is the torque beyond what the model's own terms could take up. Errors add
-up over a record, so torques show far below the noise of second differences.
+torque in one bin of the angle thus has a column of the Jacobian like a parameter, computed with two
+cumulative integrals. Bins of all quantities are fitted jointly, orthogonal to the model's
+parameters and initial states: the result is the torque that the model's own terms cannot represent.
+Its effect accumulates over a record, so torques far below the noise of second differences are seen.
 """
 
 from __future__ import annotations
@@ -42,47 +42,47 @@ OVER: Final = {
     "drive_phase": "rad",
     "lab_time": "s",
 }
-"""Quantities over which the torque is given, and their units."""
+"""Quantities against which the torque is computed, with their units."""
 
 ALONG: Final = ("amplitude", "lab_time")
-"""Quantities over which the torque along the motion is given, positive where it drives."""
+"""Quantities with the torque along the motion, positive if it adds energy."""
 
-BINS: Final = 10  # Number of bins, with equally many samples
+BINS: Final = 10  # Number of bins of a quantity, with equally many samples each
 
-STANDS_OUT: Final = 4.0  # Standard errors from which a bin stands out; none of fifty does by chance
+STANDS_OUT: Final = 4.0  # Standard errors above which a bin is significant; 0.3 % for fifty bins
 
 BLIND: Final = 1e-5
-"""Information of a combination of bins, over the greatest, below which it is not determined."""
+"""Information of a combination of bins, over the greatest, below which it is undetermined."""
 
-LOST: Final = 1e-6  # ``W`` over its greatest below which the motion no longer depends on its start
+LOST: Final = 1e-6  # ``W`` over its greatest below which the integrand is set to 0
 
 
 @dataclasses.dataclass(frozen=True)
 class Torque:
-    """The torque that a model lacks."""
+    """Residual torque of a model, in bins of each quantity."""
 
     # Rows of bins by quantity: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, their
-    # ratio ``z``, and whether it is along the motion. Empty where the records do not show it.
+    # ratio ``z``, and whether it is along the motion. Empty if the records have no such quantity.
     rows: dict[str, list[dict[str, Any]]]
-    # Fall of the sum of squares with the torques of all bins of a quantity, and their number.
+    # Decrease of the sum of squares with a quantity's torques, and number of combinations of bins.
     gains: dict[str, tuple[float, int]]
-    noise: ResidualNoise  # Of the model
+    noise: ResidualNoise  # Noise of the model's residuals
 
     @classmethod
     def unknown(cls, noise: ResidualNoise) -> Torque:
-        """Return the result for a model whose torque cannot be computed."""
+        """Return the empty result for a model whose residual torque cannot be computed."""
         return cls({name: [] for name in OVER}, {}, noise)
 
     @property
     def chance(self) -> float:
-        """Probability that noise alone gains as much over any quantity (Bonferroni)."""
+        """Probability that noise alone gives such a gain for any quantity (Bonferroni)."""
         gains = [(gain, count) for gain, count in self.gains.values() if count]
         tails = [self.noise.chance_of(gain, count) for gain, count in gains]
         return min(min(tails, default=1.0) * max(len(tails), 1), 1.0)
 
 
 def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise) -> Torque:
-    """Return the torque that a model lacks in the runs to which it is fitted."""
+    """Return the residual torque of a model in the runs to which it is fitted."""
     windows, places = window_derivatives(runs, fit)
     names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
     edges = {
@@ -100,7 +100,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     torques, errors, _ = _solved(further, residual)
-    # Errors by the sum of squares over the number of independent readings (residuals.noise).
+    # The noise level is at least the sum of squares over the effective number of readings.
     power = dct(residual - further @ torques, norm="ortho") ** 2
     level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
     errors *= math.sqrt(max(noise.level, level))
@@ -130,7 +130,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
 def window_derivatives(
     runs: Sequence[FitRun], fit: TrajectoryFit
 ) -> tuple[list[WindowSlopes], list[dict[str, Floats]]]:
-    """Return derivatives and quantities of a fit in each window, also at samples without weight."""
+    """Return derivatives and quantities of OVER in each window, also at samples without weight."""
     whole = [dataclasses.replace(run, trusted=None) for run in runs]
     _, windows = window_slopes(fit, whole, (), fit.model)
     return windows, [_places(runs[w.run], fit, w) for w in windows]
@@ -139,9 +139,9 @@ def window_derivatives(
 def project_out(
     runs: Sequence[FitRun], windows: Sequence[WindowSlopes], columns: Sequence[Floats]
 ) -> tuple[Floats, Floats]:
-    """Return columns and residuals orthogonal to parameters and initial states.
+    """Return columns and residuals projected orthogonally to parameters and initial states.
 
-    Samples that do not count are set to 0, also in ``windows``.
+    Excluded samples are set to 0, also in ``windows``.
     """
     parts = []
     for window, own in zip(windows, columns, strict=True):
@@ -157,7 +157,7 @@ def project_out(
 
 
 def outstanding_bins(torque: Torque) -> list[dict[str, Any]]:
-    """Return the bins in which a torque stands out, the most significant first."""
+    """Return the bins with a significant torque, the most significant first."""
     rows = [row for rows in torque.rows.values() for row in rows if abs(row["z"]) > STANDS_OUT]
     return sorted(rows, key=lambda row: -abs(row["z"]))
 
@@ -187,7 +187,7 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
 
 
 def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
-    """Return torques of 1 rad/s^2 in each bin, as columns."""
+    """Return a column for each bin with a torque of 1 rad/s^2 in it."""
     torques = []
     for name, edge in edges.items():
         which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
@@ -200,7 +200,7 @@ def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
 def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     """Return the response of a window's readings to torques, over standard errors, shape (n, k).
 
-    Torques per moment of inertia at the window's samples, rad/s^2, shape (n, k).
+    ``torques`` are per moment of inertia at the window's samples, rad/s^2, shape (n, k).
     """
     own = slice(window.first, window.first + len(window.residual))
     time = run.time[own]
@@ -223,10 +223,10 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 
 
 def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[float, int]]:
-    """Return the least-squares torques of bins, of least norm where they are not unique.
+    """Return the least-squares torques of bins, of least norm if they are not unique.
 
-    With them are their errors for a noise level of 1, the fall of the sum of squares, and the
-    number of combinations of bins that are determined.
+    Further results: their standard errors for a noise level of 1; the decrease of the sum of
+    squares and the number of determined combinations of bins.
     """
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))

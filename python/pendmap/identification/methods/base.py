@@ -1,4 +1,4 @@
-"""Result of every method of identification, and what methods of peaks share."""
+"""Common result type of all methods of identification, and helpers for methods of peaks."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ MISFIT: Final = 2.0  # chi^2 per degree of freedom above which a method of peaks
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Identification:
-    """The damping that one method finds in a record.
+    """Damping identified by one method from a record.
 
     Parameters
     ----------
     method : str
-        Its name in the registry, as in the JSON of ``pendmap identify``.
+        Name in the registry, as in the JSON of ``pendmap identify``.
     estimates : mapping of str to Estimate
-        By the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr`` in
-        rad/s^2, ...) and ``offset`` (rad), those that the method gives. ``zeta`` and ``theta_r``
-        follow from them. Empty where the method is not applicable.
+        Estimates by the names of :class:`pendmap.Rig` (``w0`` in rad/s, ``c_over_m`` in 1/s, ``Tr``
+        in rad/s^2, ...) and ``offset`` (rad), as far as the method gives them. ``zeta`` and
+        ``theta_r`` are derived from them. Empty if the method is not applicable.
     used : str
-        Data that it used, in words.
+        Description of the data used.
     warnings : tuple of str
-        Reasons to doubt it.
+        Reasons to doubt the result.
     applicable : bool
-        Whether the method can be applied to the record; if not, ``warnings`` say why.
+        Whether the method can be applied to the record; if not, ``warnings`` give the reason.
     covariance : tuple of (tuple of str, ndarray) or None
-        Names and covariance matrix of what was fitted together.
+        Names and covariance matrix of the jointly fitted parameters.
     misfit : float or None
-        chi^2 per degree of freedom of the method's own model, where it has one.
+        chi^2 per degree of freedom of the method's model, if it has one.
     model : Rig or None
-        The pendulum, where the method finds effects beside ``estimates``.
+        Identified model, if the method fits effects in addition to ``estimates``.
     converged : bool
-        Whether its search converged; no model is made of others.
+        Whether the search converged; if not, no model is returned.
     """
 
     method: str = ""
@@ -64,7 +64,7 @@ class Identification:
 
     @property
     def short(self) -> str:
-        """Method and estimates on a line; numbers in SI, standard errors in brackets."""
+        """Method and estimates in one line; numbers in SI, standard errors in parentheses."""
         if not self.applicable:
             return f"{self.method}: {'; '.join(self.warnings)}"
         found = ", ".join(
@@ -74,7 +74,7 @@ class Identification:
 
     @property
     def sound(self) -> bool:
-        """Whether a model can be made of it: it converged, to a w0 that a pendulum may have."""
+        """Whether the result gives a model: it converged, with a positive finite w0."""
         w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
         return self.applicable and self.converged and 0 < w0 < math.inf
 
@@ -84,9 +84,9 @@ class Identification:
 
     @property
     def derived(self) -> dict[str, Estimate]:
-        """``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as known.
+        """Derived ``zeta = c_over_m / (2 w0)`` and ``theta_r = Tr / w0**2`` (rad), as far as known.
 
-        Errors follow by the delta method; without a covariance the two numbers are independent.
+        Errors are by the delta method; without a covariance the parameters are independent.
         """
         made = {}
         for name, numerator, power in (("zeta", "c_over_m", 1), ("theta_r", "Tr", 2)):
@@ -109,7 +109,7 @@ class Identification:
 
     @property
     def rig(self) -> Rig:
-        """The pendulum that was found; parameters not found, and negative damping, are 0."""
+        """Identified pendulum; missing parameters and negative damping are 0."""
         if self.model is not None:
             return self.model
         known: dict[str, Any] = {
@@ -131,7 +131,7 @@ def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
     warnings: Sequence[str] = (),
     because: str = "",
 ) -> Identification:
-    """Return that a method needs ``least`` peaks ``where`` a record of ``total`` has ``count``."""
+    """Return an inapplicable result: ``count`` of ``total`` peaks, but ``least`` are needed."""
     peaks = counted(count, "peak") if total is None else f"{count} of {counted(total, 'peak')}"
     text = f"not applicable: {f'{peaks} {where}'.strip()}, {least} are needed" + (
         f": {because}" if because else ""
@@ -140,7 +140,7 @@ def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
 
 
 def unphysical(values: Mapping[str, float]) -> list[str]:
-    """Return a warning for each damping below 0."""
+    """Return a warning for each negative damping parameter."""
     return [
         f"unphysical: {name} is {values[name]:.4g}, below 0"
         for name in ("c_over_m", "Tr")

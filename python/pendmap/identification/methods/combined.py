@@ -1,4 +1,4 @@
-"""The combined decrement of viscous damping and Coulomb friction, as the paper prints it.
+"""Combined decrement of viscous damping and Coulomb friction, as printed in the paper.
 
 Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2, eqs. 2.4 to 2.10.
 """
@@ -23,29 +23,29 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-Reading = Literal["all", "odd_ends", "odd_triplets"]  # Peaks that the printed method uses
+Reading = Literal["all", "odd_ends", "odd_triplets"]  # Interpretations of the peaks to be used
 
 CUT: Final = math.radians(12.0)
-"""Peaks above this are dropped, rad: there the pendulum is not linear."""
+"""Amplitude above which peaks are excluded, rad: the pendulum is nonlinear there."""
 
 ENDS_ABOVE: Final = "the record ends above it"  # Reason why a record has no peaks below the cut
 
-_FEWEST: Final = 4  # Peaks below the cut that are needed
+_FEWEST: Final = 4  # Fewest peaks below the cut
 _USES: Final[dict[Reading, str]] = {
     "all": "of them the first two and the last two",
     "odd_ends": "of them the first two and the last two that begin at an odd peak",
     "odd_triplets": "the mean over all triplets that begin at an odd peak",
 }
-"""How each reading uses the peaks, in words of the result."""
+"""Description of the peaks used by each interpretation, for the result."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Decrement:
-    """Result of the combined method for a small decay."""
+    """Result of the combined method for a decay of small amplitude."""
 
     delta: float  # zeta / sqrt(1 - zeta^2), eq. 2.7
     theta_r: float  # Tr / w0^2, rad, eq. 2.10
-    mean_period: float  # of all overlapping full cycles, s
+    mean_period: float  # mean period of all overlapping full cycles, s
 
     @property
     def zeta(self) -> float:
@@ -64,7 +64,7 @@ class Decrement:
 
     @property
     def si(self) -> Floats:
-        """``w0, c_over_m, Tr``."""
+        """Array of ``w0, c_over_m, Tr``, SI."""
         return np.array([self.w0, 2 * self.zeta * self.w0, self.Tr])
 
 
@@ -72,7 +72,7 @@ def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
     """Return the absolute values of peaks by eqs. 2.4 to 2.6, shape (count,).
 
     ``abs(th_k) = -theta_r (E + 1) + E abs(th_{k-1})``, ``E = exp(-delta pi)``. Negative values,
-    from the peak on that does not reach zero, mean nothing.
+    after the pendulum has stopped, are meaningless.
     """
     shrink = math.exp(-delta * math.pi)
     result = np.empty(count)
@@ -85,8 +85,8 @@ def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
 def decrement(peaks: Floats) -> float:
     """Return ``delta`` by eq. 2.7, from the first two and the last two absolute peaks.
 
-    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``; all peaks between cancel. NaN
-    where the ratio is not above 0.
+    ``delta = ln[(th_0 - th_1) / (th_{k-1} - th_k)] / ((k - 1) pi)``; the peaks between them cancel.
+    NaN if the ratio is not positive.
     """
     ratio = (peaks[0] - peaks[1]) / (peaks[-2] - peaks[-1])
     if not ratio > 0:
@@ -95,14 +95,14 @@ def decrement(peaks: Floats) -> float:
 
 
 def coulomb(peaks: Floats) -> float:
-    """Return ``theta_r = Tr / w0^2`` by eq. 2.10, from the same four absolute peaks, rad."""
+    """Return ``theta_r = Tr / w0^2``, rad, by eq. 2.10, from the first and last two peaks."""
     first, second, last_but_one, last = peaks[0], peaks[1], peaks[-2], peaks[-1]
     below = second + first - last_but_one - last
     return float((second * last_but_one - first * last) / below) if below else math.nan
 
 
 def triplets(peaks: Floats) -> tuple[Floats, Floats]:
-    """Return ``delta`` and ``theta_r`` of each three peaks in a row, shape (P - 2,): figure 5."""
+    """Return ``delta`` and ``theta_r`` (figure 5) of each three consecutive peaks, (P - 2,)."""
     first, second, third = peaks[:-2], peaks[1:-1], peaks[2:]
     with np.errstate(invalid="ignore", divide="ignore"):
         delta = np.log((first - second) / (second - third)) / math.pi
@@ -111,14 +111,14 @@ def triplets(peaks: Floats) -> tuple[Floats, Floats]:
 
 
 def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
-    """Apply eqs. 2.7 and 2.10 to absolute peaks; ``parity`` is that of the first one's number."""
+    """Return the result of eqs. 2.7 and 2.10; ``parity`` is that of the first peak's number."""
     if reading == "odd_triplets":
         deltas, thetas = (each[1 - parity :: 2] for each in triplets(peaks))
         delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
     else:
         used = peaks
         if reading == "odd_ends":
-            # Both pairs of neighbours that 2.7 uses begin at an odd peak.
+            # Both pairs of neighbours in eq. 2.7 begin at an odd peak.
             used = used[1 - parity :]
             used = used[: used.size - used.size % 2]
         delta, theta_r = decrement(used), coulomb(used)
@@ -126,7 +126,7 @@ def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int)
 
 
 def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
-    """Return the peaks below a cut that follow one another, and warnings about them."""
+    """Return the longest row of consecutive peaks below a cut, and warnings."""
     small = peaks.turned
     above = np.flatnonzero(np.abs(small.amplitude) >= cut)
     small = small.select(np.arange(len(small)) > (above[-1] if above.size else -1))
@@ -149,14 +149,14 @@ def from_peaks(
 ) -> Identification:
     """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
-    Peaks above the cut (12 degrees) are dropped; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``, the
-    mean period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``; standard errors are by the delta
+    Peaks above the cut (12 degrees) are excluded; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``,
+    the mean period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``; standard errors are by the delta
     method, intervals by a parametric bootstrap of the peaks. The paper starts "only on odd half
-    cycles": ``odd_ends`` takes 2.7 between the first and the last pair of peaks that begin at an
-    odd one, ``odd_triplets`` the mean over the triplets that do. The method is biased: by the
-    nonlinearity (1.5 % in delta at 12 degrees), by a zero error of the angle, and because 2.7 uses
-    four peaks of all; the module ``repaired`` corrects that. The samples of the ``record``, s and
-    rad, show why there is no peak below the cut.
+    cycles": ``odd_ends`` applies eq. 2.7 to the first and the last pair of peaks that begin at an
+    odd peak, ``odd_triplets`` averages over such triplets. The method is biased by the nonlinearity
+    (1.5 % in delta at 12 degrees) and by a zero error of the angle, and eq. 2.7 uses only four
+    peaks; the module ``repaired`` corrects that. The samples of the ``record``, s and rad, serve to
+    explain missing peaks below the cut.
     """
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
@@ -210,13 +210,13 @@ def from_peaks(
 
 
 def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> bool:
-    """Return whether a record continues below a cut, and its peaks there are lost."""
+    """Return whether a record continues below a cut with peaks that were not found."""
     if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
         return False
     size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
     above = np.flatnonzero(size >= cut)
     first = int(above[-1]) + 1 if above.size else 0
-    # Within a half swing after the last large peak no peak is lost: turns are noise.
+    # Within a half swing after the last large peak, turns are noise.
     if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
         return False
     turns = np.count_nonzero(np.diff(np.sign(np.diff(theta[first:]))))

@@ -1,4 +1,4 @@
-"""De Paula's split: viscous damping where the swing is fast, friction where it is slow.
+"""De Paula's method: viscous damping from fast swings, friction from slow ones.
 
 De Paula, Savi & Pereira-Pinto (2006), "Chaos and transient chaos in an experimental nonlinear
 pendulum", J. Sound Vib.; the windows of amplitudes are chosen here.
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 
 FAST: Final = (CUT, math.radians(90.0))
-"""Amplitudes between which the decay is taken as exponential, rad."""
-SLOW: Final = (0.0, CUT)  # Amplitudes between which it is taken as linear, rad
-_FEWEST: Final = 3  # Peaks that each window needs
+"""Range of amplitudes in which the decay is assumed to be exponential, rad."""
+SLOW: Final = (0.0, CUT)  # Range of amplitudes in which the decay is assumed to be linear, rad
+_FEWEST: Final = 3  # Fewest peaks of each window
 
 
 def from_peaks(
     peaks: Peaks, *, fast: tuple[float, float] = FAST, slow: tuple[float, float] = SLOW
 ) -> Identification:
-    """Identify viscous damping and Coulomb friction apart, each where it is assumed to dominate.
+    """Identify viscous damping and Coulomb friction separately, each in its own window.
 
-    Where the swing is fast ``abs(th) ~ exp(-c_over_m t / 2)`` is fitted, where it is slow
-    ``abs(th) ~ -(2 Tr / (pi w0)) t``: friction takes ``2 theta_r`` of a half cycle's amplitude.
-    Each fit attributes all damping to its own law, so the windows (rad) decide the result.
+    ``abs(th) ~ exp(-c_over_m t / 2)`` is fitted to fast swings, ``abs(th) ~ -(2 Tr / (pi w0)) t``
+    to slow ones, since friction reduces the amplitude by ``2 theta_r`` per half cycle. Each fit
+    attributes all damping to its own law, so the result depends on the windows (rad).
     """
     turned = peaks.turned
     size = np.abs(turned.amplitude)

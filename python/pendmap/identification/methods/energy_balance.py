@@ -1,7 +1,7 @@
-"""Energy balance: the loss of each half cycle against the work of the two kinds of damping.
+"""Energy balance: the loss of each half cycle against the work of viscous damping and friction.
 
 Liang & Feeny (2006), "Balancing energy to estimate damping parameters in forced oscillators",
-J. Sound Vib.; the balance here is that of a free decay, half cycle by half cycle.
+J. Sound Vib.; here it is applied to the half cycles of a free decay.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_FEWEST: Final = 5  # Peaks that are needed
+_FEWEST: Final = 5  # Fewest peaks
 _LARGEST: Final = 2.0
-"""Peaks below this give w0, rad: above, damping itself changes the half cycle's time."""
+"""Amplitude below which peaks determine w0, rad: above, damping affects the half period."""
 _PHASE: Final = 0.5
-"""Half width of the windows in which the velocity is fitted, radians of phase w0 t."""
+"""Half-width of the windows in which the velocity is fitted, rad of phase w0 t."""
 _SAMPLES: Final = 25
-"""Samples a period below which a warning comes: the nine of a quartic smooth the velocity then."""
+"""Samples per period below which a warning is given: the quartic smooths the velocity."""
 
 
 def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
-    """Identify viscous damping and Coulomb friction by the energy that each half cycle loses.
+    """Identify viscous damping and Coulomb friction from the energy loss of each half cycle.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
     between the peaks ``x_k``, with the angle's zero error ``b``, at any amplitude. The integral is
-    over the measured cycle: velocities by local quartics, less the noise's share; across a gap it
-    is that of a pendulum. Neighbouring half cycles share a peak: least squares are generalised.
+    over measured velocities from local quartics, less the noise's share; across a gap it is that of
+    an undamped pendulum. Generalized least squares account for peaks shared by half cycles.
     """
     turned = peaks.turned
     if len(turned) < _FEWEST:
@@ -94,7 +94,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
 def _balance(
     peaks: Peaks, pairs: NDArray[np.intp], work: Floats, w0: float, zero: float
 ) -> tuple[Floats, Floats, float]:
-    """Return ``c_over_m``, ``Tr`` and the change of the zero; covariance; chi^2 a freedom."""
+    """Return ``c_over_m``, ``Tr``, change of the zero; covariance; chi^2 per degree of freedom."""
     x = peaks.amplitude - zero
     later = pairs + 1
     lost = w0**2 * (np.cos(x[later]) - np.cos(x[pairs]))
@@ -104,7 +104,7 @@ def _balance(
     rows = np.column_stack((work, way, tilt))
     variance = np.maximum(peaks.stderr_amplitude, 1e-12) ** 2
     noise = chain_covariance(pairs, w0**2 * np.sin(x[pairs]), -(w0**2) * np.sin(x[later]), variance)
-    # Noise changes the energy of a small peak in second order too.
+    # The second-order effect of noise matters for the energy of small peaks.
     second = w0**4 * variance**2 / 2
     noise[0] += second[pairs] + second[later]
     return chain_least_squares(rows, lost, noise)

@@ -1,4 +1,4 @@
-"""The classic logarithmic decrement: viscous damping alone."""
+"""Classic logarithmic decrement, for viscous damping alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 Reading = Literal["ends", "line"]
-_FEWEST: Final = 3  # Peaks below the cut that are needed
+_FEWEST: Final = 3  # Fewest peaks below the cut
 
 
 def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> Identification:
@@ -30,7 +30,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     ``delta = ln(abs(th_0) / abs(th_n)) / (n pi)`` over ``n`` half cycles between the first and the
     last peak (the mean of all decrements is equal), or by ``reading="line"`` the slope of a line
     through all ``ln abs(th_k)``; ``zeta = delta / sqrt(1 + delta^2)``, ``w0`` from the mean period.
-    Coulomb friction counts as viscous damping: the decrement grows as the swing falls.
+    Coulomb friction is attributed to viscous damping: the decrement increases as the swing decays.
     """
     small = peaks.turned
     small = small.select(np.abs(small.amplitude) < cut)

@@ -1,4 +1,4 @@
-"""All methods by their names, run on one record."""
+"""Registry of all methods by name, and their application to one record."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Method:
-    """A method of identification."""
+    """Method of identification."""
 
-    name: str  # in results and in JSON
-    compute: Callable[..., Identification]  # of peaks, of peaks and samples, or of samples alone
-    reads_peaks: bool = True  # found once for all methods
+    name: str  # name in results and JSON
+    compute: Callable[..., Identification]  # from peaks, peaks and samples, or samples alone
+    reads_peaks: bool = True  # whether it uses peaks, found once for all methods
     reads_samples: bool = False
     needs_samples: bool = False  # whether it cannot be applied to peaks alone
 
@@ -51,7 +51,7 @@ class Method:
         trusted: ArrayLike | None = None,
         peaks: Peaks | None = None,
     ) -> Identification:
-        """Identify the damping of a record, arguments as for :func:`identify`."""
+        """Identify the damping of a record, with the arguments of :func:`identify`."""
         if not self.reads_peaks:
             found = self.compute(time, theta, sigma=sigma, trusted=trusted)
             return dataclasses.replace(found, method=self.name)
@@ -62,7 +62,7 @@ class Method:
     def from_peaks(
         self, peaks: Peaks, record: tuple[Floats, Floats] | None = None
     ) -> Identification:
-        """Identify the damping of peaks, and of samples (s, rad) where there are any."""
+        """Identify the damping from peaks, and from samples (s, rad) if given."""
         if self.needs_samples and record is None:
             text = (
                 "not applicable: the record holds peaks alone, and this method needs every sample"
@@ -95,7 +95,7 @@ METHODS: Final = {
 
 
 def check_names(methods: Iterable[str] | None) -> list[str]:
-    """Return the names of methods, all by default; refuse those that are not known."""
+    """Return the names of methods, all by default; raise InputError for unknown names."""
     if isinstance(methods, str):
         raise InputError(f"methods must be a list of names, like [{methods!r}], got {methods!r}")
     names = list(METHODS) if methods is None else list(dict.fromkeys(methods))
@@ -120,7 +120,7 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
     Parameters
     ----------
     time, theta : array, shape (N,)
-        s, increasing, and rad from the downward rest, unwrapped.
+        Times, s, increasing, and angles from the downward rest, rad, unwrapped.
     sigma : float, optional
         Noise of a sample, rad; by default estimated from the record.
     trusted : array of bool, shape (N,), optional
@@ -128,19 +128,19 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
     methods : iterable of str, optional
         Names of :data:`METHODS`; by default all.
     peaks : Peaks, optional
-        Those of the record, where they are known; by default found.
+        Peaks of the record; by default found from the samples.
     progress : callable, optional
-        Called with the methods done and those to do.
+        Called with the numbers of methods done and in all.
 
     Returns
     -------
     dict of str to Identification
-        By method. One that is not applicable is there too, and says why.
+        Results by method, including inapplicable ones with the reason.
 
     Raises
     ------
     InputError
-        If a method is not known or the arrays are not a record.
+        If a method is unknown or the arrays are not a valid record.
     """
     names = check_names(methods)
     if samples(time, theta, trusted)[0].size == 0:
@@ -152,7 +152,7 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
         peaks = peaks.later(-first)
     found = {}
     for name in names:
-        # The trajectory method reports times of the record, and subtracts the first one itself.
+        # The trajectory method reports times of the record, and subtracts the first itself.
         own, known = (elapsed, {"peaks": peaks}) if METHODS[name].reads_peaks else (time, {})
         found[name] = METHODS[name].identify(own, theta, sigma=sigma, trusted=trusted, **known)
         if progress is not None:
@@ -161,9 +161,10 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
 
 
 def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
-    """Identify damping where nothing but peaks was measured.
+    """Identify damping from measured peaks alone.
 
-    Peaks without standard errors get those of their own scatter; of too few there are no intervals.
+    Standard errors of peaks are estimated from their scatter unless given; with too few peaks there
+    are none, and no intervals.
     """
     peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
     if not peaks.known:
@@ -175,24 +176,24 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
         )
     found = {name: METHODS[name].from_peaks(peaks) for name in check_names(methods)}
     for name, one in found.items():
-        # Errors of 0 are none; a fit estimates its own from its residuals.
+        # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
         if not peaks.known and not any(each.stderr for each in one.estimates.values()):
             bare = {n: Estimate(each.value) for n, each in one.estimates.items()}
             found[name] = dataclasses.replace(one, estimates=bare, covariance=None)
     return found
 
 
-FEWEST: Final = 16  # Values from which a scatter is estimated: eight differences, to about a third
+FEWEST: Final = 16  # Fewest values from which a scatter is estimated: eight differences, to a third
 
 _DIFFERENCE: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-"""Fourth difference, which is 0 of a cubic."""
+"""Coefficients of the fourth difference, which vanishes for a cubic."""
 
 
 def scatter(values: Floats) -> float:
-    """Return the standard deviation of the noise of values in a row; 0 where there are few.
+    """Return the standard deviation of the noise of successive values; 0 if there are too few.
 
-    The median of fourth differences counts, of every second value, since a zero error moves odd and
-    even peaks apart; of white noise they have 70 times its variance.
+    It is estimated from the median of fourth differences of every second value, since a zero error
+    separates odd and even peaks; for white noise these have 70 times its variance.
     """
     if values.size < FEWEST:
         return 0.0

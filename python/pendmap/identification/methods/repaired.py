@@ -1,4 +1,4 @@
-"""The combined decrement repaired: all peaks by least squares, the zero estimated too."""
+"""Corrected combined decrement: least squares over all peaks, with the angle's zero error."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_FEWEST: Final = 6  # Peaks below the cut that are needed
+_FEWEST: Final = 6  # Fewest peaks below the cut
 
 
 def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
-    """Identify viscous damping and Coulomb friction by the repaired combined decrement.
+    """Identify viscous damping and Coulomb friction by the corrected combined decrement.
 
     All peaks under the cut (rad) are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4
-    to 2.6 of Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A. Unknown are ``a_0``,
-    ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are the peaks' standard errors.
-    The half cycle that stops is left out. ``w0`` comes from the amplitude-corrected period
-    ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to all their times. The remaining bias is of the
-    linear recursion at 12 degrees.
+    to 2.6 of Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A. The unknowns are ``a_0``,
+    ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are from the peaks' standard
+    errors. The final half cycle, in which the pendulum stops, is excluded. ``w0`` is from the
+    amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to the times of these
+    peaks. The remaining bias is that of the linear recursion at 12 degrees.
     """
     small, warnings = small_peaks(peaks, cut)
     count = len(small)
@@ -42,7 +42,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         return too_few(count, _FEWEST, len(peaks.turned), under, warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
-    # Peaks measured elsewhere may come without errors: then all weigh the same.
+    # Given peaks may have no standard errors: then all have equal weights.
     error = small.stderr_amplitude
     known = bool(np.all(error > 0))
     error = error if known else np.ones(count)
@@ -71,7 +71,7 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
         )
     _, delta, theta_r, zero = fit.x
     zeta = delta / math.sqrt(1 + delta**2)
-    # Errors of fitted peaks are negligible beside those of measured ones.
+    # Errors of fitted peaks are negligible relative to those of measured ones.
     times = small.stderr_time
     smooth = dataclasses.replace(
         small,

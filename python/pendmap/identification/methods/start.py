@@ -1,4 +1,4 @@
-"""Starting values for a fit to the whole record: from methods of peaks, or a global search."""
+"""Starting values for a fit to a whole record, from methods of peaks or a global search."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_DAMPING: Final = (1e-5, 0.5)  # Range of ``c_over_m / w0`` that is searched
-_FRICTION: Final = (1e-6, 0.3)  # Range of ``Tr / w0^2`` that is searched, rad
-_ZERO: Final = 0.2  # Largest zero error that is searched, rad
+_DAMPING: Final = (1e-5, 0.5)  # Searched range of ``c_over_m / w0``
+_FRICTION: Final = (1e-6, 0.3)  # Searched range of ``Tr / w0^2``, rad
+_ZERO: Final = 0.2  # Largest zero error in the search, rad
 _MISFIT: Final = 25.0
 """chi^2 per degree of freedom above which a method's values are not used as a start."""
-_MOST_PEAKS: Final = 80  # Peaks that the global search compares at most
+_MOST_PEAKS: Final = 80  # Most peaks compared in the global search
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,11 +48,11 @@ def starting_values(
     sigma: float | None = None,
     trusted: ArrayLike | None = None,
 ) -> StartingValues:
-    """Find starting values: energy balance, else the repaired decrement, else a global search.
+    """Return starting values by energy balance, else repaired decrement, else global search.
 
-    A method counts if it is applicable, its damping is not negative by more than its errors, and
-    its model of the peaks is not far off. A record with two peaks or fewer gives a guess; one that
-    does not swing raises InputError.
+    A method is used if it is applicable, its damping is not significantly negative, and its misfit
+    is not large. With at most three peaks a guess is returned; a record without a swing raises
+    InputError.
     """
     peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
     record = samples(time, theta, trusted)
@@ -67,12 +67,12 @@ def starting_values(
 
 
 def global_start(peaks: Peaks, *, seed: int = 0) -> StartingValues:
-    """Search all of the plausible damping for the envelope of four peaks or more.
+    """Return starting values by a global search over plausible damping, from at least four peaks.
 
     Differential evolution over ``c_over_m / w0``, ``Tr / w0^2``, the first peak and the zero error
-    on :func:`pendmap.identification.period.envelope`; distances count by
-    ``2 (sqrt(1 + r^2) - 1)``, so that false peaks cannot lead it away. ``w0`` is the median over
-    half cycles of the amplitude-corrected one of each.
+    of :func:`pendmap.identification.period.envelope`, with the loss ``2 (sqrt(1 + r^2) - 1)``,
+    which is robust to outliers. ``w0`` is the median over half cycles of their amplitude-corrected
+    frequencies.
     """
     turned = peaks.turned
     if len(turned) < 4:  # noqa: PLR2004
@@ -114,7 +114,7 @@ def _frequency(peaks: Peaks, zero: float) -> float:
 
 
 def _start_of(found: Identification, source: str) -> StartingValues | None:
-    """Return starting values from a method's result; None where they are no start."""
+    """Return starting values from a method's result; None if they are implausible."""
     if not found.applicable:
         return None
     for name in ("c_over_m", "Tr"):
@@ -128,11 +128,11 @@ def _start_of(found: Identification, source: str) -> StartingValues | None:
 
 
 def _guess(time: Floats, theta: Floats, peaks: Peaks) -> StartingValues:
-    """Return w0 by the half period of one swing, and a damping that most rigs have."""
+    """Return w0 from half or quarter periods, and a typical damping."""
     if len(peaks) > 1:
         w0 = _frequency(peaks, 0.0)
     else:
-        # One quarter: from the largest angle to the first zero.
+        # One quarter period, from the largest angle to the first zero.
         far = int(np.argmax(np.abs(theta)))
         passed = np.flatnonzero(theta[far:] * theta[far] < 0)
         if passed.size == 0:

@@ -1,8 +1,8 @@
-"""Trajectory method: the whole record of a free decay against the equation of motion.
+"""Trajectory method: fit of the equation of motion to the whole record of a free decay.
 
-``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is followed
-from release to rest, stops included, and all parameters are fitted to all readings at once
-(:mod:`pendmap.identification.fit`). Nothing is linearised, no peak is picked.
+``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')``, with further terms by effects, is integrated
+from release to rest, including stops, and all parameters are fitted jointly to all readings
+(:mod:`pendmap.identification.fit`), without linearization or peaks.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
 
 
 TOO_GOOD: Final = 0.7
-"""chi^2 per degree of freedom below which a warning says that sigma is too large."""
-OFFSET: Final = "encoder_offset"  # The effect that is the sensor's zero
-POOR: Final = 0.1  # Residual over the record's own scatter above which the search went astray
+"""chi^2 per degree of freedom below which sigma is reported as too large."""
+OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
+POOR: Final = 0.1  # Rms residual over the record's standard deviation above which a fit is poor
 LACKING: Final = 4.0
-"""Widening above which readings count alike: by their law the slowest alone would decide."""
+"""Widening above which readings have equal weights: else the slowest alone would dominate."""
 
 
 class TooShortError(InputError):
-    """The record gives no start: fewer than two half swings, or none that fall."""
+    """Error raised for a record with too few decaying half swings for starting values."""
 
 
 def identify(
@@ -58,8 +58,8 @@ def identify(
     """Identify the damping of a free decay by fitting its whole trajectory.
 
     ``choices`` are those of :func:`fit_decay`. Results are ``w0``, ``c_over_m``, ``Tr``, ``offset``
-    and the effects' parameters. Damping may come out negative: a warning says that an effect is
-    missing then.
+    and the effects' parameters. Negative damping is possible, with a warning that an effect may be
+    missing.
     """
     try:
         fit, reading = fit_decay(time, theta, **choices)
@@ -69,10 +69,10 @@ def identify(
 
 
 def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str) -> Identification:
-    """Return a fit as every method gives its result; ``part`` says which part of the records."""
+    """Return the identification from a fit; ``part`` describes the fitted part of the records."""
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
-    # Where the model does not fit, errors come from the misfit.
+    # If the model does not fit, errors are widened by the misfit.
     wider = math.sqrt(fit.widening)
     found = [
         dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
@@ -108,7 +108,7 @@ def fit_decay(
 ) -> tuple[TrajectoryFit, Reading]:
     """Return the fit to a free decay (s, and rad from the downward rest) and its readings.
 
-    ``sigma`` (rad) is by default the noise as estimated without a model; ``choices`` are those of
+    ``sigma`` (rad) is by default the noise estimated without a model; ``choices`` are those of
     :func:`fit_from_start`.
     """
     time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
@@ -152,7 +152,7 @@ def _warnings(
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         found.append("the search did not converge")
-    # A sensor's tilt shows in wide swings alone: its interval is not reported.
+    # A sensor's tilt is determined by large swings only: its interval is not reported.
     wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
@@ -176,21 +176,21 @@ def fit_from_start(
     friction: bool = True,
     effects: Sequence[Effect | str] = (),
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
-    """Return the fit to several records, from a start that the first gives, and their readings.
+    """Return the joint fit to several records, and their readings.
 
-    Where a rough start leads to a poor fit, a second one begins with the values of the methods of
-    peaks, or of a global search over their envelope; the better one counts. Readings whose noise
-    grows with speed count by it, unless the model lacks an effect: then they count alike.
-    ``start`` comes by default from zero crossings and the energy of each half swing; TooShortError
-    is raised where the first record gives none. ``friction`` fits Coulomb friction; ``effects`` act
-    besides (SI), and begin small if given by name. Fitted are all their parameters but exponents,
-    orders and widths.
+    ``start`` has starting values, by default from zero crossings and the energy of each half swing
+    of the first record; TooShortError is raised if that has too few. If the fit is poor and
+    ``start`` is not a Rig, a second one starts from the methods of peaks, or a global search over
+    their envelope; the better one is returned. Readings whose noise grows with speed are weighted
+    accordingly, unless the model lacks an effect: then weights are equal. ``friction`` includes
+    Coulomb friction; further ``effects`` (SI) begin small if given by name; all their parameters
+    except exponents, orders and widths are fitted.
     """
     first = runs[0]
     time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
-    # A sensor on the rod has a bias instead of a zero.
+    # A sensor on the rod has a bias instead of a zero error.
     zeroed = any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
@@ -227,7 +227,7 @@ def fit_from_start(
 def _start_of(
     start: Rig | Mapping[str, float] | None, time: Floats, theta: Floats, sigma: float
 ) -> Rig:
-    """Return where a search starts: given values, the others from the record's half swings."""
+    """Return the starting model: given values, and others from the record's half swings."""
     if isinstance(start, Rig):
         return start
     known: dict[str, Any] = dict(start or {})
@@ -237,7 +237,7 @@ def _start_of(
 
 
 def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
-    """Return a start from the methods of peaks, which handle rotations too."""
+    """Return starting values from the methods of peaks, which also handle rotations."""
     try:
         start = starting_values(time, theta, sigma=sigma)
     except InputError:
@@ -252,7 +252,7 @@ def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
 
 @dataclasses.dataclass(frozen=True)
 class JointFit:
-    """A pendulum fitted to several runs, in the order of its curves and residuals."""
+    """Fit of a pendulum to several runs, in the order of its curves and residuals."""
 
     fit: TrajectoryFit
     runs: tuple[Run, ...]
@@ -260,7 +260,7 @@ class JointFit:
 
     @property
     def noise(self) -> float:
-        """Root mean square of the noise of the readings that count, rad."""
+        """Root mean square noise of the included readings, rad."""
         counts = [int(run.trusted.sum()) for run in self.runs]
         square = np.average([reading.sigma**2 for reading in self.readings], weights=counts)
         return math.sqrt(square)
@@ -273,11 +273,10 @@ def fit_together(
     known: dict[str, float] | None = None,
     effects: Sequence[Effect | str] = (),
 ) -> JointFit:
-    """Fit natural frequency, damping, the sensor's zero and effects to one run or more.
+    """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
-    ``start``, with its effects, or ``known`` parameters are where the search begins, else it is
-    found from the first run: TooShortError is raised where that gives none. Sizes of ``effects``
-    are fitted.
+    Starting values are ``start``, with its effects, or ``known`` parameters, else estimated from
+    the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted.
     """
     if not runs:
         raise InputError("runs must hold one record or more, got none")
