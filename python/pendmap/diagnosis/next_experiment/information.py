@@ -76,7 +76,7 @@ class Information:
         return np.where(np.outer(shown, shown), own, 0.0)
 
     def followed(self, columns: Sequence[int], by: Sequence[int], beside: Sequence[int]) -> Floats:
-        """Return the coefficients of ``by`` in the fit to columns, with others, shape (n of by, n)."""
+        """Return the coefficients of ``by`` in the fit to columns, with others, (n of by, n)."""
         every = [*by, *beside]
         found = self.covariance(every) @ self.matrix[np.ix_(every, columns)]
         return np.asarray(found[: len(by)], np.float64)
