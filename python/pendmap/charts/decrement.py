@@ -37,7 +37,7 @@ class Triplets:
     """Decrements of three successive peaks (eq. 2.7), with the size of the middle peak in rad.
 
     ``delta`` is NaN if a peak is not smaller than the previous one; its standard error follows from
-    those of the peaks; ``odd`` tells whether the first of the three has an odd number.
+    those of the peaks; ``odd`` is true if the first of the three has an odd number.
     """
 
     size: Floats

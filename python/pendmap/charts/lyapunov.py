@@ -71,7 +71,7 @@ def _value(dataset: xr.Dataset) -> str:
 
 
 def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the first and the last period of a curve, at least one apart."""
+    """Return the first and the last period of a curve, which differ by 1 or more."""
     periods = dataset["elapsed"].values
     return float(periods[0]), float(max(periods[-1], periods[0] + 1))
 

@@ -105,7 +105,7 @@ def _named(name: str) -> str:
         return f"oscillation {which}:0"
     if family == "rotation":
         n, _, w = which.partition(":")
-        # Rotations slower than one turn per period need colours of their own.
+        # Rotations slower than one turn per period have separate colours.
         return f"rotation {n}:+{w}" if n == w else f"rotation {5 * int(n)}:+{w}"
     return f"{name} +" if name in ("rotating chaos", "quasiperiodic rotation") else name
 

@@ -28,7 +28,7 @@ _FINE = 8  # Pixels of the narrowest cell if cells differ in width
 
 LOG_TICKS = 4  # Least number of ticks of a logarithmic colour bar, if its range allows
 
-MOST_COPIES = 100  # Greatest number of copies of a point, 2 pi apart, in a window
+MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
 
 def edges(dataset: xr.Dataset, name: str) -> Floats:

@@ -105,7 +105,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     ]
     inverted = _stable(omega, dataset, "inverted_", np.zeros_like(first), p_max)
     if inverted:
-        # A hatch keeps what is below visible, and has no seams.
+        # A hatch leaves the area below it visible, and has no seams.
         drawn.append(
             Areas(
                 [to(area) for area in inverted],

@@ -92,7 +92,7 @@ def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
 
 
 def resting(dataset: xr.Dataset) -> Floats:
-    """Return the intervals within the times shown in which friction holds it, shape (n, 2)."""
+    """Return the sticking intervals within the times shown, from and to, shape (n, 2)."""
     if "event_kind" not in dataset:
         return np.empty((0, 2))
     kinds, times = dataset["event_kind"].values, dataset["event_time"].values

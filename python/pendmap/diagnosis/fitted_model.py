@@ -34,12 +34,12 @@ MOST_STEPS: Final = 40  # Most steps of a fit
 QUICK: Final = 4.0  # Growth factor of windows between stages of a fit
 
 LITTLE: Final = 0.05
-"""Promised fall of the sum of squares, per independent reading, below which a fit ends."""
+"""Promised fall of the sum of squares, over one independent reading's, below which a fit ends."""
 
 LEAST_LEVEL: Final = 0.5  # Least variance of noise over the stated variance of its readings
 
 EXACT: Final = 1e-3
-"""Promised fall of the sum of squares, per independent reading, at which a fit has converged."""
+"""Promised fall of the sum of squares, over one independent reading's, of a converged fit."""
 
 FEW_STEPS: Final = 12  # Most steps of a candidate's fit; the right candidate needs about five
 
@@ -98,7 +98,7 @@ class FittedModel:
 
     @property
     def taken(self) -> set[str]:
-        """Effects of the model, and those of its own parameters that are fitted."""
+        """Names of the model's effects and of its fitted parameters."""
         own = {name.partition("[")[0] for name in self.free}
         return {effect.name for effect in self.fit.model.effects} | own
 

@@ -68,9 +68,9 @@ class Discrepancy(Readable):
     assessment: Assessment  # Verdict and the statistics it is based on
     effects: tuple[NamedEffect, ...]  # The named effects
     gap: Gap  # Residuals of the baseline and of the best model
-    torque_before: Torque  # Torque that the baseline lacks
-    torque_after: Torque  # Torque that the best model lacks
-    where: list[dict[str, Any]]  # Bins in which the torque that the baseline lacks stands out
+    torque_before: Torque  # Torque missing in the baseline
+    torque_after: Torque  # Torque missing in the best model
+    where: list[dict[str, Any]]  # Bins in which the torque missing in the baseline is significant
     runs: RunByRun  # Parameters run by run
     scores: Scores  # Scores of all candidates at the baseline
     attempts: tuple[Attempt, ...]  # Candidates that were fitted

@@ -20,8 +20,8 @@ class Thresholds:
     # Twice the difference of log-likelihoods, in independent readings, up to which two models are
     # indistinguishable.
     alike: float = 10.0
-    # Share of the squared gap above the noise that effects must close where something is still
-    # missing: each to be accepted, all together for the verdict ``partial``.
+    # Share of the squared gap above the noise that effects must close if they leave a part of it:
+    # each to be accepted, all together for the verdict ``partial``.
     closes: float = 1 / 3
     # Rise of the sum of squares on a held-out set, in independent readings, up to which an effect
     # is accepted.

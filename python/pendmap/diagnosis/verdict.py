@@ -62,7 +62,7 @@ class Identifiability:
 
     candidate: Candidate  # The effect
     gain: float  # Fall of the sum of squares with it, in independent readings
-    closed: float  # Share of the squared gap above the noise that it closes besides the others
+    closed: float  # Share of the squared gap above the noise that it closes with the others
     alternatives: tuple[Alternative, ...]  # The nearest first
 
     @property
@@ -289,7 +289,7 @@ def probabilities(chance: float, gains: Sequence[float]) -> tuple[float, ...]:
     + b3 log10(gain / strongest) + b4 log10(strongest / 100)``, with the ``chance`` of the goodness
     of fit and the gains without each effect over the noise's level. It was fitted to blind
     experiments (``benchmarks/blind/calibration.py``), some without the true effect among the
-    candidates, where the nearest effect or several together take its place.
+    candidates, in which the nearest effect or several together take its place.
     """
     rows = features(chance, gains)
     sums = [sum(b * x for b, x in zip(COEFFICIENTS, row, strict=True)) for row in rows]

@@ -40,7 +40,7 @@ BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
 LEAST: Final = 0.5  # Least side of a panel, inches
 HEADING: Final = 0.32  # Height of the heading of a chart on a sheet, inches
 SMALLEST: Final = (0.88, 0.72)
-"""Least width and height of a readable sheet, as shares of its own."""
+"""Least width and height of a readable sheet, as shares of its default size."""
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 _SMALLEST: Final = 0.9
 """Least font size of a two-line subtitle, over the normal one; below it a third line is used."""

@@ -103,7 +103,7 @@ def _proposals(outlook: Outlook) -> str:
 
 
 def set_aside(found: Discrepancy) -> Iterator[str]:
-    """Yield what was not used, not computed or not accepted, and the detection limits."""
+    """Yield the parts not used, not computed or not accepted, and the detection limits."""
     yield "## What was left out, and what would have shown"
     said = left_out(found.data.experiment, found.data.runs)
     texts = [plain(said.capitalize()) + "."] if said else []

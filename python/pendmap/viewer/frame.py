@@ -54,7 +54,7 @@ def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
 
 @contextlib.contextmanager
 def strict() -> Iterator[None]:
-    """Make the recording library raise where it would only warn and leave something out."""
+    """Make the recording library raise errors instead of warning and dropping data."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
     try:
@@ -69,7 +69,7 @@ def written(
 ) -> Iterator[rr.RecordingStream]:
     """Collect the data logged in the block in memory, with a layout, and write them at the end.
 
-    The library's own file output blocks for ever when the disk is full.
+    The library's own file output blocks indefinitely when the disk is full.
     """
     try:
         with stream:

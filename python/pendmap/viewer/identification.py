@@ -56,8 +56,8 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
 
     In a run longer than 20,000 samples every k-th is drawn, unless fewer than 24 of each swing
     would remain. If the trajectory was not fitted, the best method's model is simulated from the
-    first peak; if no method is applicable, the record is shown alone. The record's pendulum stands
-    still between readings: in a gap, or between peaks alone.
+    first peak; if no method is applicable, the record is shown alone. The record's pendulum does
+    not move between readings: in a gap, or between peaks alone.
 
     Parameters
     ----------

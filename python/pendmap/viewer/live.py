@@ -32,7 +32,7 @@ _PORTS: Final = 65_535
 
 
 class NobodyListensError(ViewerError):
-    """There is no viewer listening at an address."""
+    """No viewer listens at an address."""
 
 
 def check_address(address: str) -> tuple[str, int]:

@@ -44,7 +44,7 @@ class Request:
         Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
         ``quadratic_drag,q=0.01``; or ``none`` alone.
     size : float
-        Multiplies the size of every effect that is drawn; above 0, and 1 where none is.
+        Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
     free, forced : int

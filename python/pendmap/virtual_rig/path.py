@@ -118,6 +118,6 @@ class Path:
         begins = np.array(self._begins)
         step = np.clip(np.searchsorted(begins, time, side="right") - 1, 0, begins.size - 1)
         s = (time - begins[step]) / np.array(self._lengths)[step]
-        # The value at both ends of a step is clipped, so that rounding never extrapolates.
+        # Places are clipped to their step, so that rounding never extrapolates.
         polynomials = basis(np.clip(s, 0.0, 1.0), count)
         return np.asarray(np.einsum("nk,nk->n", polynomials, np.array(coefficients)[step]))

@@ -129,7 +129,7 @@ def _description(experiment: Experiment) -> dict[str, Any]:
 def held_out(experiment: Experiment) -> set[int]:
     """Return the held-out runs: of each kind with 3 or more runs, the last but one.
 
-    Runs before and after it are fitted, so that the hold-out run lies within their range.
+    Runs before and after it, faster and slower ones, are fitted.
     """
     kinds: dict[str, list[int]] = {}
     for k, run in enumerate(experiment.runs):

@@ -4,8 +4,8 @@ The equation of the virtual rig, in SI and per unit of inertia:
 
 ``M th'' = -(c/m) th' - w0**2 (1 + a(t)) sin th + torques - sign(th') F``
 
-with ``M = 1`` plus the effects' inertia and ``F = Tr`` plus their dry
-friction. The pendulum sticks while ``th' = 0`` and the sum of all other terms is at most ``F``.
+with ``M = 1`` plus the effects' inertia and ``F = Tr`` plus their dry friction. The pendulum
+sticks while ``th' = 0`` and the sum of all other terms is at most ``F``.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     least: float | None = None,
     most: float | None = None,
 ) -> Any:  # noqa: ANN401 (of a field)
-    """Describe a shape parameter of an effect, drawn uniformly between ``low`` and ``high``."""
+    """Describe a shape parameter, drawn uniformly in [low, high] and allowed in [least, most]."""
     most = MOST * max(abs(low), abs(high)) if most is None else most
     least = -most if least is None else least
     metadata = {"low": low, "high": high, "unit": unit, "whole": whole}
