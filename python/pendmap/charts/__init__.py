@@ -1,7 +1,6 @@
-"""Charts of results: names, shares, ticks and cells that figures and recordings share.
+"""Charts of results, independent of drawing libraries, for figures and recordings.
 
-``layers``: which layers of a map lead, and their titles; ``legend``: names, colours and shares of
-the attractors; ``plane``: cells, ticks and curves of the phase plane; ``names``: of axes, by units.
-No drawing library is
-imported here.
+One module builds the chart of one kind of result; ``chart`` and ``marks`` hold the data classes,
+``legend`` names, colours and shares of attractors, ``plane`` cells, ticks and curves of the phase
+plane, ``names`` axis names by units.
 """

@@ -1,4 +1,4 @@
-"""Basin maps: the layers that tell something, which of them lead, and the chart of them."""
+"""Basin maps: meaningful layers, their order, and their chart."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 BYTES_OF_CELL = 64
-"""Memory of a cell of a basin map while its figure and its recording are made, bytes."""
+"""Memory of a cell of a basin map during drawing and recording, bytes."""
 
-BYTES_OF_VALUE = 16  # Memory of a value of any other dataset while its picture is made, bytes
+BYTES_OF_VALUE = 16  # Memory of a value of any other dataset during drawing, bytes
 
 VARIABLES = {
     "labels": "label",
@@ -35,12 +35,12 @@ VARIABLES = {
     "probability": "certainty",
     "entropy": "label_entropy",
 }
-"""Layers by the name a user types, and the variable that holds each."""
+"""Layers by the name a user types, and the variable of each."""
 
-SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to those that lead
-FLAT: Final = 0.55  # Height over width of panels under which they stand below one another
+SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to the leading ones
+FLAT: Final = 0.55  # Height over width of panels below which they are stacked
 _SHAPES: Final = {"oscillation": "sPXph8", "inverted_rest": "D"}
-"""Markers by kind; the further ones where the colours begin again."""
+"""Markers by kind; further ones are used when the colours repeat."""
 _COLOUR_MAPS: Final = {
     "settle": "viridis",
     "turns": "RdBu_r",
@@ -51,7 +51,7 @@ _COLOUR_MAPS: Final = {
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
-    """Return the leading layers: two, or three where the labels are unreliable; or one alone."""
+    """Return the leading layers: two, or three if the labels are unreliable; or one alone."""
     shown = (named(dataset, layer),) if layer else _leading(dataset)
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
     units = Units.of(dataset.attrs)
@@ -106,7 +106,7 @@ def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
 def _with_names(
     dataset: xr.Dataset, panel: Panel, listed: list[legend.Entry], shown: tuple[str, ...]
 ) -> Panel:
-    """Return a panel with the legend: a basin's colour, the attractor's marker upon it."""
+    """Return a panel with the legend: each basin's colour with the attractor's marker."""
     none = np.empty(0)
     named: list[Mark] = []
     for entry in listed:
@@ -145,7 +145,7 @@ def _marker(
 def _layer(
     dataset: xr.Dataset, layer: str, cells: int, window: tuple[tuple[float, float], ...]
 ) -> list[Mark]:
-    """Return one layer; cells without a value keep the colour of their label."""
+    """Return one layer; cells without a value have the colour of their label."""
     label = plane.pixels(dataset, dataset["label"], cells)
     colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
     classes = [("", colour) for colour in colours]
@@ -164,9 +164,9 @@ def _layer(
 def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -> Colours:
     """Return the colour scale of a layer.
 
-    Settle time is logarithmic; net turns are symmetric about 0 and leave out the outermost
-    two percent, so that a few long transients do not wash out the rest; so does the exponent.
-    Probabilities reach from 0 to 1, entropies from 0 on.
+    Settle time is logarithmic; net turns are symmetric about 0 and saturate at the outermost two
+    percent, so that a few long transients do not compress the rest, as does the exponent.
+    Probabilities reach from 0 to 1, entropies start at 0.
     """
     name, colours = unit(dataset, layer), _COLOUR_MAPS[layer]
     if values.size == 0 or layer == "probability":
@@ -199,7 +199,7 @@ def _attractors(
     theta: tuple[float, float],
     velocity: tuple[float, float],
 ) -> list[Mark]:
-    """Return the points of all attractors, with their copies 2 pi further."""
+    """Return the points of all attractors, with their copies shifted by 2 pi."""
     marks: list[Mark] = []
     for entry in listed:
         at = plane.copies(dataset, entry.points, *theta)
@@ -212,7 +212,7 @@ def _attractors(
 
 
 def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Panel:
-    """Return the stroboscopic points of chaotic attractors on a plane of their own."""
+    """Return the stroboscopic points of chaotic attractors in a separate plane."""
     dots = [Points(*entry.points.T, size=1.1, colour=entry.colour) for entry in chaos]
     points = np.concatenate([entry.points for entry in chaos])
     pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
@@ -224,35 +224,35 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
 
 
 def reliable(dataset: xr.Dataset) -> bool:
-    """Whether the labels stand up to half the step and to mirroring."""
+    """Return whether the labels agree with those at half the step and under mirroring."""
     return bool(int(dataset.attrs.get("labels_reliable", 1)))
 
 
 def finite_time(dataset: xr.Dataset) -> bool:
-    """Whether labels tell nothing: one chaotic attractor takes every start, or nothing attracts."""
+    """Return whether labels are meaningless: one chaotic attractor has every start, or none."""
     return bool(dataset.attrs.get("layers") == "finite_time")
 
 
 def refuse_too_large(dataset: xr.Dataset) -> None:
-    """Refuse a dataset whose picture would need more memory than is free, with a MemoryError."""
+    """Raise MemoryError for a dataset whose image would need more memory than is free."""
     _core.reckon(
         "values", sum(values.size for values in dataset.variables.values()), BYTES_OF_VALUE
     )
 
 
 def settles(dataset: xr.Dataset) -> bool:
-    """Whether any start settles on an attractor."""
+    """Return whether any start settles on an attractor."""
     return int(dataset["settle_periods"].max()) >= 0
 
 
 def warning(dataset: xr.Dataset) -> str:
-    """Return the line that marks labels as unreliable."""
+    """Return the warning that labels are unreliable."""
     share = 100 * float(dataset.attrs.get("unreliable", math.nan))
     return f"labels unreliable: {share:.3g} % change under half the step or mirroring"
 
 
 def transients(dataset: xr.Dataset) -> str:
-    """Return mean and longest settle time and the basin entropy in one line, as far as known."""
+    """Return mean and longest settle time and the basin entropy in one line, if known."""
     attrs = dataset.attrs
     known = [
         (
@@ -271,7 +271,7 @@ def transients(dataset: xr.Dataset) -> str:
 
 
 def exponents(dataset: xr.Dataset) -> str:
-    """Return the largest exponents of the chaotic attractors in one line; empty where unknown."""
+    """Return the largest exponents of the chaotic attractors in one line; empty if unknown."""
     chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
     values = dataset["exponent"].values[chaotic]
     without = np.full(values.shape, np.nan)
@@ -285,19 +285,19 @@ def exponents(dataset: xr.Dataset) -> str:
 
 
 def layers(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Return the layers of a map that tell something, the leading ones first.
+    """Return the meaningful layers of a map, the leading ones first.
 
-    Usually labels, then settle time and net turns. Where the labels are unreliable, settle time and
-    net turns come before them; where labels tell nothing, there are only the net turns and the
-    finite-time exponent. Settle time is left out where no start settles. Over draws of the
-    parameters the probability of the most likely end comes second.
+    Usually these are labels, then settle time and net turns. If the labels are unreliable, settle
+    time and net turns come first; if labels are meaningless, there are only the net turns and the
+    finite-time exponent. Settle time is left out if no start settles. Over draws of the parameters
+    the probability of the most likely end comes second.
     """
     if finite_time(dataset):
         order: tuple[str, ...] = ("turns", "exponent")
     elif reliable(dataset):
         order = ("labels", "probability", "settle", "turns", "exponent", "entropy")
     else:
-        # Three of them lead, and the labels are one.
+        # Three layers lead, and the labels are one of them.
         middle = ("labels", "turns") if "certainty" in dataset else ("turns", "labels")
         order = ("settle", "probability", *middle, "exponent", "entropy")
     present = [layer for layer in order if VARIABLES[layer] in dataset]
@@ -307,7 +307,7 @@ def layers(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def named(dataset: xr.Dataset, layer: str) -> str:
-    """Return the layer of this name or variable; refuse one that the map lacks."""
+    """Return the layer of a name or variable; raise InputError if the map has none."""
     for name, variable in VARIABLES.items():
         if layer in (name, variable) and variable in dataset:
             return name
@@ -316,7 +316,7 @@ def named(dataset: xr.Dataset, layer: str) -> str:
 
 
 def what(dataset: xr.Dataset, layer: str) -> str:
-    """Return what a layer shows, in words, for a title."""
+    """Return the quantity of a layer in words, for a title."""
     periods = counted(int(dataset.attrs.get("layer_periods", 0)), "period")
     draws = counted(int(dataset.attrs.get("draws", 0)), "draw")
     turns = "until settled"
@@ -335,7 +335,7 @@ def what(dataset: xr.Dataset, layer: str) -> str:
 
 
 def unit(dataset: xr.Dataset, layer: str) -> str:
-    """Return what a scalar layer counts, for a colour bar; without drive also what a period is."""
+    """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
     driven = float(dataset.attrs.get("p", 1.0)) != 0.0
     units = Units.of(dataset.attrs)
     own = units.own_period.replace(" pi", "\N{GREEK SMALL LETTER PI}").replace(" ", "")

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-MOST: Final = 16  # Families that a legend names; the rest are drawn in the grey of what has no name
+MOST: Final = 16  # Greatest number of families that a legend names; all others are grey
 _LAYERS: Final = ("theta", "velocity")
-_SIZE: Final = (7.4, 6.8)  # Inches of the figure
-_HEIGHTS: Final = (2.4, 0.42, 1.6)  # Heights of points, sweeps and exponents beside one another
+_SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
+_HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
 _SWEEPS: Final = (("up", 0.025), ("down", 0.055))
-"""Sweeps, and how far above the angles a recording has them, over the range of these."""
+"""Sweeps, and their height above the angles in a recording, over the range of the angles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """All attractors of a kind, period and winding.
+    """All attractors of one kind, period and winding number.
 
     ``points``, shape (m, 3), are value, angle and velocity; ``exponents``, shape (k, 2), value and
     largest exponent; ``up`` and ``down`` mark the values at which the sweeps are on one of them.
@@ -44,7 +44,7 @@ class Family:
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return angles and velocities of the points, the sweeps, the exponents."""
+    """Return angles and velocities of the points, the sweeps, and the exponents."""
     del cells
     shown = layer or _LAYERS[0]
     if shown not in _LAYERS:
@@ -99,10 +99,10 @@ def _dots(one: Family, at: npt.NDArray[np.float64], size: float, path: str) -> P
 
 
 def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
-    """Return the stroboscopic points: those of orbits larger than those of chaos."""
+    """Return the stroboscopic points; points of orbits are larger than those of chaos."""
     column = 1 + _LAYERS.index(which)
     values = dataset[str(dataset.attrs["varied"])].values
-    # Where values are far apart a point must be seen.
+    # With few values a single point must be visible.
     size = min(3.0, max(0.9, 200.0 / values.size))
     loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
     grey: dict[str, Any] = {"colour": palette.UNNAMED}
@@ -121,7 +121,7 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
 
 
 def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float]) -> list[Mark]:
-    """Return a strip for each sweep: on which attractor it is; and the names of all."""
+    """Return a strip for each sweep, coloured by its attractor, with the names of all families."""
     strip = np.zeros((2, dataset.sizes[str(dataset.attrs["varied"])]), dtype=np.int64)
     classes = [("", "#ffffff")]
     more = len(every) - MOST
@@ -136,9 +136,9 @@ def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float])
 
 
 def families(dataset: xr.Dataset) -> list[Family]:
-    """Return the families, those that occur at most values first.
+    """Return the families, ordered by the number of values at which they occur.
 
-    Chaos is among the :data:`MOST` that are named, however rare.
+    Chaos is always among the :data:`MOST` named ones, however rare.
     """
     kind, n, w, value = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "value"))
     keys = np.stack([kind, n, w], axis=1)
@@ -172,7 +172,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
 
 
 def _name(kind: str, n: int, w: int) -> str:
-    """Return an attractor's name from that of its kind."""
+    """Return an attractor's name from its kind, period and winding number."""
     family = kind.rpartition(" ")[0]
     if kind.startswith("oscillation"):
         return f"oscillation {n}:0"

@@ -1,7 +1,7 @@
-"""Charts: what a picture shows, as arrays and plain values; every renderer draws any chart.
+"""Charts: contents of a figure as arrays and plain values; every renderer draws any chart.
 
-A chart has panels, a panel two axes and marks (:mod:`pendmap.charts.marks`), a sheet several
-charts. No drawing library is imported here.
+A chart consists of panels, a panel of two axes and marks (:mod:`pendmap.charts.marks`), a sheet
+of several charts. No drawing library is imported here.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class Axis:
     """One side of a panel.
 
-    ``name`` is symbol and unit, a blank between them. Without ``ends`` a side holds the marks.
-    ``scale`` ``angle`` has multiples of pi as labels, ``signed`` is logarithmic beyond
+    ``name`` is symbol and unit, separated by a blank. Without ``ends`` the axis contains the marks.
+    With the ``scale`` ``angle`` labels are multiples of pi; ``signed`` is logarithmic beyond
     ``straight`` on both sides of 0. Labels are values times ``factor``, or else ``ticks``.
     """
 
@@ -41,11 +41,11 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Two axes and what stands between them.
+    """Two axes with the marks between them.
 
-    ``name`` is what a user types for it; ``root`` is where a recording has it, by default the name.
-    ``share`` is its size beside the others of its row; a ``note``, pairs of text and colour, stands
-    beneath one that is smaller. ``bare`` panels have no frame.
+    ``name`` is the name a user types; ``root`` is the path in a recording, by default the name.
+    ``share`` is the size relative to the others of its row; a ``note``, pairs of text and colour,
+    is written below a smaller one. ``bare`` panels have no frame.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Panel:
 
     @property
     def where(self) -> str:
-        """Return where a recording has it."""
+        """Return the path of the panel in a recording."""
         return self.root or self.name
 
 
@@ -69,10 +69,10 @@ class Panel:
 class Chart:
     """Panels with a title.
 
-    ``rows`` are the names of the panels that a figure shows, from the top, by default all in one;
-    ``heights`` are the shares of the rows, ``ratio`` the height of a panel over its width, and
-    ``size`` the inches of the figure where it has a size. Rows of fewer panels than ``columns``
-    are not filled. A recording shows all panels: one at a time as ``tabs``, or below one another;
+    ``rows`` are the names of the panels in a figure, from the top, by default all in one row;
+    ``heights`` are the relative heights of the rows, ``ratio`` the height of a panel over its
+    width, and ``size`` the size of the figure in inches, if fixed. Rows of fewer panels than
+    ``columns`` are not filled. A recording shows all panels, as ``tabs`` or below one another;
     ``remark`` ends its legend.
     """
 
@@ -98,23 +98,23 @@ class Chart:
         rows: Sequence[Sequence[Panel]],
         **look: Any,  # noqa: ANN401 (fields of a chart)
     ) -> Chart:
-        """Return a chart of which a figure shows these rows of panels."""
+        """Return a chart whose figure shows these rows of panels."""
         names = [[panel.name for panel in row] for row in rows]
         return cls(title, subtitle, [panel for row in rows for panel in row], rows=names, **look)
 
     def panel(self, name: str) -> Panel:
-        """Return the panel of a name."""
+        """Return the panel with a name."""
         return next(panel for panel in self.panels if panel.name == name)
 
     @property
     def shown(self) -> list[list[Panel]]:
-        """Return the rows of a figure."""
+        """Return the rows of panels of a figure."""
         if not self.rows:
             return [list(self.panels)]
         return [[self.panel(name) for name in row] for row in self.rows]
 
     def only(self, layer: str | None, size: Ends | None = None) -> Chart:
-        """Return the chart with one of its panels alone, all of it without a name."""
+        """Return the chart with one of its panels alone; unchanged without a name."""
         if layer is None:
             return self
         known = [panel.name for row in self.shown for panel in row]
@@ -127,9 +127,9 @@ class Chart:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Charts in columns under one title: the title of each is a heading, its size in inches.
+    """Charts in columns under one title; the title of each chart is its heading.
 
-    One ``legend`` at the top names the marks of all charts; else each chart has its own.
+    One ``legend`` at the top names the marks of all charts; otherwise each chart has its own.
     """
 
     title: str
@@ -145,7 +145,7 @@ def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
 
 
 def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:
-    """Return the ends of an axis that holds the values that are numbers, with a margin."""
+    """Return the limits of an axis that contains all finite values, with a margin."""
     every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
     known = every[np.isfinite(every)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

@@ -1,4 +1,4 @@
-"""A comparison: a model over records that it was not fitted to, free decays and forced runs."""
+"""Charts of a comparison: a model with records that it was not fitted to, free and forced."""
 
 from __future__ import annotations
 
@@ -30,38 +30,38 @@ if TYPE_CHECKING:
     Pair = tuple[str, str]
     Compared = RunComparison | ForcedComparison
 
-ALL: Final = 3  # Runs up to which each has a row
+ALL: Final = 3  # Number of runs up to which each has a row
 CHOSEN: Final = 2
-"""Rows where there are more: those held out first, then those that the model misses most."""
+"""Number of rows for more runs: those held out first, then those with the largest residual."""
 WIDTH: Final = 11.6
 ROW: Final = 2.35
 ALONE: Final = 3.4
 OVERVIEW: Final = 1.95
-"""Inches: of the sheet, of a run's row, of the only one, of the panel of all runs. The whole is no
-higher than a screen is beside its width."""
+"""Inches: width of the sheet; heights of a run's row, of a single one, of the panel of all runs.
+The sheet fits the proportions of a screen."""
 SPREAD: Final = 10.0
-"""Ratio of the greatest to the least residual from which they are drawn logarithmically."""
+"""Ratio of the greatest to the least residual above which their axis is logarithmic."""
 HELD: Final = "#d55e00"
-NAMED: Final = 40  # Runs that are named below a panel at most
-DOTS: Final = 6_000  # Readings of a decay that are drawn
-SAMPLES: Final = 20_000  # Samples of a curve that are drawn
-WELLS: Final = 14  # Wells up to which each has a band
+NAMED: Final = 40  # Greatest number of runs named below a panel
+DOTS: Final = 6_000  # Greatest number of readings of a decay drawn
+SAMPLES: Final = 20_000  # Greatest number of samples of a curve drawn
+WELLS: Final = 14  # Number of wells up to which each has a band
 WELL, ENSEMBLE = "#f0f0f0", "#9ecae1"
 """Colours of every other well, and of an ensemble."""
-EVERY: Final = 3  # Samples of a measured cycle of which one is drawn
+EVERY: Final = 3  # Step between the drawn samples of a measured cycle
 BINS: Final = 24  # Bins of a histogram of an ensemble
-TALL: Final = 0.36  # Height of a histogram, over its row's
+TALL: Final = 0.36  # Height of a histogram over that of its row
 PAIR: Final = ("record", "model")
 OF_PAPER: Final = ("virtual rig", "identified model")
-"""Names of what was measured and of the model: of a comparison, and in the paper's figures."""
+"""Names of record and model in a comparison, and in the paper's figures."""
 _SI: Final = Units(si=True)
 
 
 def sheet(comparison: Comparison) -> Sheet:
-    """Return a row a run, with record and model, the residual, figure 7; or the forced run's.
+    """Return one row per run: record and model, residual, figure 7, or the panels of a forced run.
 
-    Where there are more than :data:`ALL` runs, all of them stand in one panel, and
-    :data:`CHOSEN` have rows.
+    More than :data:`ALL` runs are summarised in one panel, and only :data:`CHOSEN` of them have
+    rows.
     """
     every = comparison.every
     many = len(every) > ALL
@@ -77,12 +77,12 @@ def sheet(comparison: Comparison) -> Sheet:
 
 
 def _ratio(one: Compared) -> float:
-    """Return the rms of what a model misses, over the record's noise."""
+    """Return the root mean square residual of a model over the record's noise."""
     return one.rms / one.sigma if one.sigma > 0 else math.inf
 
 
 def _overview(runs: Sequence[Compared]) -> Chart:
-    """Return how far the model is from each run, in units of its noise."""
+    """Return the residual of the model in each run, in units of its noise."""
     ratios = np.array([min(_ratio(one), 1e12) for one in runs])
     held = np.array([one.run.hold_out for one in runs])
     places = np.arange(len(runs), dtype=float)
@@ -113,12 +113,12 @@ def _row(one: Compared, high: float) -> Chart:
 
 
 def _small(angle: float) -> str:
-    """Return an angle in rad or mrad."""
+    """Return an angle as text, in rad or mrad."""
     return f"{angle:.3g} rad" if angle >= 1 else f"{1e3 * angle:.3g} mrad"
 
 
 def _free(one: RunComparison) -> list[Panel]:
-    """Return record and model, what is between them, and errors of periods and peaks."""
+    """Return record and model, the residual, and errors of periods and peaks."""
     left = residuals(one.run, one.residual, one.sigma, MODEL, "record less model")
     panels = [_over_record(one), left]
     if one.errors is None:
@@ -135,7 +135,7 @@ def _over_record(one: RunComparison) -> Panel:
     factor = 1.0 if sensor is None else sensor.gain
     readings = run.theta if sensor is None else factor * as_angles(run)
     shown = np.where(run.trusted, readings, np.nan)
-    # The reading of the model: what the sensor makes of its angle stands in the residual alone.
+    # The model's reading; the sensor's own errors appear in the residual alone.
     angle = readings - factor * one.residual
     if sensor is None and run.rod_sensor is not None:
         angle = one.curve[0]  # a gyroscope reads no angle
@@ -153,7 +153,7 @@ def _over_record(one: RunComparison) -> Panel:
 
 
 def _forced(one: ForcedComparison) -> list[Panel]:
-    """Return a forced run: the record, its phase plane, the model's, the statistics."""
+    """Return the panels of a forced run: record, phase planes, statistics."""
     panels = [history(one), phase(one)]
     if one.steady is None or one.steady.measured.at_rest:
         panels.append(phase(one, model=True, title="a member of the ensemble"))
@@ -181,7 +181,7 @@ def history(
 
 
 def phase(one: ForcedComparison, *, model: bool = False, title: str = "record") -> Panel:
-    """Return the path of the record or of a member in the phase plane, to one scale."""
+    """Return the path of the record or of a member in the phase plane, with a common scale."""
     path, colour = (one.measured, one.velocity), MEASURED
     if model:
         path, colour = one.example, look(MODEL).colour
@@ -192,7 +192,7 @@ def phase(one: ForcedComparison, *, model: bool = False, title: str = "record") 
 
 
 def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
-    """Return the steady state of a record as points, and the model's as a line."""
+    """Return the steady state of a record as points, and that of the model as a line."""
     found, model = one.steady, look(MODEL)
     marks: list[Mark] = []
     reach, speeds = math.pi, np.zeros(1)
@@ -220,9 +220,9 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
 
 
 def statistics(one: ForcedComparison) -> Panel:
-    """Return each statistic in a row: the ensemble's histogram, and the record's value as a mark.
+    """Return one row per statistic: the ensemble's histogram, and the record's value as a line.
 
-    What has not come by the record's end stands hatched at the right.
+    Events that do not occur before the record's end are hatched at the right.
     """
     marks: list[Mark] = []
     for k, each in enumerate(one.statistics):
@@ -267,7 +267,7 @@ def _column(left: float, right: float, base: float, high: float) -> Floats:
     return np.array([(left, base), (right, base), (right, base - high), (left, base - high)])
 
 
-# The paper's figures 8 and 9.
+# Figures 8 and 9 of the paper.
 
 
 def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart:
@@ -294,9 +294,9 @@ def _drive(one: ForcedComparison) -> str:
 
 
 def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:
-    """Return histories above, phase planes and statistics below, of each run.
+    """Return histories above, and phase planes and statistics below, for each run.
 
-    A record and a member of the ensemble stand beside one another, never over one another.
+    A record and a member of the ensemble are drawn side by side, never superposed.
     """
     charts = []
     for one in runs:

@@ -1,7 +1,7 @@
-"""The decrement of each three peaks against their size (figure 5), with the zero error and without.
+"""Decrement of each triplet of peaks against amplitude (figure 5), with and without the zero error.
 
-A zero error ``b`` of the angle makes the drops between peaks alternate by ``2 b``, and with them
-the decrements of triplets that begin at odd and at even peaks.
+A zero error ``b`` of the angle makes the differences of successive peaks alternate by ``2 b``, and
+so the decrements of triplets that begin at odd and at even peaks.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"
 TITLE: Final = f"The decrement {DELTA} of each three peaks"
 SIZE: Final = "middle peak |\N{GREEK SMALL LETTER THETA}| (rad)"
 REACH: Final = 3.0
-"""Reach of a signed panel of few triplets, over the distance of nine tenths of them from 0."""
+"""Range of a signed panel with few triplets, over the 90th percentile of their absolute values."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Triplets:
-    """Decrements of three peaks in a row (eq. 2.7), by the size of the middle peak in rad.
+    """Decrements of three successive peaks (eq. 2.7), with the size of the middle peak in rad.
 
-    ``delta`` is NaN where a peak is not smaller than the one before; its standard error is from
-    those of the peaks; ``odd`` says whether the first of the three has an odd number.
+    ``delta`` is NaN if a peak is not smaller than the previous one; its standard error follows from
+    those of the peaks; ``odd`` is true if the first of the three has an odd number.
     """
 
     size: Floats
@@ -47,10 +47,10 @@ class Triplets:
 
 
 def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
-    """Return the triplets of neighbouring peaks, with a zero error (rad) taken off the angles.
+    """Return the triplets of neighbouring peaks, with a zero error (rad) subtracted from angles.
 
     ``stderr(delta)**2 = [(s_0 / p)**2 + (s_1 (1/p + 1/q))**2 + (s_2 / q)**2] / pi**2`` with the
-    drops ``p`` and ``q`` and the standard errors ``s_k`` of the peaks.
+    differences ``p`` and ``q`` of the peaks and their standard errors ``s_k``.
     """
     turned = peaks.turned
     size = np.abs(turned.amplitude - zero)
@@ -67,7 +67,7 @@ def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
 
 
 def _stderr(size: Floats, error: Floats) -> Floats:
-    """Standard errors of the triplets of absolute peaks with these standard errors."""
+    """Return the standard errors of triplets from those of the absolute peaks."""
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = 1 / (size[:-2] - size[1:-1]), 1 / (size[1:-1] - size[2:])
         parts = (error[:-2] * first, error[1:-1] * (first + second), error[2:] * second)
@@ -75,7 +75,7 @@ def _stderr(size: Floats, error: Floats) -> Floats:
 
 
 def part(report: IdentificationReport) -> Chart:
-    """Return absolute and signed decrements, as recorded and with the zero error removed."""
+    """Return absolute and signed decrements, as recorded and without the zero error."""
     raw, zero, source = triplets_of(report.peaks), _zero(report), _source(report)
     if not raw.size.size:
         return nothing(TITLE, "Fewer than three peaks in a row.")
@@ -108,15 +108,15 @@ def part(report: IdentificationReport) -> Chart:
 
 
 def _zero(report: IdentificationReport) -> Estimate | None:
-    """Return the zero error by the first method that knows it."""
+    """Return the zero error from the first method that estimates it."""
     able = (found for found in report.methods.values() if found.applicable)
     return next((found.estimates["offset"] for found in able if "offset" in found.estimates), None)
 
 
 def _source(report: IdentificationReport) -> Identification | None:
-    """Return the first method that knows frequency, damping and zero, or else the first two.
+    """Return the first method that estimates frequency, damping and zero, else the first two.
 
-    Peaks of an angle that is only roughly made judge none.
+    None is returned if the angle is only approximate.
     """
     if report.table.left_out:
         return None
@@ -129,7 +129,7 @@ def _source(report: IdentificationReport) -> Identification | None:
 
 
 def _delta(found: Identification) -> float:
-    """``zeta / sqrt(1 - zeta^2)`` of what was found."""
+    """Return ``zeta / sqrt(1 - zeta^2)`` of an identification."""
     zeta = found["c_over_m"] / (2 * found["w0"])
     return zeta / math.sqrt(max(1 - zeta**2, 1e-12))
 
@@ -145,7 +145,7 @@ def _absolute(known: Floats, level: float) -> Axis:
 
 
 def _signed(known: Floats, level: float) -> Axis:
-    """Return an axis as far as most of the triplets reach; those beyond stand at its ends."""
+    """Return an axis that contains most of the triplets; those beyond are drawn at its ends."""
     far = float(np.percentile(np.abs(known), 90)) if known.size else 1.0
     far = max(REACH * far if known.size < 10 else 1.35 * far, 4 * level, 1e-6)  # noqa: PLR2004
     return Axis(DELTA, (-far, far))
@@ -173,7 +173,7 @@ def _points(some: Triplets, up: Axis, *, absolute: bool) -> list[Mark]:
 def _model(
     peaks: Peaks, source: Identification, shift: float, place: tuple[float, Axis], *, absolute: bool
 ) -> list[Mark]:
-    """Return the triplets of the simulated peaks with their zero error, and the noise."""
+    """Return the triplets of simulated peaks with a zero error, and the band of the noise."""
     level, none = _delta(source), np.empty(0)
     dashed = f"its {DELTA} = {level:.3g}"
     marks: list[Mark] = [

@@ -1,4 +1,4 @@
-"""A diagnosis: residuals, forecasts, the torque that a model lacks, candidates, effects by run."""
+"""Charts of a diagnosis: residuals, forecasts, missing torque, candidates, effects by run."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ OVER_SAID: Final = {
 """Axes of the residual torque, with units."""
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
-"""Candidates that are not told apart from what was found, and all others."""
-RUNS: Final = 3  # Runs whose residuals are drawn: those that the baseline misses most
+"""Colours of candidates that are indistinguishable from an effect found, and of all others."""
+RUNS: Final = 3  # Number of runs whose residuals are drawn: those with the worst baseline fit
 PART: Final = 0.1
-"""Part of a small swing over which residuals are averaged: what a model lacks is slower."""
+"""Part of a small swing over which residuals are averaged; model errors are slower."""
 WIDE: Final = 8.0
-"""Ratio of the greatest residual to the least from which on they are drawn logarithmically."""
-CYCLES: Final = 3  # Free runs in figure 7: those held out first, then the longest
-RANKED: Final = 8  # Candidates in the ranking
+"""Ratio of the greatest residual to the least above which their axis is logarithmic."""
+CYCLES: Final = 3  # Number of free runs in figure 7: those held out first, then the longest
+RANKED: Final = 8  # Number of candidates in the ranking
 SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
 
 
@@ -59,7 +59,7 @@ def sheet(found: Discrepancy) -> Chart:
         gap.append(forecast(found, max(found.forecasts, key=lambda one: one.starts)))
     rows += [gap, [torque(found, "angle"), torque(found, "velocity")]]
     shown = shown_coefficients(found)[:1]
-    # One run has nothing to be compared with.
+    # A single run cannot be compared with others.
     last = coefficients(found, shown[0]) if shown else torque(found, "amplitude")
     rows.append([ranking(found), last])
     heights += [1.2, 1.2, 1.5]
@@ -68,7 +68,7 @@ def sheet(found: Discrepancy) -> Chart:
 
 
 def parts(found: Discrepancy) -> dict[str, Chart]:
-    """Return the charts of a report by the names that it has for them, those that show anything."""
+    """Return the non-empty charts of a report by the names that it uses."""
     made: dict[str, Chart] = {}
 
     def add(name: str, title: str, said: str, rows: list[list[Panel]], high: float) -> None:
@@ -97,7 +97,7 @@ def parts(found: Discrepancy) -> dict[str, Chart]:
 
 
 def cycles(found: Discrepancy) -> Sheet | None:
-    """Return errors of simulated periods and peaks, of both models, for each free run."""
+    """Return the errors of simulated periods and peaks of both models, for each free run."""
     runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
     charts = []
     for one in runs:
@@ -111,7 +111,7 @@ def cycles(found: Discrepancy) -> Sheet | None:
 
 
 def _title(found: Discrepancy) -> str:
-    """Return the verdict with its names; of classes that are not told apart with all of them."""
+    """Return the verdict with its names; for indistinguishable effects with all of them."""
     alike = {names[0]: names for names in found.equivalent}
     names = [effect.name for effect in found.effects]
     if found.verdict == "ambiguous":
@@ -121,12 +121,12 @@ def _title(found: Discrepancy) -> str:
 
 
 def models(found: Discrepancy) -> list[tuple[str, str]]:
-    """Return the names of the models and their colours; the baseline alone where it stays."""
+    """Return names and colours of the models; the baseline alone if no effect was added."""
     return [("before", BEFORE), ("after", AFTER)] if found.adds else [("baseline", BEFORE)]
 
 
 def residuals(found: Discrepancy) -> list[Panel]:
-    """Return record less model of the runs that the baseline misses most, before and after."""
+    """Return the residuals of the runs with the worst baseline fit, before and after."""
     runs = found.data.fitted
     rows = [row for row in found.gap.by_run if not row.held_out]
     order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
@@ -160,7 +160,7 @@ def residuals(found: Discrepancy) -> list[Panel]:
 
 
 def _smoothed(residual: Floats, every: int) -> Floats:
-    """Return means over ``every`` samples; a bin without samples is not drawn."""
+    """Return means over ``every`` samples; NaN for a bin without samples."""
     whole = -(-residual.size // every) * every
     padded = np.full(whole, math.nan)
     padded[: residual.size] = residual
@@ -172,7 +172,7 @@ def _smoothed(residual: Floats, every: int) -> Floats:
 
 
 def _rms(*values: npt.ArrayLike) -> Axis:
-    """Return the axis of residuals in mrad, logarithmic where they differ much."""
+    """Return the axis of residuals in mrad, logarithmic if they differ much."""
     every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())
@@ -187,7 +187,7 @@ def _runs(names: Sequence[str]) -> Axis:
 
 
 def by_run(found: Discrepancy) -> Panel:
-    """Return the residual of each run before and after over its noise, those held out last."""
+    """Return the residual of each run before and after with its noise, held-out runs last."""
     rows = found.gap.by_run
     at = np.arange(len(rows), dtype=float)
     back = [k for k, row in enumerate(rows) if row.held_out]
@@ -217,7 +217,7 @@ def by_run(found: Discrepancy) -> Panel:
 
 
 def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel:
-    """Return the error of forecasts against their horizon, and the noise."""
+    """Return the forecast error against the horizon, with the noise."""
     floor = 1e3 * one.noise_floor
     marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
     shown: list[npt.ArrayLike] = [floor]
@@ -234,7 +234,7 @@ def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel
 
 
 def _torque_rows(found: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
-    """Return the bins of both models, none where there is nothing to bin by."""
+    """Return the torque bins of both models; empty if there are none."""
     torques = (found.torque_before, found.torque_after)
     both = zip(models(found), torques, strict=False)
     rows = [torque.rows.get(over, []) for _, torque in both]
@@ -242,7 +242,7 @@ def _torque_rows(found: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
 
 
 def torque(found: Discrepancy, over: str) -> Panel:
-    """Return the torque that both models lack over one of these, with bands of 95 %."""
+    """Return the missing torque of both models over one quantity, with 95 % bands."""
     marks: list[Mark] = [Level(0.0, colour=QUIET, path="zero")]
     every: list[dict[str, Any]] = []
     shown = [np.zeros(1)]
@@ -276,7 +276,7 @@ def recorded(found: Discrepancy) -> list[Panel]:
 
 
 def ranking(found: Discrepancy) -> Panel:
-    """Return the greatest scores at the baseline, those of the effects found in colour."""
+    """Return the greatest scores at the baseline, with the effects found in colour."""
     best = [found.scores.scores[k] for k in found.scores.best()[:RANKED]]
     level = found.base.fitted.noise.level
     values = [max(score.gain / level, 0.1) for score in best]
@@ -298,10 +298,10 @@ def ranking(found: Discrepancy) -> Panel:
 
 
 def shown_coefficients(found: Discrepancy) -> list[str]:
-    """Return the parameters that are drawn run by run: the sizes of what was found.
+    """Return the parameters that are drawn run by run: the sizes of the effects found.
 
-    Where nothing was found, the parameter that differs most between runs, by its errors. One run
-    has nothing to be compared with.
+    If no effect was found, it is the parameter that differs most between runs, over its errors. A
+    single run cannot be compared with others.
     """
     if len(found.data.fitted) == 1:
         return []
@@ -316,16 +316,16 @@ def shown_coefficients(found: Discrepancy) -> list[str]:
 
 
 def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the interval of 95 % that all runs together leave a parameter, as it is stated.
+    """Return the 95 % interval of a parameter from all runs together.
 
-    That of the effect found; of what is not claimed, by the standard error as the report widens it.
+    It is that of the effect found; without a claimed effect it follows from the standard error.
     """
     trial = found.nearest.fitted
     estimate = trial.fit.estimates[shown]
     for standing, effect in zip(found.assessment.identified, found.effects, strict=False):
         bounds = effect.ci95.get(standing.candidate.size)
         if standing.candidate.free[0] == shown and bounds is not None:
-            # A size below 0 may be stated as one above it, half a turn on.
+            # A negative size may be stated as a positive one, with the phase shifted by pi.
             turned = estimate.value * effect.parameters[standing.candidate.size] < 0
             return (-bounds[1], -bounds[0]) if turned else bounds
     half = Z95 * math.sqrt(trial.widening) * (estimate.stderr or 0.0)
@@ -333,7 +333,7 @@ def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
 
 
 def _reach(found: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the ends of the axis: a run that hardly shows the effect would hide the others."""
+    """Return the limits of the axis; a run that hardly determines the effect is cut off."""
     mean = found.nearest.fitted.fit.estimates[shown].value
     known = [(v, e) for v, e in found.runs.coefficients[shown] if math.isfinite(e)]
     errors = sorted(e for _, e in known)
@@ -345,7 +345,7 @@ def _reach(found: Discrepancy, shown: str) -> tuple[float, float]:
 
 
 def coefficients(found: Discrepancy, shown: str) -> Panel:
-    """Return a parameter as each run would have it, over what all together have."""
+    """Return the value of a parameter from each run, and from all runs together."""
     pairs = found.runs.coefficients[shown]
     mean = found.nearest.fitted.fit.estimates[shown].value
     power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0

@@ -1,4 +1,4 @@
-"""The record of a decay with its half cycles: angle, velocity and its sign (figure 4)."""
+"""Chart of a decay record with its half cycles: angle, velocity and its sign (figure 4)."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.records import Run
 
-NEAR: Final = 6  # Half cycles of a near view
-POINTS: Final = 500  # Places of a near view at which the velocity is computed
-SPAN: Final = 0.2  # Half width of the stretch a cubic is fitted to, over the length of a half cycle
+NEAR: Final = 6  # Number of half cycles of a close view
+POINTS: Final = 500  # Number of points of a close view at which the velocity is computed
+SPAN: Final = 0.2  # Half width of the stretch of a cubic fit, over the length of a half cycle
 
 
 @dataclasses.dataclass(frozen=True)
 class Course:
-    """A record as its peaks count it: the turns that it rests away from its start taken off.
+    """A record relative to the turn in which it comes to rest.
 
-    Samples for fitting (s, rad), the number of the half cycle of each, -1 outside; all others.
+    Samples for fitting (s, rad), the half cycle of each, -1 if in none; all other samples.
     """
 
     time: Floats
@@ -60,7 +60,7 @@ def course_of(run: Run, peaks: Peaks) -> Course:
 
 
 def first_and_last(peaks: Peaks, count: int = NEAR) -> list[tuple[float, float]]:
-    """Return the spans of the first and the last half cycles; one span where these are all."""
+    """Return the spans of the first and the last half cycles; one span if these are all."""
     time = peaks.time
     if time.size <= 2 * count + 1:
         return [(float(time[0]), float(time[-1]))]
@@ -68,7 +68,7 @@ def first_and_last(peaks: Peaks, count: int = NEAR) -> list[tuple[float, float]]
 
 
 def part(report: IdentificationReport) -> Chart:
-    """Return the whole record, and angle, velocity and its sign of the first and the last peaks."""
+    """Return the whole record, and angle, velocity and its sign at the first and the last peaks."""
     run, peaks = report.run, report.peaks
     course = course_of(run, peaks)
     few = len(peaks) < 3  # noqa: PLR2004 (a half cycle on either side)
@@ -88,7 +88,7 @@ def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:
 
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
-    """Return the whole record, as a line that is ``thin``, or as its peaks alone."""
+    """Return the whole record, as a line if ``thin``, else as its peaks alone."""
     none = np.empty(0)
     cross: dict[str, Any] = {"marker": "|", "edge_width": 1.2, "name": "crossings of zero"}
     circle: dict[str, Any] = {"fill": "white", "edge_width": 0.9, "name": "peaks"}
@@ -113,7 +113,7 @@ def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
 def _near(
     report: IdentificationReport, course: Course, title: str, span: tuple[float, float]
 ) -> list[Panel]:
-    """Return angle, velocity and its sign over a span, from the top."""
+    """Return angle, velocity and its sign over a span, from top to bottom."""
     run, peaks = report.run, report.peaks
     ends = holding(span, margin=0.02)
     clock, bare = Axis(names.TIME, ends), Axis("", ends, ticks=())
@@ -128,14 +128,14 @@ def _near(
 
 
 def _coloured(time: Floats, values: Floats, half: NDArray[np.int64], width: float) -> list[Mark]:
-    """Return a curve, each half cycle in the colour of its parity, the rest grey."""
+    """Return a curve with each half cycle in the colour of its parity, the rest in grey."""
     marks: list[Mark] = []
     for which, colour in (
         (half < 0, UNUSED),
         ((half >= 0) & (half % 2 == 0), EVEN),
         ((half >= 0) & (half % 2 == 1), ODD),
     ):
-        # One sample more at the end, so that the pieces meet.
+        # One more sample at the end joins the pieces.
         shown = which | np.concatenate([[False], which[:-1]])
         marks.append(Line(time, np.where(shown, values, np.nan), colour=colour, width=width))
     return marks
@@ -158,7 +158,7 @@ def _peaks(peaks: Peaks, size: float, *, by_parity: bool = False) -> list[Mark]:
 def _angle(
     course: Course, peaks: Peaks, ends: tuple[float, float], *, only: bool
 ) -> tuple[list[Mark], Floats]:
-    """Return the angle with its peaks, their 95 % intervals and the crossings; and all angles."""
+    """Return the angle with its peaks, their 95 % intervals and zero crossings, and all angles."""
     near = (course.time >= ends[0]) & (course.time <= ends[1])
     some = peaks.select((peaks.time >= ends[0]) & (peaks.time <= ends[1]))
     known = some.select(np.isfinite(some.stderr_amplitude))
@@ -180,7 +180,7 @@ def _angle(
 def _velocity(
     run: Run, course: Course, peaks: Peaks, ends: tuple[float, float]
 ) -> tuple[list[Mark], Floats]:
-    """Return the velocity that was measured, or else the slopes of cubics through the samples."""
+    """Return the measured velocity, or else the slopes of cubics fitted to the samples."""
     near = (course.time >= ends[0]) & (course.time <= ends[1])
     time, half = course.time[near], course.half[near]
     if run.velocity is not None:
@@ -195,7 +195,7 @@ def _velocity(
 
 
 def _slopes(course: Course, at: Floats, reach: float) -> Floats:
-    """Return the slope in the middle of a cubic through the samples within a reach, rad/s."""
+    """Return the slope at the centre of a cubic fitted to samples within ``reach``, rad/s."""
     result = np.full(at.size, math.nan)
     low = np.searchsorted(course.time, at - reach)
     high = np.searchsorted(course.time, at + reach, side="right")
@@ -208,7 +208,7 @@ def _slopes(course: Course, at: Floats, reach: float) -> Floats:
 
 
 def _sign(peaks: Peaks) -> list[Mark]:
-    """Return the sign of the velocity: that of the way from each peak to the next."""
+    """Return the sign of the velocity, that of the change from each peak to the next."""
     marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
     for parity, colour in ((0, EVEN), (1, ODD)):
         whole = np.flatnonzero((np.diff(peaks.index) == 1) & (peaks.index[:-1] % 2 == parity))

@@ -1,4 +1,4 @@
-"""An identification: figures 4 to 7 of the paper and its table 1, for one record."""
+"""Charts of an identification: figures 4 to 7 of the paper and its table 1, for one record."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.records import Run
 
-WIDTH: Final = 8.6  # Inches across a column
-NEAR: Final = 5  # Half cycles of the near views
-SAMPLES: Final = 64  # Samples of a simulation in a swing
-MOST: Final = 6_000  # Residuals that are drawn
-DOTS: Final = 150  # Readings of a near view that are drawn
-LINE: Final = 0.2  # Inches of a row of the table
-LETTERS: Final = 110  # Letters of a line below the table
-RESTS: Final = "at rest"  # Entry of an error where a simulation has come to rest before
+WIDTH: Final = 8.6  # Width of a column, inches
+NEAR: Final = 5  # Number of half cycles of the close views
+SAMPLES: Final = 64  # Samples per swing of a simulation
+MOST: Final = 6_000  # Greatest number of residuals drawn
+DOTS: Final = 150  # Greatest number of readings drawn in a close view
+LINE: Final = 0.2  # Height of a row of the table, inches
+LETTERS: Final = 110  # Letters per line below the table
+RESTS: Final = "at rest"  # Entry for an error if the simulation has already come to rest
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
 QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s\u00b2)"}
-"""Estimates in the table, and the heads of their columns."""
+"""Estimates in the table, with the heads of their columns."""
 
 
 def sheet(
@@ -50,7 +50,7 @@ def sheet(
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Sheet:
-    """Return the parts in one column; more than two in two columns of nearly equal height."""
+    """Return the parts in one column, or more than two in two columns of nearly equal height."""
     wanted = list(PARTS) if parts is None else list(parts)
     unknown = [name for name in wanted if name not in PARTS]
     if unknown or not wanted:
@@ -72,7 +72,7 @@ def _high(column: Sequence[Chart]) -> float:
 
 
 def _said(report: IdentificationReport) -> str:
-    """Return what was measured, in a line."""
+    """Return a line about the measured record."""
     run, peaks = report.run, report.peaks
     if run.peaks_only:
         return f"{len(peaks)} peaks, {span(run.time)}"
@@ -84,12 +84,12 @@ def _said(report: IdentificationReport) -> str:
     return f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {len(peaks)} peaks, {noise}"
 
 
-# The decay of each model beside the measured one: figure 6.
+# Decay of each model with the measured one: figure 6.
 
 
 @dataclasses.dataclass(frozen=True)
 class Decay:
-    """A model simulated from the first peak of a record, as the sensor would show it: s, rad."""
+    """A model simulated from the first peak of a record, with the sensor's zero error: s, rad."""
 
     peak_time: Floats
     peak: Floats
@@ -110,7 +110,7 @@ class Decay:
 
 
 def _decays(report: IdentificationReport) -> dict[str, Decay]:
-    """Return the simulation of each method's model; none where there is too little to compare."""
+    """Return the simulation of each method's model; empty if there is too little to compare."""
     if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return {}
     made = {}
@@ -130,7 +130,7 @@ def _line(x: Floats, y: Floats, method: str, width: float) -> Line:
 
 
 def decays(report: IdentificationReport) -> Chart:
-    """Return peaks, their differences, near views and residuals of every model."""
+    """Return peaks, their differences, close views and residuals of every model."""
     title = "The decay by each model"
     made, run, turned = _decays(report), report.run, report.peaks.turned
     last = [] if report.joint is None else [_left(report, report.joint)]
@@ -163,7 +163,7 @@ def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float
 
 
 def _differences(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
-    """Return what each simulated peak is larger than the measured one of its number."""
+    """Return the difference of each simulated peak from the measured one of equal number."""
     number = turned.index - turned.index[0]
     curves, marks = [], _noise(turned.time, 1e3 * Z95 * turned.stderr_amplitude)
     for name, one in made.items():
@@ -181,7 +181,7 @@ def _differences(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, fl
 
 
 def _noise(x: Floats, error: Floats) -> list[Mark]:
-    """Return the band of the noise about 0, with a name where it is known."""
+    """Return the band of the noise about 0, named if the noise is known."""
     name = NOISE_SAID if np.any(error > 0) else ""
     return [Band(x, -error, error, colour=NOISE, order=0.0, name=name)]
 
@@ -204,7 +204,7 @@ def _near(
         shown = (one.time >= ends[0]) & (one.time <= ends[1])
         marks.append(_line(one.time[shown], one.theta[shown], name, 1.1))
         values.append(one.theta[shown])
-    # A model that decays too slowly would make the measured swing a line.
+    # A model that decays too slowly would flatten the measured swing to a line.
     bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
     up = names.angle(holding(np.clip(np.concatenate(values), -bound, bound)))
     return Panel(title, title, Axis(names.TIME, ends), up, marks)
@@ -217,9 +217,9 @@ def _left(report: IdentificationReport, joint: JointFit) -> Panel:
 
 
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
-    """Return the residuals of a model over a record, with its noise as lines.
+    """Return the residuals of a model over a record, with lines at the standard deviation.
 
-    Of a gyroscope they are the rates that it reads.
+    For a gyroscope they are residuals of its rate.
     """
     gyroscope = run.gyroscope
     size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
@@ -235,11 +235,11 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
     return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
 
 
-# The error of each simulated period and peak: figure 7.
+# Error of each simulated period and peak: figure 7.
 
 
 def errors(report: IdentificationReport) -> Chart:
-    """Return the errors of every model."""
+    """Return the errors of periods and peaks of every model."""
     title, known = "What simulated periods and peaks miss of the measured ones", report.table.errors
     if report.table.left_out:
         return nothing(title, report.table.left_out)
@@ -257,7 +257,7 @@ def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Char
 def error_panels(
     known: Mapping[str, PeakErrors], peaks: Peaks, titles: tuple[str, str]
 ) -> list[Panel]:
-    """Return the errors of periods and peaks, percent, over the band of the noise of the peaks."""
+    """Return the errors of periods and peaks, percent, over the band of the peaks' noise."""
     some, turned = next(iter(known.values())), peaks.turned
     at = np.searchsorted(turned.time, some.period_time)
     variance = turned.stderr_time**2
@@ -293,7 +293,7 @@ def error_panels(
 
 
 def columns(report: IdentificationReport) -> list[str]:
-    """Return the names of the columns."""
+    """Return the column names of table 1."""
     units = {"period": "s", "peak": "rad"}
     measured = [f"{row.what} {row.measured:.3g} {units[row.what]}" for row in report.table.rows]
     overall = [] if report.table.left_out else ["periods, rms", "peaks, rms"]
@@ -301,7 +301,7 @@ def columns(report: IdentificationReport) -> list[str]:
 
 
 def rows(report: IdentificationReport) -> list[list[str]]:
-    """Return a row for each method that can be applied; errors in percent, absolute."""
+    """Return a row for each applicable method; absolute errors in percent."""
     made, dash = [], "\N{EN DASH}"
     for name, found in report.methods.items():
         if not found.applicable:
@@ -318,14 +318,14 @@ def rows(report: IdentificationReport) -> list[list[str]]:
 
 
 def _percent(value: float) -> str:
-    """Return three digits without an exponent, or that the simulation rests by then."""
+    """Return three digits without an exponent, or a note that the simulation is at rest."""
     if math.isnan(value):
         return RESTS
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"  # noqa: PLR2004
 
 
 def table(report: IdentificationReport) -> Chart:
-    """Return table 1 of a record, and beneath it the methods that cannot be applied and why."""
+    """Return table 1 of a record, and below it the inapplicable methods with the reason."""
     head = [name.replace(" ", "\n", 1) if " " in name else f"\n{name}" for name in columns(report)]
     body = rows(report)
     notes = ["in brackets: standard error of the last digits"] if body else []
@@ -353,4 +353,4 @@ PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {
     "errors": errors,
     "table": table,
 }
-"""Parts of the sheet by the names a user types: figures 4, 5, 6, 7 and table 1."""
+"""Parts of the sheet by the name a user types: figures 4, 5, 6, 7 and table 1."""

@@ -1,4 +1,4 @@
-"""The legend of a basin map: who attracts, in which colour, and how large a share."""
+"""Legend of a basin map: names, colours and shares of the attractors."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 class Entry:
     """One line of a legend.
 
-    ``id`` is 1 and up of an attractor, 0 of undecided and -1 of failed cells, whose ``kind`` is the
-    name; ``share`` is that of the cells with its standard error, ``twin`` the name of its mirror
-    twin, ``points``, shape (m, 2), are its stroboscopic points: angle in rad, velocity.
+    ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells, whose ``kind`` is
+    the name; ``share`` is the share of the cells with its standard error, ``twin`` the name of the
+    mirror twin, ``points``, shape (m, 2), the stroboscopic points: angle in rad, velocity.
     """
 
     id: int
@@ -45,13 +45,13 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """The whole line as it is printed."""
+        """Text of the line."""
         twin = f", twin of {typeset(self.twin)}" if self.twin else ""
         return f"{typeset(self.name)}, {self.share}{twin}"
 
 
 def entries(dataset: xr.Dataset) -> list[Entry]:
-    """Return the attractors of a map, then undecided and failed cells where there are any."""
+    """Return the attractors of a map, then undecided and failed cells if there are any."""
     names = {
         int(i): str(name)
         for i, name in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
@@ -75,7 +75,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
 
 
 def colours(dataset: xr.Dataset) -> npt.NDArray[np.uint8]:
-    """Return the colours of the labels -1, 0, 1, ..., K: shape (K + 2, 3), rows from -1 on."""
+    """Return the colours of the labels -1, 0, 1, ..., K, in this order: shape (K + 2, 3)."""
     ids = dataset["id"].values.astype(int)
     table = np.empty((int(ids.max(initial=0)) + 2, 3), dtype=np.uint8)
     table[:] = palette.rgb("unnamed")

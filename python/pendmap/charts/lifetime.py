@@ -1,4 +1,4 @@
-"""Lifetimes of transient chaos: survival with its tail, and the mean over where the tail begins."""
+"""Lifetimes of transient chaos: survival with its tail, and the mean against the tail's start."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-SIGMAS: Final = 2.0  # Standard errors on each side that a band covers
+SIGMAS: Final = 2.0  # Half width of a band, standard errors
 FEW: Final = 0.01
-"""Share of starts given up at the bound above which curves of single attractors would end there."""
+"""Share of starts cut off at the bound above which curves of single attractors are not drawn."""
 _FIT, _BAND = "#d55e00", "#f4c3a0"
 _DASHES: Final[tuple[Dash, ...]] = ("-", (5, 1.5), (1.2, 1.2), (5, 1.5, 1.2, 1.5))
-"""Dashes of the curves: those of twins lie on one another."""
-_LEAST_SIGNIFICANT: Final = 0.05  # Level at which a tail is not exponential
-_MARK: Final = (2.0, 2.0)  # Dash of the line where the tail begins
+"""Dashes of the curves, because those of mirror twins coincide."""
+_LEAST_SIGNIFICANT: Final = 0.05  # Significance level below which a tail is not exponential
+_MARK: Final = (2.0, 2.0)  # Dash of the line at the start of the tail
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Share of all starts still alive after ``periods``; without a name, of all together."""
+    """Share of all starts still alive after ``periods``; without a name, of all attractors."""
 
     name: str
     kind: str
@@ -41,7 +41,7 @@ class Curve:
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return survival curves with the fitted tail, and the mean time left by its beginning."""
+    """Return survival curves with the fitted tail, and the mean time left by start of the tail."""
     del cells
     panels = [_survival(dataset)]
     if dataset.sizes["tail_begin"] > 1:
@@ -53,9 +53,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
 
 
 def curves(dataset: xr.Dataset) -> list[Curve]:
-    """Return the curve of all starts, then of each attractor's that captured any.
+    """Return the curve of all starts, then of each attractor that captured any.
 
-    Those of single attractors are left out where the bound cut many trajectories off.
+    Curves of single attractors are left out if the bound cut many trajectories off.
     """
     periods = dataset["elapsed"].values.astype(float)
     captured = dataset["captured"].values
@@ -83,7 +83,7 @@ def _shares(count: npt.NDArray[np.int64], starts: int) -> Floats:
 
 
 def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
-    """Return the fitted tail; none where there is no transient chaos, or it begins later."""
+    """Return the fitted tail; empty without transient chaos, or if the tail begins later."""
     a = dataset.attrs
     if not a["transient_chaos"]:
         return []
@@ -140,7 +140,7 @@ def _survival(dataset: xr.Dataset) -> Panel:
 
 
 def _tail(dataset: xr.Dataset) -> Panel:
-    """Return the mean time left against where the tail begins; empty: it is not exponential."""
+    """Return the mean time left against the start of the tail; open points: not exponential."""
     begin, mean = dataset["tail_begin"].values.astype(float), dataset["tail_mean"].values
     error, chance = dataset["tail_stderr"].values, dataset["tail_exponential"].values
     a = dataset.attrs

@@ -1,4 +1,4 @@
-"""A Lyapunov exponent: growth along the start, the running mean, its distribution."""
+"""Chart of a Lyapunov exponent: growth of deviations, running mean, distribution."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
-_BINS: Final = 60  # Bins of the distribution
-_SIGMAS: Final = 2  # Standard errors on each side that the band covers
-_WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Inches of a figure by its number of panels
+_BINS: Final = 60  # Number of bins of the distribution
+_SIGMAS: Final = 2  # Half width of the band, standard errors
+_WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Width of a figure by its number of panels, inches
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return growth and exponent; of chaos also its distribution, in a recording the attractor."""
+    """Return growth and exponent; for chaos the distribution, and in recordings the attractor."""
     del cells
     a = dataset.attrs
     panels = [_growth(dataset)]
@@ -61,7 +61,7 @@ def _title(dataset: xr.Dataset) -> str:
 
 
 def _value(dataset: xr.Dataset) -> str:
-    """Return the exponent with its error and unit, empty where there is none."""
+    """Return the exponent with its error and unit, or an empty string."""
     a = dataset.attrs
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
@@ -71,7 +71,7 @@ def _value(dataset: xr.Dataset) -> str:
 
 
 def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the first and the last period of a curve, one apart at least."""
+    """Return the first and the last period of a curve, which differ by 1 or more."""
     periods = dataset["elapsed"].values
     return float(periods[0]), float(max(periods[-1], periods[0] + 1))
 
@@ -109,7 +109,7 @@ def _growth(dataset: xr.Dataset) -> Panel:
     look: dict[str, Any] = {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
     if math.isfinite(rate) and math.isfinite(a["stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
-        # Beside a line of many decades the constant matters little: it meets the end.
+        # Over many decades the constant matters little, so that the line meets the end.
         last = growth[-1] if transient else rate * periods[-1]
         line = last + rate * (periods[begin:] - periods[-1])
         marks.append(Line(periods[begin:], line, **look))
@@ -144,11 +144,11 @@ def _average(dataset: xr.Dataset) -> Panel:
 
 
 def _sliding(dataset: xr.Dataset) -> Panel:
-    """Return exponents of stretches of ``window`` periods of the start's own trajectory."""
+    """Return exponents over ``window`` periods of the start's own trajectory."""
     a = dataset.attrs
     growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
     width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
-    # Of a selection only those periods have an exponent that begin at one that is there too.
+    # In a selection only windows whose first period is selected too have an exponent.
     begin = np.searchsorted(elapsed, elapsed - width)
     whole = (elapsed[begin] == elapsed - width) & (width > 0)
     gained = growth[whole] - growth[begin[whole]]

@@ -1,7 +1,7 @@
-"""Marks of charts: lines, points, bands, images and words, as arrays and plain values.
+"""Marks of charts: lines, points, bands, images and text, as arrays and plain values.
 
-Marks stand in the units of their axes. Where a mark has a ``name``, a legend names it; marks of one
-name share a line there. Where it has a ``path``, a recording holds it there, below the data of its
+Marks are in the units of their axes. A mark with a ``name`` is in the legend; marks of equal
+name share one entry. A mark with a ``path`` is in the recording, below the data of its
 panel.
 """
 
@@ -22,8 +22,8 @@ Dash = str | tuple[float, ...]
 Ends = tuple[float, float]
 
 INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
-"""Colours of text and axes, of what is secondary, and of warnings."""
-DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)  # Dashes: lengths of lines and gaps, in widths of the line
+"""Colours of text and axes, of secondary elements, and of warnings."""
+DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)  # Dashes: lengths of lines and gaps, in line widths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +39,7 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Line(Mark):
-    """A line through points, broken where they are not numbers; ``halo`` is a colour around it."""
+    """A line through points, broken at values that are not numbers; ``halo`` is its outline."""
 
     x: Floats
     y: Floats
@@ -52,7 +52,7 @@ class Line(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Points(Mark):
-    """Separate points; ``fill`` and ``edge`` are by default the colour."""
+    """Separate points; ``fill`` and ``edge`` default to ``colour``."""
 
     x: Floats
     y: Floats
@@ -79,7 +79,7 @@ class Band(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Steps(Mark):
-    """A histogram, ``n`` values over ``n + 1`` edges: its outline, or its area."""
+    """A histogram, ``n`` values over ``n + 1`` edges: outline or area."""
 
     edges: Floats
     values: Floats
@@ -90,7 +90,7 @@ class Steps(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Areas(Mark):
-    """Polygons, shape (m, 2) each; hatched, or full."""
+    """Polygons, each of shape (m, 2); hatched or filled."""
 
     shapes: Sequence[Floats]
     _: dataclasses.KW_ONLY
@@ -99,10 +99,10 @@ class Areas(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Colours:
-    """Colour scale of an image, and the name of the bar beside it.
+    """Colour scale of an image, and the name of its colour bar.
 
     ``scale`` is ``linear``, ``log``, ``centred`` (two halves about 0) or ``counts`` (whole numbers
-    in steps); ``beyond`` says which ends values exceed.
+    in steps); ``beyond`` tells which ends are exceeded by values.
     """
 
     name: str
@@ -116,10 +116,10 @@ class Colours:
 
 @dataclass(frozen=True, eq=False)
 class Image(Mark):
-    """Cells, row 0 lowest, between the ends of both axes.
+    """Cells between the ends of both axes, row 0 lowest.
 
-    ``values`` are numbers, shape (rows, columns), nan where there is none, and ``colours`` how they
-    are coloured; or they are numbers of ``classes``, pairs of name and colour.
+    ``values`` are numbers, shape (rows, columns), nan where missing, coloured by ``colours``; or
+    they are indices into ``classes``, pairs of name and colour.
     """
 
     values: npt.NDArray[Any]
@@ -143,7 +143,7 @@ class Level(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Span(Mark):
-    """Stretches of one axis, shaded across the panel, shape (n, 2)."""
+    """Shaded intervals of one axis, shape (n, 2), across the panel."""
 
     ends: npt.ArrayLike
     _: dataclasses.KW_ONLY
@@ -152,7 +152,7 @@ class Span(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Text(Mark):
-    """Words at a place, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
+    """Text at a position, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
 
     x: float
     y: float
@@ -166,14 +166,14 @@ class Text(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Table(Mark):
-    """Rows of words over a whole panel; words of the first column begin, others end at a line."""
+    """Rows of text over a whole panel; the first column is left-aligned, others right-aligned."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
 
 
 def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
-    """Return lines, shape (n, 2) each, as one that is broken between them: x and y."""
+    """Return lines, each of shape (n, 2), as one line broken between them: x and y."""
     gap = np.full((1, 2), np.nan)
     parts = [part for line in lines for part in (line, gap)]
     both = np.concatenate([np.empty((0, 2)), *parts])
@@ -181,7 +181,7 @@ def together(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
 
 
 def bars(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Floats, Floats]:
-    """Return upright bars from low to high as one broken line: x and y."""
+    """Return vertical bars from low to high as one broken line: x and y."""
     at, bottom, top = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, low, high)))
     gap = np.full(at.shape, np.nan)
     return np.repeat(at, 3), np.stack([bottom, top, gap], axis=1).ravel()

@@ -1,4 +1,4 @@
-"""Melnikov's threshold against the frequency of the drive."""
+"""Chart of Melnikov's threshold against the drive frequency."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _HIGH: Final = 12.0
-"""Largest threshold shown, in units of the least: a loop's goes to infinity between frequencies."""
+"""Largest threshold shown, over the least: that of a loop diverges between frequencies."""
 
 _LOOKS: Final[dict[str, tuple[str, Dash]]] = {
     "loop": (INK, "-"),
@@ -24,7 +24,7 @@ _LOOKS: Final[dict[str, tuple[str, Dash]]] = {
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return the threshold of each branch and the pendulum's own point."""
+    """Return the threshold of each branch and the pendulum's own parameters as a point."""
     del cells
     a = dataset.attrs
     omega, p = dataset["omega"].values, dataset["p_melnikov"].values
@@ -66,7 +66,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
 
 
 def _highest(p: np.ndarray, own: float) -> float:
-    """Return the largest ``p`` of the picture; the pendulum's own is in it."""
+    """Return the largest ``p`` of the chart, which includes the pendulum's own."""
     known = p[np.isfinite(p)]
     shown = min(float(known.max()), _HIGH * float(known.min())) if known.size else 1.0
     return max(shown, 1.15 * own, 1e-3)

@@ -1,4 +1,4 @@
-"""Names and colours of methods of identification in pictures, and what their panels share."""
+"""Names and colours of identification methods, and items shared by their panels."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ if TYPE_CHECKING:
 
 ODD: Final = "#d55e00"
 EVEN: Final = "#0072b2"
-"""Half cycles that begin at a peak of odd or even number."""
+"""Colours of half cycles that begin at a peak of odd or even number."""
 MEASURED: Final = "#222222"
 """Colour of measured values."""
 NOISE: Final = "#d9d9d9"
 NOISE_SAID: Final = "95 % of the readings' noise"
-"""Colour and name of the band that the noise of the readings explains."""
-MINUS: Final = "\N{MINUS SIGN}"  # Sign of negative numbers in pictures
-Z95: Final = 1.959963984540054  # Half the width of a 95 % interval, in standard errors
+"""Colour and name of the band of the readings' noise."""
+MINUS: Final = "\N{MINUS SIGN}"  # Minus sign in charts
+Z95: Final = 1.959963984540054  # Half width of a 95 % interval, standard errors
 
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """Name in a legend, colour ``#rrggbb`` and dash of a method's line, as matplotlib writes it."""
+    """Name in a legend, colour ``#rrggbb`` and matplotlib dash of a method's line."""
 
     label: str
     colour: str
@@ -47,26 +47,26 @@ _LOOKS: Final = {
     "baseline": Look("baseline", "#d55e00"),
     "after": Look("after", "#0072b2"),
 }
-"""Okabe and Ito's colours, for the methods that stand beside one another."""
+"""Colours of Okabe and Ito for methods drawn together."""
 _OTHER: Final = "#8a8a8a"
 _READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
-"""The printed method; where the first cannot be applied, one of the others stands for it."""
+"""Variants of the printed method; if the first is not applicable, another is drawn instead."""
 
 
 def look(method: str) -> Look:
-    """Return the look of a method; an unknown one is grey, under its own name."""
+    """Return the look of a method; an unknown one is grey under its own name."""
     return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
 
 
 def drawn(methods: Iterable[str]) -> list[str]:
-    """Return those of the methods that are drawn: all but further readings of the printed one."""
+    """Return the methods to draw: all but further variants of the printed one."""
     there = list(methods)
     printed = [name for name in _READINGS if name in there][:1]
     return [name for name in there if name not in _READINGS or name in printed]
 
 
 def nothing(title: str, why: str, letters: int = 90) -> Chart:
-    """Return a chart that says why there is nothing to draw, in lines of at most ``letters``."""
+    """Return a chart with the reason for an empty figure, in lines of at most ``letters``."""
     why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
     words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
     return Chart(title, "", [bare("nothing", words)], size=(8.6, 0.9))

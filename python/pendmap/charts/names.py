@@ -1,4 +1,4 @@
-"""Names of axes and parameters in the units of a result, and the axes that many panels share."""
+"""Names of axes and parameters in the units of a result, and axes shared by several panels."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ _THETA: Final = "\N{GREEK SMALL LETTER THETA}"
 
 ANGLE: Final = f"{_THETA} (rad)"  # The angle, with its unit
 TIME: Final = "t (s)"  # Time in SI, with its unit
-_TURN: Final = 2.0  # Range of angles from which multiples of pi are their labels, rad
-_LONG: Final = 5  # Characters of a label beyond which an axis is in thousandths of its unit
+_TURN: Final = 2.0  # Range of angles above which labels are multiples of pi, rad
+_LONG: Final = 5  # Characters of a label above which an axis is in thousandths of its unit
 _MOSTLY: Final = 95
-"""Percent of the curve nearest to 0 in the straight part of a signed logarithmic axis."""
-_NEAR: Final = 12.0  # Reach of an axis, over its straight part, up to which it is not logarithmic
+"""Percentile of absolute values that the linear part of a signed logarithmic axis contains."""
+_NEAR: Final = 12.0  # Range of an axis over its linear part up to which it is linear
 _BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
 _SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
-"""Parameters of a model without dimensions and of one in SI, in the order of a subtitle."""
+"""Parameters of a nondimensional model and of one in SI, in the order of a subtitle."""
 _ALWAYS: Final = ("w0", "gamma", "c_over_m", "p", "omega", "Omega")
-"""Parameters that a subtitle has even where they are 0."""
+"""Parameters in a subtitle even if they are 0."""
 _LABORATORY: Final = {"stroke_mm": "p", "frequency_hz": "Omega"}
-"""Quantities that a laboratory varies, and the parameter of a rig that each of them sets."""
+"""Quantities that a laboratory varies, with the rig parameter that each sets."""
 
 
 def velocity(units: Units) -> str:
@@ -45,17 +45,17 @@ def velocity(units: Units) -> str:
 
 
 def speed(units: Units) -> str:
-    """Return the symbol of the velocity with its unit, a blank between them."""
+    """Return the symbol of the velocity with its unit, separated by a blank."""
     return velocity(units) + (" (rad/s)" if units.si else "")
 
 
 def clock(units: Units) -> str:
-    """Return the symbol of time with its unit, a blank between them."""
+    """Return the symbol of time with its unit, separated by a blank."""
     return TIME if units.si else _TAU
 
 
 def per_time(units: Units) -> str:
-    """Return what an exponent counts."""
+    """Return the unit of an exponent in words."""
     return "per second" if units.si else f"per unit {_TAU}"
 
 
@@ -65,7 +65,7 @@ def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
 
 
 def symbol(name: str, unit: str = "1") -> str:
-    """Return the symbol of a parameter with its unit, a blank between them."""
+    """Return the symbol of a parameter with its unit, separated by a blank."""
     own = LABELS[name].symbol if name in LABELS else name
     return own if unit in ("", "1") else f"{own} ({unit})"
 
@@ -73,8 +73,8 @@ def symbol(name: str, unit: str = "1") -> str:
 def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
     """Return the model's parameters in one line, in its units, then its effects.
 
-    Phase, torque and friction stand there only where they are not 0, and without drive, p = 0,
-    there is no frequency and no phase; nor do those of ``without``, which vary.
+    Phase, torque and friction are omitted if they are 0, frequency and phase if there is no drive
+    (p = 0), and parameters in ``without``, which vary.
     """
     without = {_LABORATORY.get(name, name) for name in without}
     driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
@@ -92,12 +92,12 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
 
 
 def seconds(time: Floats) -> Axis:
-    """Return the axis of these times of a record."""
+    """Return the time axis of a record."""
     return Axis(TIME, holding(time, margin=0.01))
 
 
 def angle(ends: Ends, name: str = ANGLE) -> Axis:
-    """Return the axis of an angle or a rate: multiples of pi if long, thousandths if short."""
+    """Return the axis of an angle or a rate, with multiples of pi if long, thousandths if short."""
     if name == ANGLE and ends[1] - ends[0] > _TURN:
         return Axis(name, ends, "angle")
     _, labels = plane.short_ticks(*ends, angle=False)
@@ -107,10 +107,10 @@ def angle(ends: Ends, name: str = ANGLE) -> Axis:
 
 
 def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:
-    """Return an axis with powers of ten on both sides of 0, and lines where it changes its scale.
+    """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale.
 
-    Nearly all of the curve nearest to 0 lies in the straight part, which is at least ``least``: its
-    noise makes no towers. An axis that reaches little farther is straight.
+    The linear part contains nearly all of the curve nearest to 0 and is at least ``least``, so that
+    noise is not enlarged. An axis with little beyond it is linear.
     """
     known = [each[np.isfinite(each)] for each in curves]
     known = [each for each in known if np.any(each != 0)]

@@ -1,4 +1,4 @@
-"""Closed orbits: paths and stroboscopic points in the phase plane."""
+"""Chart of closed orbits: paths and stroboscopic points in the phase plane."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-MOST: Final = 16  # Orbits that are named: of more the legend says how many there are
+MOST: Final = 16  # Greatest number of named orbits; a legend gives the number of the others
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return the orbits: full lines and points are stable, broken lines, empty points are not."""
+    """Return the orbits: full lines and points if stable, broken lines and open points if not."""
     del cells
     units = Units.of(dataset.attrs)
     points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
@@ -37,7 +37,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     marks = _drawn(dataset, theta)
     count = int(dataset.attrs.get("draws", 0))
     over = f";   grey dots: {counted(count, 'draw')}" if count else ""
-    # Those that attract come last: they are drawn on top.
+    # Stable orbits are drawn last, on top.
     stable = dataset["stable"].values.astype(bool)
     for k in [*np.flatnonzero(~stable), *np.flatnonzero(stable)]:
         own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
@@ -76,7 +76,7 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     said = f"{typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
     named = sorted(dataset["id"].values)[:MOST]
     colour = palette.colour(name, str(row["kind"].values))
-    # Pale colours on white, and all of them in grey, need an edge.
+    # Pale colours on white, and all colours in grey, need an edge.
     look: dict[str, Any] = {
         "colour": colour,
         "name": f"{number}: {said}" if number in named else "",

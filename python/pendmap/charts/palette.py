@@ -1,4 +1,4 @@
-"""Colours of attractors by their names: an attractor looks alike in every picture.
+"""Colours of attractors by name, so that an attractor has one colour in every figure.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
@@ -14,9 +14,9 @@ chaos                   tumbling purple; rotating wine and violet; libration pin
 no attractor            undecided light grey; failed black
 ======================  ==================================================================
 
-Beyond a family's last colour they begin again, darker, then lighter, and so on (:func:`lap`). So
-do attractors around another turn of the line, ``"rest turn +1"``.
-Nothing here depends on which other attractors a map holds, and no drawing library is imported.
+After its last colour a family repeats, darker, then lighter, and so on (:func:`lap`). Attractors
+around another turn of the line, ``"rest turn +1"``, are coloured likewise. A colour does not
+depend on the other attractors of a map, and no drawing library is imported.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FAILED = "#000000"
 """Cells whose integration failed or diverged (label -1)."""
 
 UNNAMED = "#8a8a8a"
-"""An attractor whose name and kind say nothing that this module knows."""
+"""Attractors of unknown name and kind."""
 
 _DIVERGING = np.array(
     [
@@ -52,7 +52,7 @@ _DIVERGING = np.array(
         (103, 0, 31),
     ],
     dtype=float,
-)  # Brewer's red and blue, as it is used for signed quantities
+)  # Brewer's red and blue, for signed quantities
 
 _Shade = tuple[str, str]  # the colour, and its name in words
 
@@ -119,7 +119,7 @@ _LAPS = (
     (0, 0.18, "slightly darker"),
     (255, 0.25, "slightly lighter"),
 )
-"""Grey that a family's colours are mixed with when they begin again, its share, and in words."""
+"""Grey that a family's colours are mixed with on repetition, its share, and its name."""
 
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
@@ -141,7 +141,7 @@ class _Read:
 def colour(name: str, kind: str | None = None) -> str:
     """Return the colour ``#rrggbb`` of an attractor, of ``undecided`` or ``failed``, by its name.
 
-    ``kind`` is needed only where the name does not begin with it.
+    ``kind`` is only needed if the name does not begin with it.
     """
     return _shade(name, kind)[0]
 
@@ -162,13 +162,13 @@ def describe(name: str, kind: str | None = None) -> str:
 
 
 def direction(name: str, kind: str | None = None) -> int:
-    """Return which way it turns: +1 forward (counter-clockwise), -1 backward, 0 neither."""
+    """Return the direction of rotation: +1 forward (counter-clockwise), -1 backward, 0 neither."""
     return _read(name, kind).direction
 
 
 @functools.cache
 def _words() -> dict[str, str]:
-    """Return every colour that this module gives, and its name."""
+    """Return every colour of this module, with its name."""
     directed = [
         shade for family in _DIRECTED.values() for side in family.values() for shade in side
     ]
@@ -179,7 +179,7 @@ def _words() -> dict[str, str]:
 
 
 def in_words(code: str) -> str:
-    """Return the name of a colour ``"#rrggbb"``, or of the nearest that has one."""
+    """Return the name of a colour ``"#rrggbb"``, or of the nearest named one."""
     known = _words()
     if code in known:
         return known[code]
@@ -189,7 +189,7 @@ def in_words(code: str) -> str:
 
 
 def lap(name: str, kind: str | None = None) -> int:
-    """Return how often the colours of its family were used up before its own: usually 0.
+    """Return how often the colours of a family were repeated before this one: usually 0.
 
     ``oscillation 8:0`` has the colour of ``oscillation 2:0``, darkened, and the lap 1.
     """
@@ -210,14 +210,14 @@ def _shade(name: str, kind: str | None) -> _Shade:
 
 
 def _mixed(shade: _Shade, round_: int) -> _Shade:
-    """Return a colour where its family begins again."""
+    """Return a shade mixed for a repetition of its family's colours."""
     ground, part, word = _LAPS[(round_ - 1) % len(_LAPS)]
     mixed = [round((1 - part) * int(shade[0][k : k + 2], 16) + part * ground) for k in (1, 3, 5)]
     return "#" + "".join(f"{value:02x}" for value in mixed), f"{word} {shade[1]}"
 
 
 def _place(read: _Read) -> tuple[_Shade, int]:
-    """Return the colour of a name in its family, and how often the family was gone through."""
+    """Return the colour of a name in its family, and the number of repetitions of the family."""
     step = max(read.n, 1) - 1
     family: tuple[_Shade, ...]
     if read.kind in _SINGLE:
@@ -229,7 +229,7 @@ def _place(read: _Read) -> tuple[_Shade, int]:
     else:
         return (UNNAMED, "grey"), 0
     around, at = divmod(step + _further(read.mark), len(family))
-    # Turns +1, -1, +2, ... take the laps one after the other.
+    # Turns +1, -1, +2, ... use successive laps.
     return family[at], around + 2 * abs(read.turn) - (read.turn > 0)
 
 
@@ -250,7 +250,7 @@ def _read(name: str, kind: str | None) -> _Read:
 
 
 def _further(mark: str) -> int:
-    """Return how many shades a mark such as ``b`` or ``2`` moves on; a twin's sign: 0."""
+    """Return the number of shades that a mark such as ``b`` or ``2`` advances; a twin's sign: 0."""
     if mark.isdigit():
         return max(int(mark) - 1, 0)
     return ord(mark) - ord("a") if mark.isalpha() else 0

@@ -1,4 +1,4 @@
-"""Maps over two parameters: a colour for each kind of attractor, stripes where some coexist."""
+"""Maps over two parameters: a colour for each kind of attractor, striped if several coexist."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ LAYERS = {
     "undecided": "share of the starts undecided",
     "certainty": "probability of the most likely regime",
 }
-"""Layers by the name a user types; ``share KIND`` is the share of the starts of a kind."""
+"""Layers by the name a user types; ``share KIND`` is the share of the starts on a kind."""
 
 _RECORDED: Final = ("exponent", "attractors", "undecided")
-"""Layers that a recording has beside those that lead."""
-_STRIPES: Final = 100  # Stripes across a picture
-_LEAST_HALF: Final = 0.05  # Least part of the other one that a half of the exponents' scale reaches
-_MOST_COUNT: Final = 8  # Largest number that has its own colour
+"""Layers of a recording in addition to the leading ones."""
+_STRIPES: Final = 100  # Stripes across an image
+_LEAST_HALF: Final = 0.05  # Least ratio of the halves of the colour scale of exponents
+_MOST_COUNT: Final = 8  # Largest count that has its own colour
 _MOST, _LEAST = 13, 0.002
-"""Greatest number of kinds that are named, and least share of the cells that they have."""
+"""Greatest number of named kinds, and the least share of the cells with one."""
 
 _OTHERS = {"oscillation": "oscillation, other periods", "rotation": "rotation, others"}
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of attractor in a picture, or a family of rare ones.
+    """A kind of attractor in an image, or a family of rare kinds.
 
-    ``members`` are the kinds of the dataset, ``presence`` the share of the cells that have it.
+    ``members`` are kinds of the dataset, ``presence`` the share of the cells with any of them.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Kind:
 
     @property
     def text(self) -> str:
-        """Its line in a legend."""
+        """Line of the legend."""
         return f"{self.name}: {_percent(self.presence)} of the cells"
 
 
@@ -64,12 +64,12 @@ def _percent(share: float) -> str:
 
 
 def sets(dataset: xr.Dataset) -> list[list[str]]:
-    """Return the kinds of each regime."""
+    """Return the kinds of attractor of each regime."""
     return [json.loads(str(text)) for text in dataset["regime_kinds"].values]
 
 
 def kinds(dataset: xr.Dataset) -> list[Kind]:
-    """Return the kinds that a picture names, in the order of the regimes' words."""
+    """Return the kinds that a map names, in a fixed order of families."""
     share = dataset["regime_share"].values
     presence: dict[str, float] = {}
     for k, one in enumerate(sets(dataset)):
@@ -99,13 +99,13 @@ def _kind(name: str, like: str, members: tuple[str, ...], presence: float) -> Ki
 
 
 def _named(name: str) -> str:
-    """Return an attractor with the colour of a kind: of the two senses the forward one."""
+    """Return an attractor name with the colour of a kind, the forward one of two directions."""
     family, _, which = name.rpartition(" ")
     if name.startswith("oscillation period"):
         return f"oscillation {which}:0"
     if family == "rotation":
         n, _, w = which.partition(":")
-        # Those that do not turn once a period look like none that do.
+        # Rotations slower than one turn per period have separate colours.
         return f"rotation {n}:+{w}" if n == w else f"rotation {5 * int(n)}:+{w}"
     return f"{name} +" if name in ("rotating chaos", "quasiperiodic rotation") else name
 
@@ -122,10 +122,10 @@ def _place(name: str) -> tuple[int, float, float]:
 
 
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:
-    """Return an image of indices into :func:`kinds`, row 0 lowest, a cell a block of pixels.
+    """Return an image of indices into :func:`kinds`, row 0 lowest, one block of pixels per cell.
 
-    Where kinds coexist, diagonal stripes of their colours take turns. ``size`` is about the pixels
-    of the longer side, ``width`` those of a stripe along a row.
+    Cells with several kinds have diagonal stripes in turn. ``size`` is about the number of pixels
+    of the longer side, ``width`` that of a stripe along a row.
     """
     listed = kinds(dataset)
     own = {member: k for k, kind in enumerate(listed) for member in kind.members}
@@ -145,7 +145,7 @@ def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
-    """Return the kinds of attractor, striped where several coexist, and other layers."""
+    """Return the kinds of attractor, striped if several coexist, and other layers."""
     shares = [f"share {kind}" for kind in dataset["kind"].values]
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
     if layer is not None and layer not in (*known, *shares):
@@ -181,7 +181,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
 def _image(
     dataset: xr.Dataset, name: str, across: tuple[float, float], up: tuple[float, float], cells: int
 ) -> Image:
-    """Return the picture of a layer."""
+    """Return the image of a layer."""
     if name == "kinds":
         classes = [(kind.text, kind.colour) for kind in kinds(dataset)]
         picture = striped(dataset, cells, max(2, cells // _STRIPES))
@@ -196,12 +196,12 @@ def _image(
 
 
 def _colours(dataset: xr.Dataset, name: str, values: npt.NDArray[np.float64]) -> Colours:
-    """Return the colour scale: exponents about 0, counts in steps, shares from 0 to 1."""
+    """Return the colour scale: centred at 0 for exponents, steps for counts, 0 to 1 for shares."""
     said = _said(dataset, name)
     if name == "exponent":
         low, high = (float(q) for q in np.quantile(values, [0.01, 0.99])) if values.size else (0, 0)
         low, high = min(low, -1e-3, -_LEAST_HALF * high), max(high, 1e-3, -_LEAST_HALF * low)
-        # The halves have scales of their own: without ticks on both, dark blue would look as far
+        # The halves have different scales: without ticks on both, dark blue would appear as far
         # from 0 as dark red.
         ticks = sorted({at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)})
         return Colours(said, "RdBu_r", low, high, "centred", "both", ticks)
@@ -215,13 +215,13 @@ def _colours(dataset: xr.Dataset, name: str, values: npt.NDArray[np.float64]) ->
 
 
 def _few(low: float, high: float) -> list[float]:
-    """Return at most four round places in a half of a colour bar."""
+    """Return at most four round ticks in a half of a colour bar."""
     ticks = [at for at, _ in plane.plain_ticks(low, high)]
     return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
 
 
 def _said(dataset: xr.Dataset, name: str) -> str:
-    """Return what a layer shows, in words, with its unit."""
+    """Return the quantity of a layer in words, with its unit."""
     if name.startswith("share "):
         return f"share of the starts on {name.removeprefix('share ')}"
     unit = ""
@@ -234,7 +234,7 @@ def _said(dataset: xr.Dataset, name: str) -> str:
 
 
 def _curves(dataset: xr.Dataset) -> list[Mark]:
-    """Return the critical curves of a map; none where they were not asked for."""
+    """Return the critical curves of a map; an empty list if it has none."""
     if "curve_p" not in dataset:
         return []
     omega = dataset["curve_omega"].values

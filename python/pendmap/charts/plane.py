@@ -1,4 +1,4 @@
-"""The phase plane as it is drawn: cells, ticks, thinned maps, copies of points, wrapped curves."""
+"""Phase-plane geometry: cell edges, ticks, thinned maps, copies of points, wrapped curves."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ if TYPE_CHECKING:
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
 
-FEWEST, MOST = 2.0, 6.5  # Steps between ticks that a range of angles may have
+FEWEST, MOST = 2.0, 6.5  # Least and greatest number of tick steps of a range of angles
 
-FURTHEST = 1000  # Multiples of pi beyond which angles are labelled with plain numbers
+FURTHEST = 1000  # Multiple of pi beyond which angles have plain numbers as labels
 
 NARROW = 1e-4
-"""Width of a window, relative to its distance from 0, under which its ticks have an offset."""
+"""Width of a window, relative to its distance from 0, below which its ticks have an offset."""
 
-_FINE = 8  # Pixels of the narrowest cell where cells are not equally wide
+_FINE = 8  # Pixels of the narrowest cell if cells differ in width
 
-LOG_TICKS = 4  # Ticks that a logarithmic colour bar has at least, where its range allows
+LOG_TICKS = 4  # Least number of ticks of a logarithmic colour bar, if its range allows
 
-MOST_COPIES = 100  # Copies of a point, 2 pi apart, that are told apart in a window
+MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
 
 def edges(dataset: xr.Dataset, name: str) -> Floats:
     """Return the edges of the cells along a rising axis of N values, shape (N + 1,).
 
-    The outer edges are those of the outermost cells, and between two cells the edge is half-way
-    from one to the other. Cells have the bounds that the axis names (CF conventions); without them
-    each reaches half-way to its neighbours, and a lone cell is 1 wide.
+    The outer edges are those of the outermost cells; an inner edge is midway between the edges of
+    two cells. Cells have the bounds that the axis names (CF conventions); without them each extends
+    halfway to its neighbours, and a single cell is 1 wide.
     """
     axis = dataset[name]
     x = np.asarray(axis.values, dtype=float)
@@ -62,16 +62,16 @@ def outer_edges(dataset: xr.Dataset, name: str) -> tuple[float, float]:
 def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
     """Return an array over two rising axes as an image of at most ``limit`` pixels along each.
 
-    Each pixel has the cell that its centre lies in. A pixel is a cell where cells are equally wide;
-    else the narrowest has eight. They are chosen before anything is converted: a large map is never
-    copied whole.
+    Each pixel has the value of the cell at its centre. One pixel is one cell if cells are equally
+    wide, else the narrowest has eight. Cells are selected before conversion, so that a large map is
+    never copied whole.
     """
     cells = {str(d): _cells(edges(dataset, str(d)), limit) for d in array.dims}
     return np.asarray(array.isel(cells).values)
 
 
 def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
-    """Return the cell of each pixel between these edges."""
+    """Return the index of the cell of each pixel between these edges."""
     count, whole = bounds.size - 1, float(bounds[-1] - bounds[0])
     widths = np.diff(bounds)
     rounding = 8 * np.finfo(float).eps * float(np.abs(bounds).max())
@@ -87,20 +87,20 @@ def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
 
 
 def on_line(dataset: xr.Dataset) -> bool:
-    """Return whether angles are not wrapped: an effect counts turns."""
+    """Return whether angles are not wrapped, because an effect depends on the number of turns."""
     return str(dataset.attrs.get("angle")) == "line"
 
 
 def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
-    """Return the limits of an axis of these angles: a turn, or on the line all of them."""
+    """Return the limits of an axis of angles: one turn, or all angles if they are not wrapped."""
     return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
 
 
 def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
-    """Return the points, shape (m, 2), that are in [low, high], and their copies 2 pi k further.
+    """Return the points, shape (m, 2), in [low, high], with their copies shifted by 2 pi k.
 
-    On the line there are no copies. None are returned where there would be more than a hundred
-    of each.
+    Unwrapped angles have no copies. An empty array is returned if there would be more than a
+    hundred copies of each.
     """
     if on_line(dataset):
         return points[(points[:, 0] >= low) & (points[:, 0] <= high)]
@@ -115,7 +115,7 @@ def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floa
 
 
 def angle_ticks(low: float, high: float) -> Ticks:
-    """Return a handful of ticks at multiples of pi; plain numbers in a small or far window."""
+    """Return a few ticks at multiples of pi, or plain numbers in a small or distant window."""
     if max(abs(low), abs(high)) > FURTHEST * math.pi:
         return plain_ticks(low, high)
     for quarters in (2**k for k in range(12)):
@@ -127,11 +127,11 @@ def angle_ticks(low: float, high: float) -> Ticks:
 
 
 def plain_ticks(low: float, high: float) -> Ticks:
-    """Return about five round places between ``low`` and ``high`` with their labels."""
+    """Return about five ticks at round numbers from ``low`` to ``high``, with labels."""
     raw = (high - low) / 6
     size = max(abs(low), abs(high))
     if not (size * 1e-15 < raw < math.inf) or raw < sys.float_info.min:
-        return [(low, _written(low, 17))]  # narrower than numbers can tell apart
+        return [(low, _written(low, 17))]  # narrower than the resolution of floating-point numbers
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
     first, last = _between(low, high, step)
@@ -140,7 +140,7 @@ def plain_ticks(low: float, high: float) -> Ticks:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return ticks 1, 2, 5, 10, ... between the ends; more of them where these are close."""
+    """Return ticks 1, 2, 5, 10, ... between the ends, more if these are close."""
     for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         ticks = [m * 10.0**k for k in powers for m in steps]
@@ -151,14 +151,14 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 
 def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
-    """Return what is subtracted from an axis, usually 0, and the ticks of the difference."""
+    """Return the offset subtracted from an axis, usually 0, and the ticks of the difference."""
     shift = _offset(low, high)
     make = angle_ticks if angle and not shift else plain_ticks
     return shift, make(low - shift, high - shift)
 
 
 def power(value: float) -> str:
-    """Return a label of a logarithmic axis, short for any power of ten."""
+    """Return a label of a logarithmic axis, short for powers of ten."""
     if value == 0:
         return "0"
     size = math.log10(abs(value))
@@ -168,7 +168,7 @@ def power(value: float) -> str:
 
 
 def shifted(name: str, shift: float) -> str:
-    """Return an axis's name, symbol and unit with a blank between, with what is subtracted."""
+    """Return an axis name (symbol, blank, unit) with the offset subtracted from the axis."""
     if not shift:
         return name
     symbol, _, unit = name.partition(" ")
@@ -179,7 +179,7 @@ def shifted(name: str, shift: float) -> str:
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
     """Return a curve on the cylinder, shape (n + 3 m, 2), its angle wrapped to (-pi, pi].
 
-    Each of the m crossings adds the point on one edge, a row of nan, and that on the other.
+    Each of the m crossings adds a point on one edge, a row of nan, and a point on the other edge.
     """
     angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
     within = wrapped(angle)
@@ -188,7 +188,7 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
     at = np.flatnonzero(np.diff(turn))
     edge = np.where(turn[at + 1] > turn[at], math.pi, -math.pi)
     part = (edge - within[at]) / (angle[at + 1] - angle[at])
-    part = np.clip(part, 0.0, 1.0)  # where rounding is coarser than the steps
+    part = np.clip(part, 0.0, 1.0)  # rounding may be coarser than the steps
     crossing = rate[at] + part * (rate[at + 1] - rate[at])
     gap = np.full_like(edge, np.nan)
     extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
@@ -196,22 +196,22 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
 
 
 def wrapped(theta: Floats) -> Floats:
-    """Return angles in (-pi, pi], also where they are as large as numbers get."""
+    """Return angles wrapped to (-pi, pi], for angles of any size."""
     within: Floats = math.pi - np.remainder(math.pi - theta, TWO_PI)
     return within
 
 
 def padded(values: Floats) -> tuple[float, float]:
-    """Return the limits of an axis that holds the values, with a margin, never empty."""
+    """Return the limits of an axis that contains the values, with a margin, never empty."""
     low, high = float(np.min(values)), float(np.max(values))
     pad = max(0.06 * (high - low), 0.05, 1e-6 * max(abs(low), abs(high)))
     return low - pad, high + pad
 
 
 def _offset(low: float, high: float) -> float:
-    """Return a round number near a window that is narrow for its distance from 0; else 0.
+    """Return a round number near a window that is narrow relative to its distance from 0, else 0.
 
-    Ticks of such a window are short as differences from it, and too long as they are.
+    Ticks of such a window are short as differences from it, and too long otherwise.
     """
     width = high - low
     if not 0.0 < width < NARROW * max(abs(low), abs(high)):
@@ -229,7 +229,7 @@ def _between(low: float, high: float, step: float) -> tuple[int, int]:
 
 
 def _multiple_of_pi(quarters: int) -> str:
-    """Return ``quarters * pi / 4`` as it is written, such as -3 pi/2."""
+    """Return ``quarters * pi / 4`` in lowest terms, such as -3 pi/2."""
     if quarters == 0:
         return "0"
     divisor = math.gcd(quarters, 4)

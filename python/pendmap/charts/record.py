@@ -1,4 +1,4 @@
-"""Records: one in detail, an experiment as strips, or a panel a run."""
+"""Charts of records: one in detail, or an experiment as strips."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"
 FALSE: Final = "#d55e00"
 _BAND: Final = "#ececec"
-MOST_POINTS: Final = 20_000  # Residuals that are drawn; more only make a figure large
-MOST_LINES: Final = 14  # Lines of findings below the panels
-MOST_RUNS: Final = 12  # Strips of one figure; the text of ``look`` has every run
-FEW: Final = 400  # Samples under which each is drawn as a dot
-APART: Final = 0.22  # Inches between numbers in one row
-SHORT: Final = 2e-3  # Share of the record under which a finding is a point, not a span
-WIDTH: Final = 8.6  # Inches across a figure
+MOST_POINTS: Final = 20_000  # Greatest number of residuals drawn; more only make a figure larger
+MOST_LINES: Final = 14  # Greatest number of lines of findings below the panels
+MOST_RUNS: Final = 12  # Greatest number of strips of a figure; the text of ``look`` lists every run
+FEW: Final = 400  # Number of samples below which each is drawn as a dot
+APART: Final = 0.22  # Least distance between numbers in a row, inches
+SHORT: Final = 2e-3  # Duration of a finding, over the record's, below which it is drawn as a point
+WIDTH: Final = 8.6  # Width of a figure, inches
 
 
 def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
@@ -65,7 +65,7 @@ def _subtitle(run: Run) -> str:
 
 
 def _listed(run: Run, letters: int) -> list[str]:
-    """Return the findings in lines, numbered as in the figure."""
+    """Return the findings as lines, numbered as in the figure."""
     lines: list[str] = []
     for number, found in enumerate(run.findings, 1):
         mended = "mended: " if found.mended else ""
@@ -78,11 +78,11 @@ def _listed(run: Run, letters: int) -> list[str]:
 
 
 def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
-    """Return the samples: those for fitting, others, and outliers, which stand alone."""
+    """Return marks of the samples: those for fitting, others, and isolated outliers."""
     few: dict[str, Any] = {"size": 2.2}
     alone = _lone(~run.trusted)
     steps = np.diff(run.time)
-    # A line from the sample before would cross a gap.
+    # A line from the previous sample would cross a gap.
     breaks = np.flatnonzero(np.concatenate([[False], steps > 5 * np.median(steps)]))
     marks: list[Mark] = []
     for which, colour, said in (
@@ -103,7 +103,7 @@ def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
 
 
 def _lone(marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return which of the marked samples stand in stretches of three at most: outliers."""
+    """Return which of the marked samples lie in stretches of at most three: outliers."""
     few = np.zeros(marked.size, bool)
     for low, high in zip(*true_runs(marked), strict=True):
         few[low:high] = high - low <= 3  # noqa: PLR2004
@@ -120,7 +120,7 @@ def _history(run: Run) -> Panel:
 
 
 def _flags(run: Run, width: float) -> Panel:
-    """Return the numbers of findings that have a place, in two rows in which they do not meet."""
+    """Return the numbers of findings at their times, in two rows without overlap."""
     low, high = float(run.time[0]), float(run.time[-1])
     ends = holding(run.time, margin=0.01)
     inches = (width - 1.0) / (ends[1] - ends[0])
@@ -152,7 +152,7 @@ def _flags(run: Run, width: float) -> Panel:
 
 
 def _intervals(run: Run) -> Panel:
-    """Return how often each interval between samples occurs."""
+    """Return a histogram of the intervals between samples."""
     steps = 1e3 * np.diff(run.time)
     usual = float(np.median(steps))
     low, high = float(steps.min()), float(steps.max())
@@ -180,7 +180,7 @@ def _decay(run: Run) -> Panel:
 
 
 def _residuals(run: Run) -> Panel:
-    """Return how far samples are from their neighbours, against speed, and the noise found."""
+    """Return the residuals of samples from a local fit against speed, with the estimated noise."""
     noise = noise_floor(run)
     read = run.theta if run.gyroscope is None else run.read
     fit = local_fit(run.time, read)
@@ -197,7 +197,7 @@ def _residuals(run: Run) -> Panel:
         level = np.full(2, 1e3 * part.sigma)
         marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
-    # What is read changes by speeds, a rate by accelerations.
+    # An angle changes with the velocity, a rate with the acceleration.
     speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
     if run.gyroscope is not None:
         two = "\N{SUPERSCRIPT TWO}"
@@ -209,7 +209,7 @@ def _residuals(run: Run) -> Panel:
 
 
 def _many(experiment: Experiment, width: float) -> Chart:
-    """Return a strip of each run, each from its own start, so that all share a scale of time."""
+    """Return a strip for each run, from its own start, with a common time scale."""
     runs = experiment.runs[:MOST_RUNS]
     longest = max(float(run.time[-1] - run.time[0]) for run in runs)
     shown = f", the first {MOST_RUNS}" if len(experiment.runs) > MOST_RUNS else ""

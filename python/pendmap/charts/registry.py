@@ -1,4 +1,4 @@
-"""Builders of charts by the kind of dataset: a module here of the kind's name has ``chart``."""
+"""Chart builders by the kind of dataset: functions ``chart`` of the modules named as the kind."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 
 class Builder(Protocol):
-    """Makes a chart: of one ``layer``, with images of at most ``cells`` along a side."""
+    """Builder of a chart, of one ``layer``, with images of at most ``cells`` along a side."""
 
     def __call__(self, dataset: xr.Dataset, *, layer: str | None, cells: int) -> Chart:
         """Return the chart."""
 
 
-BUILDERS: Final[dict[str, Builder]] = {}  # Builders of kinds that have no module here
+BUILDERS: Final[dict[str, Builder]] = {}  # Builders of kinds without a module here
 
 
 def kinds() -> list[str]:
@@ -45,7 +45,7 @@ def _builder(kind: str) -> Builder | None:
 
 
 def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
-    """Return a dataset as it is drawn, if it has a chart and there is memory for it."""
+    """Return a dataset prepared for drawing; raise an error without a chart or enough memory."""
     kind = dataset.attrs.get("kind")
     if not isinstance(kind, str) or _builder(kind) is None:
         raise InputError(
@@ -57,7 +57,7 @@ def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
 
 
 def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
-    """Return the chart of a dataset of :func:`ready`."""
+    """Return the chart of a dataset returned by :func:`ready`."""
     builder = _builder(str(dataset.attrs["kind"]))
     if builder is None:
         raise InputError(f"no chart of kind {dataset.attrs['kind']!r}")

@@ -1,4 +1,4 @@
-"""Records of several runs: a panel a run, measured angle against time."""
+"""Chart of the records of several runs: one panel per run, measured angle against time."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-COLUMNS: Final = 20  # Runs up to which there are two columns; of more there are three
+COLUMNS: Final = 20  # Number of runs above which there are three columns instead of two
 BINS: Final = 10_000
-"""Pieces of a panel of which least and greatest angle are drawn, where there are more samples."""
+"""Bins of a panel, drawn by their least and greatest angle if there are more samples."""
 LOST: Final = 1.5
-"""Samples apart, in the usual distance, from which on nothing is drawn between two."""
+"""Distance of two samples, over the median, above which the line between them is broken."""
 _COLOUR: Final = "#1d3557"
 
 
 @dataclass(frozen=True)
 class RunPanel:
-    """One run as it was measured.
+    """Measured angle of one run.
 
     Attributes
     ----------
     title : str
-        What stands above its panel.
+        Title of the panel.
     time, angle : ndarray, shape (n,)
         Time since the run began in s, measured angle in rad, not wrapped.
     """
@@ -45,7 +45,7 @@ class RunPanel:
 
 
 def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
-    """Return a panel a run, measured angle against time."""
+    """Return one panel per run, measured angle against time."""
     columns = min(len(runs), 2 if len(runs) <= COLUMNS else 3)
     rows = -(-len(runs) // columns)
     panels = []
@@ -62,7 +62,7 @@ def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
 
 
 def _curve(run: RunPanel) -> tuple[Floats, Floats]:
-    """Return the line of a record: broken where samples are lost, thinned where there are many."""
+    """Return the line of a record: broken at lost samples, thinned if it has many."""
     time, theta = run.time, run.angle
     if time.size > 2 * BINS:
         return envelope(time, theta, BINS)

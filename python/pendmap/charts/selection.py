@@ -1,7 +1,7 @@
-"""Results and selections of them as they are drawn: axes rise, shares are those of what is there.
+"""Preparation of results, or selections of them, for charts: rising axes and recomputed shares.
 
-A selection that xarray makes keeps tables and attributes of the whole result, and may reverse or
-transpose its axes. Figures and recordings show what :func:`shown` makes of it.
+An xarray selection keeps the tables and attributes of the whole result, and may reverse or
+transpose its axes. :func:`shown` corrects both for figures and recordings.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 _TABLES, _COLUMNS = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "part", "trajectory")
-"""Dimensions that stand before the axes of a picture, and after them."""
+"""Dimensions before the axes of an image, and after them."""
 
 _KEYS = {"lyapunov": ("averaged",), "trajectory": ("event_time",)}
-"""Variables that rise along dimensions without a coordinate."""
+"""Rising variables along dimensions without a coordinate."""
 
 _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "basins": {"fraction": ("attractor",)},
@@ -38,26 +38,26 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
     "trajectory": {"theta": ("time",), "section_time": ("period",)},
 }
-"""Dimensions that variables of a result must have in any selection of it."""
+"""Dimensions that variables of a result must have in every selection of it."""
 
 _CELLS = {
     "basins": ("label", "settle_periods", "net_turns"),
     "bifurcation": ("up", "down"),
     "parameter_map": ("regime", "exponent"),
 }
-"""Variables over the axes of a picture."""
+"""Variables over the axes of an image."""
 
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
-"""Beginnings of the names of attributes that hold for a whole map alone."""
+"""Prefixes of attributes that hold for a whole map alone."""
 
 _BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is never converted whole
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result, or a selection of one, ready to be drawn; refuse what cannot be.
+    """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise.
 
-    Axes rise, dimensions stand in one order, and of a selection shares, tables and summary are
-    those of the part, or say that they are of the whole. Of a whole result nothing changes.
+    Axes rise and dimensions have a fixed order. For a selection, shares, tables and summary are
+    recomputed, or marked as those of the whole. A whole result is unchanged.
     """
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:
@@ -90,7 +90,7 @@ def _listed(dimensions: Iterable[Hashable]) -> str:
 
 
 def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Return the axes of a picture, rows first."""
+    """Return the axes of an image, rows first."""
     a = dataset.attrs
     axes: dict[str, tuple[str, ...]] = {
         "basins": ("velocity", "theta"),
@@ -106,7 +106,7 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def _rising(dataset: xr.Dataset, keys: tuple[str, ...]) -> xr.Dataset:
-    """Return a dataset whose coordinates of numbers, and those of kinds, rise."""
+    """Return a dataset in which numeric and kind coordinates rise."""
     numbers = [
         name for name in dataset.indexes if name == "kind" or dataset[name].dtype.kind in "iuf"
     ]
@@ -118,7 +118,7 @@ def _rising(dataset: xr.Dataset, keys: tuple[str, ...]) -> xr.Dataset:
 
 
 def _basins(dataset: xr.Dataset) -> xr.Dataset:
-    """Count the cells of a part of a basin map anew."""
+    """Recompute the shares of a part of a basin map from its cells."""
     label, settle = dataset["label"].values, dataset["settle_periods"].values
     whole = int(dataset.attrs["cells"])
     ids = dataset["id"].values.astype(int)
@@ -149,7 +149,7 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
-    """Count the cells of a part of a map over two parameters anew."""
+    """Recompute the shares of a part of a map over two parameters from its cells."""
     regime = dataset["regime"]
     whole = int(dataset.attrs["cells"])
     if "set" in dataset.indexes:
@@ -167,10 +167,10 @@ def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
-    """Keep the attractors and points at the values that are there."""
+    """Keep the attractors and points at the selected values."""
     name = str(dataset.attrs["varied"])
     values = dataset[name].values
-    if "entry_value" not in dataset:  # of an earlier version, and whole
+    if "entry_value" not in dataset:  # from an earlier version, and whole
         return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
     if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
         raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
@@ -178,7 +178,7 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)
     loose = np.isin(dataset["loose_value"].values, values)
-    # The last place is that of no entry, -1.
+    # The last entry is for -1, no attractor.
     new = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
     part = dataset.isel(entry=kept, point=kept[owner], loose=loose)
     part = part.assign(
@@ -192,7 +192,7 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _tongues(dataset: xr.Dataset) -> xr.Dataset:
-    """Keep the critical points at the frequencies that are there."""
+    """Keep the critical points at the selected frequencies."""
     omega = dataset["omega"].values
     for prefix in ("", "undamped_", "inverted_"):
         table = prefix.removesuffix("_") or "critical"
@@ -205,14 +205,14 @@ def _tongues(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _trajectory(dataset: xr.Dataset) -> xr.Dataset:
-    """Keep the points of the section that are within the times that are there."""
+    """Keep the points of the section within the selected times."""
     first, last = (float(dataset["time"].values[end]) for end in (0, -1))
     at, slack = dataset["section_time"].values, 1e-9 * max(abs(first), abs(last))
     return dataset.isel(period=(at >= first - slack) & (at <= last + slack))
 
 
 def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
-    """Return where the rows of a table with these numbers stand; -1 of -1, which is none."""
+    """Return the positions of numbers in a table; -1 for -1, which means none."""
     own = dataset[table].values
     place = np.searchsorted(own, numbers)
     found = own[np.minimum(place, own.size - 1)] == numbers if own.size else numbers < 0
@@ -222,7 +222,7 @@ def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.N
 
 
 def _told(part: xr.Dataset, which: str) -> xr.Dataset:
-    """Say in the summary what is shown, and that what follows is of the whole."""
+    """Add to the summary which part is shown, and that the remaining text is about the whole."""
     spans = [
         f"{name} = {low:.6g} to {high:.6g}"
         for name in reversed(_axes(part))

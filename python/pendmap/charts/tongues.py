@@ -1,4 +1,4 @@
-"""Critical curves: lines joined from frequency to frequency, and where rest is stable."""
+"""Critical curves: lines joined from frequency to frequency, and regions of stable rest."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _CURVES: Final = {
     -1: ("minus", "exact, multiplier \N{MINUS SIGN}1 (period 2)", "#0072b2", "#56b4e9"),
     1: ("plus", "exact, multiplier +1 (period 1)", "#d55e00", "#e69f00"),
 }
-"""By multiplier: path, name and colours of hanging and inverted rest's curves; +1 has solutions of
-the drive's period, -1 of twice that."""
+"""Path, name and colours of the curves of hanging and inverted rest, by multiplier; +1 has
+solutions of the drive's period, -1 of twice that."""
 _STABLE, _INVERTED, _FOLD = "#e3ecd8", "#9a6fb0", "#009e73"
 _ROOTS: Final = {"omega-p": ("tongues", ""), "e-alpha2": ("paper", "")}
-"""Where a recording has the planes."""
+"""Path and title of each plane in a recording."""
 _DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}  # Parameters that vary
 
 _SQUARED = "\N{SUPERSCRIPT TWO}"
@@ -45,13 +45,13 @@ _NAMES = {
     ),
 }
 
-_PARTED = 0.3  # Asymptotic curves that err more are not drawn: they say nothing there
+_PARTED = 0.3  # Error above which an asymptotic curve is not drawn
 
-_TIP = 0.6  # An undamped tongue goes down to its tip from below this amplitude
+_TIP = 0.6  # Amplitude below which an undamped tongue is extended to its tip
 
 _JUMP = 0.6
-"""Lines are joined over a change of p, between two frequencies, of at most this part of the mean
-``p`` and a little."""
+"""Largest change of p between two frequencies over which lines are joined, over the mean ``p`` plus
+0.3."""
 
 
 def chart(
@@ -64,7 +64,7 @@ def chart(
 ) -> Chart:
     """Return the critical curves in both planes; a figure shows one of them.
 
-    ``marks`` are points ``(p, omega, name)`` that stand for the pendulum's own.
+    ``marks`` are points ``(p, omega, name)`` drawn instead of the pendulum's own.
     """
     del cells
     first = layer or str(dataset.attrs.get("plane", PLANES[0]))
@@ -87,7 +87,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     x, top = window(omega, p_max, plane)
 
     def to(points: Floats) -> Floats:
-        """From (omega, p) to the plane."""
+        """Return points (omega, p) in the coordinates of the plane."""
         return np.stack(in_plane(points[..., 0], points[..., 1], plane), axis=-1)
 
     def curves(found: list[list[tuple[float, int]]], m: int) -> tuple[Floats, Floats]:
@@ -105,7 +105,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     ]
     inverted = _stable(omega, dataset, "inverted_", np.zeros_like(first), p_max)
     if inverted:
-        # A hatch shows what lies below it, and no seams.
+        # A hatch leaves the area below it visible, and has no seams.
         drawn.append(
             Areas(
                 [to(area) for area in inverted],
@@ -155,7 +155,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
 
 
 def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mark]:
-    """Return the asymptotic curves, thin where they part from the exact ones."""
+    """Return the asymptotic curves, thin where they differ from the exact ones."""
     omega, error = dataset["omega"].values, dataset["asymptotic_error"].values
     drawn: list[Mark] = []
     for k, (name, look) in enumerate(zip(dataset["curve"].values, ("-.", "--", ":"), strict=False)):
@@ -188,7 +188,7 @@ def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
 
 
 def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tuple[float, int]]]:
-    """Return amplitude and multiplier of each critical point, frequency by frequency."""
+    """Return amplitude and multiplier of the critical points of each frequency."""
     found: list[list[tuple[float, int]]] = [[] for _ in range(count)]
     columns = (dataset[f"{prefix}{name}"].values for name in ("index", "p", "multiplier"))
     for index, p, multiplier in zip(*columns, strict=True):
@@ -199,8 +199,8 @@ def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tupl
 def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
     """Return the lines through the points with this multiplier.
 
-    Counted from below, the two boundaries of a tongue keep their places; where the count changes
-    from one frequency to the next, neighbours are the nearest.
+    Counted from below, the two boundaries of a tongue keep their order; if the count changes from
+    one frequency to the next, the nearest points are joined.
     """
     open_: list[list[tuple[float, float]]] = []
     done: list[list[tuple[float, float]]] = []
@@ -227,7 +227,7 @@ def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int)
                 ended.append(line)
         done += _paired(ended)
         begun = [[(w, p)] for j, p in enumerate(values) if j not in used]
-        # Two that begin next to one another turn back between the frequencies.
+        # Two neighbouring lines that begin here are one curve that turns back between frequencies.
         for lower, upper in itertools.pairwise(begun if w > omega[0] else []):
             if _tip(lower[0], upper[0]) and len(lower) == 1:
                 upper.insert(0, lower[0])
@@ -236,14 +236,14 @@ def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int)
 
 
 def _tip(a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Whether two points at one frequency are next to a place where a curve turns back."""
+    """Return whether two points at one frequency lie next to a turning point of a curve."""
     return abs(a[1] - b[1]) < _JUMP * (0.3 + (a[1] + b[1]) / 2)
 
 
 def _paired(
     ended: list[list[tuple[float, float]]],
 ) -> list[list[tuple[float, float]]]:
-    """Join lines that end at one frequency next to one another: the curve turns back there."""
+    """Join neighbouring lines that end at one frequency, at which a curve turns back."""
     done: list[list[tuple[float, float]]] = []
     for line in sorted(ended, key=lambda one: one[-1][1]):
         if done and done[-1][-1][0] == line[-1][0] and _tip(done[-1][-1], line[-1]):
@@ -254,9 +254,9 @@ def _paired(
 
 
 def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
-    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, where a line goes round it.
+    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it.
 
-    There the linear equation without drive has the multiplier ``(-1)^k``, whatever the model.
+    At the tip the linear equation without drive has the multiplier ``(-1)^k``, for any model.
     """
     spacing = float(np.diff(omega).max())
     for k in range(1 if multiplier < 0 else 2, 9, 2):
@@ -272,11 +272,11 @@ def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
 
 
 def _ahead(line: list[tuple[float, float]], w: float) -> float:
-    """Where a line would be at the next frequency."""
+    """Return the extrapolation of a line to the next frequency."""
     if len(line) == 1:
         return line[-1][1]
     (w0, p0), (w1, p1) = line[-2:]
-    if w0 == w1:  # begun where a curve turns back
+    if w0 == w1:  # it begins at a turning point of a curve
         return p1
     return p1 + (p1 - p0) * (w - w1) / (w1 - w0)
 
@@ -290,8 +290,8 @@ def _stable(
 ) -> list[Floats]:
     """Return quadrangles between neighbouring frequencies in which rest is stable.
 
-    Between the same curves strips follow one another in their order, however steep they are; where
-    a curve begins or ends, those that overlap.
+    Between two frequencies with equal curves, strips are matched in order, however steep; otherwise
+    all overlapping ones are joined.
     """
     names = (f"{prefix}{name}" for name in ("index", "p", "multiplier", "stable_above"))
     index, p, multiplier, above = (dataset[name].values for name in names)
@@ -314,7 +314,7 @@ def _stable(
     for k in range(omega.size - 1):
         here, there = omega[k], omega[k + 1]
         before, after = intervals[k], intervals[k + 1]
-        # Those that go beyond p_max on one side are the last.
+        # Curves that exceed p_max at one of the frequencies come last.
         shared = min(len(curves[k]), len(curves[k + 1]))
         same = curves[k][:shared] == curves[k + 1][:shared] and len(before) == len(after)
         for a, b in zip(before, after, strict=True) if same else itertools.product(before, after):

@@ -1,4 +1,4 @@
-"""One trajectory: time history, energy, phase plane, Poincare section."""
+"""Chart of one trajectory: time history, energy, phase plane, Poincare section."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
 
 LATE: Final = 0.2
-"""The last share of a trajectory, drawn dark, so that what it settles to stands out."""
-FLAT: Final = 0.1  # Range in rad under which a history counts as a straight line
+"""Last share of a trajectory, drawn dark: the motion after the transient."""
+FLAT: Final = 0.1  # Range below which a history is drawn as a straight line, rad
 SIZES: Final = ((500, 2.6), (20_000, 1.3), (math.inf, 0.6))
-"""Sizes of the points of a section by the number of points up to which they hold."""
-UPSIDE_DOWN: Final = 2.0  # Energy over m g l of a pendulum that rests upside down
+"""Sizes of the points of a section by the greatest number of points for each."""
+UPSIDE_DOWN: Final = 2.0  # Energy over m g l of a pendulum at rest in the inverted position
 MOST_DRAWN: Final = 20_000
-"""Bins of a curve against time that is drawn by its lowest and highest values."""
+"""Bins of a curve against time, drawn by its lowest and highest values."""
 MOST_PERIODS: Final = 200
-"""Periods of which the phase curve is drawn whole; of more, the last half of this number."""
+"""Number of periods above which only the last half of this number is drawn in the phase plane."""
 _SIZES: Final = {"history": (8.6, 3.6), "energy": (8.6, 3.6)}  # Inches of a figure of one part
 _EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return the four parts; curves are dark where they are late."""
+    """Return the four parts; late parts of curves are dark."""
     del cells
     attrs, units = dataset.attrs, Units.of(dataset.attrs)
     start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
@@ -74,14 +74,14 @@ def _wide(values: Floats) -> tuple[float, float]:
 def _energy(dataset: xr.Dataset, clock: Axis) -> Panel:
     values = energy(dataset["theta"].values, dataset["velocity"].values, dataset.attrs)
     marks, ends, title = _against_time(dataset, values), _wide(values), "energy"
-    if ends[0] < UPSIDE_DOWN < ends[1]:  # above it, it can go over the top
+    if ends[0] < UPSIDE_DOWN < ends[1]:  # above it the pendulum can rotate
         marks.append(Level(UPSIDE_DOWN, colour=QUIET, width=0.8, dash=(4.0, 3.0), order=0.0))
         title = "energy (dashed: upside down at rest)"
     return Panel("energy", title, clock, Axis("E / (m g l)", ends), marks)
 
 
 def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
-    """Return a curve against time, its last part dark; a long one by its lowest and highest."""
+    """Return a curve against time, its last part dark; a long one by its extremes per bin."""
     time = dataset["time"].values
     late = _late(time)
     parts = ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE))
@@ -92,7 +92,7 @@ def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
 
 
 def resting(dataset: xr.Dataset) -> Floats:
-    """Return when friction holds the pendulum within the times shown, from and to, shape (n, 2)."""
+    """Return the sticking intervals within the times shown, from and to, shape (n, 2)."""
     if "event_kind" not in dataset:
         return np.empty((0, 2))
     kinds, times = dataset["event_kind"].values, dataset["event_time"].values

@@ -1,4 +1,4 @@
-"""Where model and measurement disagree, and why."""
+"""Diagnosis of discrepancies between a model and measurements."""
 
 from __future__ import annotations
 

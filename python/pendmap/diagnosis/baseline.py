@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import DataSplit
 
 POOR: Final = 0.1
-"""Residual, over the standard deviation of the angle, above which a fit went astray."""
+"""Residual, over the standard deviation of the angle, above which a fit does not follow it."""
 
 
 def fit_baseline(
@@ -38,9 +38,9 @@ def fit_baseline(
     """Fit the given model, and the physical core (None if the given model has it).
 
     The given model is ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -Tr sign(th')`` by default.
-    Of another one the natural frequency, viscous damping and sizes of effects are fitted, Coulomb
-    friction and a constant torque only if it has them. The core adds ``q th' abs(th')`` and the
-    sensor's zero, but no effects of ``without``. Each is fitted from the other's motion too.
+    For another model the natural frequency, viscous damping and sizes of effects are fitted,
+    Coulomb friction and a constant torque only if it has them. The core adds ``q th' abs(th')`` and
+    the sensor's zero, except effects in ``without``. Each is also fitted from the other's motion.
     Damping may be negative, since a bound stalls the fit.
     """
     if model is not None:
@@ -72,16 +72,16 @@ def fit_baseline(
 
 
 def follows(data: DataSplit, fitted: FittedModel) -> bool:
-    """Whether a model follows the motion, whatever its residuals lack."""
+    """Return whether a model follows the motion: whether its residual is small over the angle."""
     scatter = np.mean([float(np.std(run.theta)) for run in data.fitted])
     return fitted.fit.rms <= POOR * float(scatter)
 
 
 @none_if_diverged
 def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
-    """Return the fit started from a fit to all samples, where stretches are held back, else None.
+    """Return a fit started from a fit to all samples if stretches are held back, else None.
 
-    A fit through gaps goes astray more easily. The returned fit does not use what is held back.
+    A fit with gaps fails more easily. The returned fit does not use the stretches held back.
     """
     if not data.inside:
         return None
@@ -95,7 +95,7 @@ def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | 
 
 
 def _unfolded(model: Rig) -> Rig:
-    """Return a model with effects that equal one of its own parameters replaced by these."""
+    """Return a model with effects that equal a parameter of the rig replaced by it."""
     own, effects = {}, []
     for effect in model.effects:
         name = own_name(effect.name)
@@ -107,7 +107,7 @@ def _unfolded(model: Rig) -> Rig:
 
 
 def _start(data: DataSplit) -> Rig:
-    """Return a start from the longest free run that shows one; raises InputError without any."""
+    """Return initial values from the longest free run that yields them, else raise InputError."""
     known = data.experiment.w0
     free = [(run, k) for run, k in zip(data.fitted, data.fitted_of, strict=True)]
     free = [(run, k) for run, k in free if not run.forced]

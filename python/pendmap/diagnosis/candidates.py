@@ -1,4 +1,4 @@
-"""Candidates: effects of the library, or of the user's own, as a search tries them."""
+"""Candidates: effects of the library or of the user, each with a shape."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 ZERO: Final = "encoder_offset"
-"""The sensor's zero: no property of the pendulum, it does not count among the effects."""
+"""The sensor's zero: it is no property of the pendulum and is not counted among the effects."""
 
 CORE: Final = (DRAG, ZERO)
-"""Effects of the physical core beside viscous damping and Coulomb friction."""
+"""Effects of the physical core in addition to viscous damping and Coulomb friction."""
 
 COMMON: Final = (*CORE, "encoder_gain", "bias_torque")
 """Effects of nearly every rig, the commonest first; all others follow in the library's order."""
 
 SCANNED: Final = 6
-"""Scored values of a shape parameter, in equal ratios over its typical range, or in the middles of
-equal parts where that includes 0."""
+"""Number of scored values of a shape parameter, in equal ratios over its typical range, or in the
+middles of equal parts of a range that includes 0."""
 
 SOUGHT: Final = 1000
-"""Values of a frequency or an instant among which the residuals choose those that are scored."""
+"""Number of frequencies or instants among which residuals choose those that are scored."""
 
-MODES: Final = 3  # Scored values of a mode's frequency; a fast mode needs short steps
+MODES: Final = 3  # Number of scored frequencies of a mode; a fast mode needs short steps
 
-PLACES: Final = 9  # Scored places on the circle, in equal steps
+PLACES: Final = 9  # Number of scored places on the circle, in equal steps
 
 FAINT: Final = 1e-12
 """Nondimensional size at which an effect with a phase is scored: not 0, and far below what any
@@ -50,9 +50,9 @@ record shows, even after growth by a factor of a million in chaotic motion."""
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """An effect of the library, or of the user's own, with a shape."""
+    """An effect of the library or of the user, with a shape."""
 
-    name: str  # The effect
+    name: str  # Name of the effect
     # Values of parameters that are neither size nor phase, nondimensional.
     shape: Mapping[str, float] = dataclasses.field(default_factory=dict)
     formula: Formula | None = None  # Of the user's own effect
@@ -77,20 +77,20 @@ class Candidate:
 
     @property
     def free(self) -> list[str]:
-        """Names of its size and its phase in a fit."""
+        """Names of its size and phase in a fit."""
         own = own_name(self.name)
         names = [self.size] if self.phase is None else [self.size, self.phase]
         return [own] if own else [f"{self.name}.{name}" for name in names]
 
     @property
     def adapted(self) -> list[str]:
-        """Names in a fit of the shape parameters that are fitted with its size: not integers."""
+        """Names in a fit of the shape parameters fitted with its size, without integers."""
         orders = [entry["name"] for entry in self._of_role("order")]
         return [f"{self.name}.{name}" for name in self.shape if name not in orders]
 
     @property
     def exponents(self) -> dict[str, str]:
-        """Exponents of its shape by the sizes whose units depend on them."""
+        """Exponents of its shape, by the sizes whose units depend on them."""
         less = {e["name"]: e["power_of_w0_less"] for e in self.definition["parameters"]}
         pairs = {f"{self.name}.{size}": f"{self.name}.{power}" for size, power in less.items()}
         return {size: power for size, power in pairs.items() if power in self.adapted}
@@ -102,7 +102,7 @@ class Candidate:
 
     @property
     def sought(self) -> dict[str, Any] | None:
-        """Entry of the frequency or instant, which residuals show before any fit."""
+        """Entry of the frequency or instant that residuals show before any fit."""
         return next(iter(self._of_role("frequency", "instant")), None)
 
     @property
@@ -126,7 +126,7 @@ class Candidate:
         return len(self.free) + len(self.shape)
 
     def effect(self, units: Units, size: float = 0.0) -> Effect:
-        """Return the effect with a size, nondimensional; a phase keeps the size above 0."""
+        """Return the effect with a nondimensional size; with a phase the size is never 0."""
         bare = dict(self.shape) | {self.size: size}
         if self.phase is not None:
             bare |= {self.size: size or FAINT, self.phase: 0.0}
@@ -140,7 +140,7 @@ class Candidate:
 
 
 def count_choices(pool: Collection[Candidate]) -> dict[str, int]:
-    """Return the number of shapes among which the best is chosen, by effect."""
+    """Return the number of shapes to choose from, by effect."""
     shapes = Counter(candidate.name for candidate in pool)
     return {c.name: max(shapes[c.name], c.choices) for c in pool}
 
@@ -167,9 +167,9 @@ def add_candidates(model: Rig, added: Sequence[Candidate]) -> Rig:
 
 
 def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
-    """Return a user's own candidates, checked.
+    """Return a user's own candidates after checks.
 
-    Raises InputError if one is no formula, is given twice, or is not proportional to its first
+    Raises InputError if one is not a Formula, is given twice, or is not proportional to its first
     parameter.
     """
     formulas = []
@@ -202,7 +202,7 @@ def list_candidates(
 ) -> list[list[Candidate]]:
     """Return the candidates by effect, each in all its shapes.
 
-    Effects equivalent to those in ``taken``, names of effects and of a Rig's fitted parameters, and
+    Effects equivalent to those in ``taken`` (names of effects and of a Rig's fitted parameters) and
     those in ``without`` are left out. Effects of the drive need a harmonic drive.
     """
     formulas = {formula.name: formula for formula in own}

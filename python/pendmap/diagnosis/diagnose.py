@@ -1,4 +1,4 @@
-"""The diagnosis: from records to the effects that a model lacks."""
+"""Diagnosis of records: the effects that a model lacks."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     model : Rig, optional
         The baseline; by default viscous damping and Coulomb friction.
     max_effects : int
-        Most effects that are added; the sensor's zero does not count.
+        Most effects that are added; the sensor's zero is not included.
     without : collection of str
-        Effects that are no candidates.
+        Effects excluded from the candidates.
     effects : collection of Formula and TorqueFunction
         Further candidates: formulas are treated like the library's effects, Python functions to
         first order.
     thresholds : Thresholds, optional
-        The numbers that decide.
+        Thresholds of all decisions.
     progress : callable, optional
         Called with the number of steps done and the number of all steps.
 
@@ -91,7 +91,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     check_functions(data.runs, functions)
     with _refuse_divergence(experiment):
         base, core = fit_baseline(data, model, without)
-    # Windows are as long as the baseline followed the runs.
+    # Windows are as long as those over which the baseline followed the runs.
     data = dataclasses.replace(data, fitted=base.runs)
     report(1, steps)
     state = State(data, base, thresholds or Thresholds(), max_effects, without, own=own)
@@ -151,7 +151,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
 @contextlib.contextmanager
 def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
-    """Turn the divergence of a fit that the verdict needs into an error of the records."""
+    """Convert FitDiverged into InputError with the path of the experiment."""
     try:
         yield
     except FitDiverged as error:
@@ -162,12 +162,13 @@ def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
 
 
 def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
-    """Return the model of a diagnosis with the notes of its file.
+    """Return the model of a diagnosis with the notes for its file.
 
-    Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` holds that of all
-    fitted parameters, widened like the intervals, and in ``between_runs`` the standard deviation of
-    each parameter that differs between runs by more than its error. ``[provenance]`` holds the
-    records with their SHA-256, the version, the command, the verdict and coefficients fixed at 0.
+    Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` is the covariance
+    of all fitted parameters, widened like the intervals, and has in ``between_runs`` the standard
+    deviation of each parameter that differs between runs by more than its error. ``[provenance]``
+    holds the records with their SHA-256, the version, the command, the verdict and coefficients
+    fixed at 0.
 
     Parameters
     ----------
@@ -185,7 +186,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     model = fit.model
     covariance = found.best.fitted.widening * fit.covariance
     named = {effect.name: effect.effect for effect in found.effects}
-    # An effect that is a parameter of the rig is an effect in the file.
+    # An effect that is a parameter of the rig is written as an effect.
     own = {
         rig: f"{name}.{next(iter(effect.parameters))}"
         for name, effect in named.items()

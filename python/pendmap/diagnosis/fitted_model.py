@@ -31,15 +31,15 @@ Found = TypeVar("Found")
 
 MOST_STEPS: Final = 40  # Most steps of a fit
 
-QUICK: Final = 4.0  # Growth of windows from stage to stage of a fit
+QUICK: Final = 4.0  # Growth factor of windows between stages of a fit
 
 LITTLE: Final = 0.05
-"""Promised fall of the sum of squares, over one reading's, below which a fit ends."""
+"""Promised fall of the sum of squares, over one independent reading's, below which a fit ends."""
 
 LEAST_LEVEL: Final = 0.5  # Least variance of noise over the stated variance of its readings
 
 EXACT: Final = 1e-3
-"""Promised fall of the sum of squares, over one reading's, below which a fit has converged."""
+"""Promised fall of the sum of squares, over one independent reading's, of a converged fit."""
 
 FEW_STEPS: Final = 12  # Most steps of a candidate's fit; the right candidate needs about five
 
@@ -56,19 +56,19 @@ STRETCH: Final = 2.0  # Factor by which a width may leave its typical range
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A model fitted to records; equal to itself alone."""
+    """A model fitted to records; compared by identity."""
 
     fit: TrajectoryFit  # To the records that are not held back
-    free: tuple[str, ...]  # Fitted parameters, as in fit_runs
+    free: tuple[str, ...]  # Names of the fitted parameters, as in fit_runs
     chosen: tuple[Candidate, ...]  # Effects added to the baseline
     runs: tuple[FitRun, ...]  # Fitted records
     floors: tuple[float, ...]  # Share of rounding in the variance of each run's noise
-    # Coefficients that were negative and are fixed at 0; a larger model frees them again.
+    # Coefficients with negative estimates, fixed at 0; a larger model frees them again.
     zeroed: tuple[str, ...] = ()
 
     @functools.cached_property
     def noise(self) -> ResidualNoise:
-        """Noise of the residuals, and what exceeds it."""
+        """Noise of the residuals, and their excess over it."""
         return estimate_noise(self.fit, self.runs, len(self.fit.names), self.floors)
 
     @property
@@ -80,8 +80,8 @@ class FittedModel:
     def level(self) -> float:
         """Sum of squares of one independent reading.
 
-        The greater of the noise's spectral density where the motion is, and of the sum of squares
-        over the number of independent readings among the residuals.
+        It is the greater of the noise's spectral density at the frequencies of the motion, and of
+        the sum of squares over the number of independent readings among the residuals.
         """
         noise = self.noise
         return max(noise.level, self.chi2 / max(noise.independent, 1.0), LEAST_LEVEL)
@@ -98,7 +98,7 @@ class FittedModel:
 
     @property
     def taken(self) -> set[str]:
-        """Effects of the model, and those of its own parameters that are fitted."""
+        """Names of the model's effects and of its fitted parameters."""
         own = {name.partition("[")[0] for name in self.free}
         return {effect.name for effect in self.fit.model.effects} | own
 
@@ -163,7 +163,7 @@ def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
 
 
 def none_if_diverged(fit: Callable[Given, Found]) -> Callable[Given, Found | None]:
-    """Return a function that returns None where a fit diverges."""
+    """Return a function that returns None if a fit diverges."""
 
     @functools.wraps(fit)
     def attempt(*given: Given.args, **named: Given.kwargs) -> Found | None:
@@ -189,7 +189,7 @@ def fit_again(  # noqa: PLR0913 (what changes, and when the fit ends)
     least_gain: float = 1e-3,
     target: float = math.inf,
 ) -> FittedModel:
-    """Fit a model, with what is given changed, from its parameters and windows."""
+    """Fit a model again, with the given arguments changed, from its parameters and windows."""
     return fit_model(
         data,
         fitted.fit.model if model is None else model,
@@ -205,7 +205,7 @@ def fit_again(  # noqa: PLR0913 (what changes, and when the fit ends)
 
 
 def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel | None:
-    """Return a fit continued until it has converged."""
+    """Return a fit continued to convergence; None if it diverges."""
     if fitted.fit.converged:
         return fitted
     return fit_again(data, fitted, zeroed=fitted.zeroed, least_gain=EXACT * level)
@@ -279,12 +279,12 @@ def _adjust_exponents(
 def impose_physics(
     data: DataSplit, fitted: FittedModel, target: float = math.inf
 ) -> FittedModel | None:
-    """Return a fit whose coefficients are physically possible; None where the effects have none.
+    """Return a fit with physically possible coefficients; None if an effect is impossible.
 
     Negative viscous damping and Coulomb friction are fixed at 0, and the others fitted again. An
     added effect must oppose the motion where its kind does, must not drive it by a drift or an
     asymmetry greater than the coefficient, must last longer than a swing and no longer than the
-    records, and must have a width near its typical range. A fit far above ``target`` is given up.
+    records, and must have a width near its typical range. A fit far above ``target`` is abandoned.
     """
     while negative := [n for n in OPPOSING if n in fitted.fit.estimates and fitted.fit[n] < 0]:
         zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
@@ -305,7 +305,7 @@ def impose_physics(
 
 
 def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> bool:
-    """Whether the size and shape of an effect are physically possible."""
+    """Return whether the size and shape of an effect are physically possible."""
     estimates = fitted.fit.estimates
     size = estimates.get(candidate.free[0])
     if size is None:
@@ -338,7 +338,7 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
 def _drains(
     fitted: FittedModel, candidate: Candidate, entry: dict[str, Any], error: float, end: float
 ) -> bool:
-    """Whether damping or friction stays positive with a drift or an asymmetry of it."""
+    """Return whether damping or friction stays positive with a drift or an asymmetry of it."""
     if candidate.definition["group"] != "damping" or entry["typical"][0] >= 0:
         return True
     drifts = candidate.definition["mappable"] == "frozen"
@@ -355,9 +355,9 @@ def _drains(
 
 
 def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
-    """Return the root mean square residual of a model in each fitted run, rad.
+    """Return the root mean square residual of a model in each fitted run, rad, or 0.
 
-    0 where noise explains it: where the mean of squared residuals over squared standard errors is
+    It is 0 if noise explains it: if the mean of squared residuals over squared standard errors is
     at most ``1 + 4 sqrt(2 / N + 4 r^2)``, with the relative error ``r`` of the noise.
     """
     errors = []
@@ -375,7 +375,7 @@ def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
 
 
 def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:
-    """Return records whose standard errors are a model's errors, where these are not 0.
+    """Return records whose standard errors are a model's errors, if these are not 0.
 
     With the weights of noise alone, an erring model would follow the readings with the least noise
     and miss the others. Stretches held back have the error of their run; a whole run held back has

@@ -1,7 +1,7 @@
 """Candidates that are Python functions: scored to first order, never fitted.
 
 The kernel cannot call a function that looks up a table or a trained model. Sampled along a fitted
-motion, its torque moves the readings, to first order, by the integral of
+motion, its torque changes the readings, to first order, by the integral of
 :mod:`pendmap.residuals.torque`. With that response ``x``, over the standard errors and orthogonal
 to the fitted parameters and initial states, and the residuals ``r``, the size is ``x' r / x' x``
 and the sum of squares falls by ``(x' r)^2 / x' x``.
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 UNSEEN: Final = 1e-4
-"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which the
-records do not show a torque."""
+"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which a torque
+is undetectable."""
 
 VISITED: Final = (0.05, 0.95)
-"""Quantiles of readings and their differences that the motion reaches despite noise."""
+"""Quantiles to which angles and velocities are clipped in a check: noise exceeds them."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TorqueFunction:
-    """A candidate of a diagnosis whose torque a Python function returns.
+    """A candidate effect whose torque is a Python function.
 
     It is fitted to first order only, never named, and cannot be part of a model, a trajectory or a
     map. For arithmetic functions :meth:`pendmap.Formula.of` makes a candidate without these limits.
@@ -48,7 +48,7 @@ class TorqueFunction:
     Parameters
     ----------
     name : str
-        Its name.
+        Name of the effect.
     function : callable
         ``function(theta, v, t, phase, parameters)`` of arrays of one length in SI: angle (rad, not
         wrapped), velocity (rad/s), time in the laboratory (s), phase of the harmonic drive (rad,
@@ -59,7 +59,7 @@ class TorqueFunction:
     Raises
     ------
     InputError
-        If the name is no text, the function not callable, or a parameter no number.
+        If the name is not a string, the function not callable, or a parameter not a number.
 
     Examples
     --------
@@ -109,17 +109,17 @@ class TorqueFunction:
 
 @dataclasses.dataclass(frozen=True)
 class FunctionScore:
-    """Score of a function, to first order."""
+    """First-order score of a function."""
 
     name: str  # Of the function
-    size: float  # Factor of its torque; NaN where the records do not show it
+    size: float  # Factor of its torque; NaN if the torque is undetectable
     stderr: float  # Standard error of the size
     gain: float  # Fall of the sum of squares at the baseline, over the noise's level
-    left: float  # Fall of the sum of squares at the best model, beside the effects found
+    left: float  # Fall of the sum of squares at the best model, in addition to its effects
 
 
 def separate_functions(effects: object) -> tuple[list[TorqueFunction], list[Any]]:
-    """Return a user's candidates, functions and all others; raises InputError."""
+    """Return the functions among a user's candidates, and all others; raise InputError."""
     if not isinstance(effects, list | tuple):
         shown = short_repr(effects)
         raise InputError(f"effects must be a list of Formula and TorqueFunction, got {shown}")
@@ -128,10 +128,10 @@ def separate_functions(effects: object) -> tuple[list[TorqueFunction], list[Any]
 
 
 def check_functions(runs: Iterable[Run], functions: Sequence[TorqueFunction]) -> None:
-    """Call functions along the records, to report their errors before any fit.
+    """Evaluate functions along the records, to report their errors before any fit.
 
-    Angles and velocities of exactly 0, which only readings in counts keep, are left out, since a
-    function may be undefined there.
+    Angles and velocities of exactly 0, which occur in quantised readings only, are left out, since
+    a function may be undefined there.
     """
     for run in runs if functions else ():
         time, theta = run.time[run.trusted], run.theta[run.trusted]

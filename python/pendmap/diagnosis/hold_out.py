@@ -1,4 +1,4 @@
-"""A fitted model evaluated on the records held back."""
+"""Evaluation of a fitted model on the records held back."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel, Windows
     from pendmap.identification.runs import FitRun
 
-FOLDS: Final = 5  # Folds of stretches left out in turn; two fixed stretches alone depend on chance
+FOLDS: Final = 5  # Number of folds of stretches; two fixed stretches alone depend on chance
 
 
 @dataclasses.dataclass(frozen=True)
 class HoldOut:
-    """A model on the records held back, with its parameters fixed."""
+    """A model evaluated on the records held back, with fixed parameters."""
 
     chi2: float  # Sum of squared residuals over standard errors, initial states fitted
     degrees: int  # Samples less fitted numbers
@@ -33,7 +33,7 @@ class HoldOut:
 def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     """Evaluate a model on the records held back.
 
-    Whole runs have new initial states; stretches within fitted runs are passed by the fitted
+    Whole runs have new initial states; stretches within fitted runs are compared with the fitted
     motion, without any step of a fit.
     """
     model = fitted.fit.model
@@ -48,7 +48,7 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
         return HoldOut(fit.chi2, max(fit.samples, 1), fit)
     free = fitted.free
     if not any(run.forced for run in data.held):
-        # Effects of the drive have no part in free decays.
+        # Effects of the drive do not act in free decays.
         drives = {e.name for e in model.effects if e.drives}
         free = tuple(name for name in free if name.partition(".")[0] not in drives)
     fit = fit_runs(
@@ -68,11 +68,11 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
 def hold_out_losses(
     data: DataSplit, fitted: FittedModel, held: HoldOut, level: float
 ) -> tuple[float, ...]:
-    """Return the increase of the sum of squares by each held-out set, parameters fitted with it.
+    """Return the increase of the least sum of squares by adding each held-out set to the fit.
 
-    ``chi2(fitted and set) - chi2(fitted)``. The set is that of the runs held back; where stretches
-    are held back, the sum over five rotated folds of stretches, and the first and the last third of
-    the runs, which demand a forecast across amplitudes.
+    ``chi2(fitted and set) - chi2(fitted)``. The set consists of the runs held back; if stretches
+    are held back, the sets are five rotated folds of stretches (summed), and the first and the last
+    third of the runs, which require a forecast across amplitudes.
     """
     if not data.inside:
         shifted = tuple((w[0] + len(data.fitted), *w[1:]) for w in held.fit.windows)
@@ -100,8 +100,8 @@ def hold_out_losses(
 def _without(run: FitRun, number: int) -> FitRun:
     """Return a free run without a part of its readings.
 
-    A fold is two of ten stretches, half the run apart; two further parts are the first and the last
-    third.
+    A fold is two of ten stretches, separated by half the run; two further parts are the first and
+    the last third.
     """
     if run.forced:
         return run
@@ -123,7 +123,7 @@ def _chi2(
     level: float,
     phases: dict[str, float] | None = None,
 ) -> float:
-    """Return the least sum of squares of a model on other readings of the fitted motion."""
+    """Return the least sum of squares of a model on other readings, from the fitted motion."""
     try:
         return fit_runs(
             runs,

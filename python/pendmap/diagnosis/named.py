@@ -25,20 +25,20 @@ if TYPE_CHECKING:
 class NamedEffect:
     """An effect that a diagnosis names."""
 
-    name: str  # In the library
+    name: str  # Name in the library
     parameters: dict[str, float]  # SI
     ci95: dict[str, tuple[float, float]]  # 95 % intervals of fitted parameters
-    # That the name is right if the effect is in the library: its share among its alternatives,
-    # times the probability that one of them is right.
+    # Probability of the name, given that the effect is in the library: its share among its
+    # alternatives, times the probability that one of them is right.
     probability: float
-    approximate: bool  # Whether its form may be only nearly right
+    approximate: bool  # Whether its form may be right only approximately
     formula: Formula | None = None  # Of the user's own effect
-    # A mirrored place, or another frequency or instant, that fits equally well.
+    # Mirrored place, or another frequency or instant, of an equally good fit.
     elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def definition(self) -> dict[str, Any]:
-        """Entry of the library, or of the user's formula."""
+        """Entry in the library, or of the user's formula."""
         return self.effect.definition
 
     @property
@@ -57,7 +57,7 @@ def name_effects(
     profiled = compute_part(
         reasons, "effects.ci95", lambda: profile_intervals(data, best.fitted), none
     )
-    # The frequencies or instants that residuals show without the effect.
+    # Frequencies or instants that the residuals show without the effect.
     sought = {
         c.name: [
             score
@@ -100,7 +100,7 @@ def name_effects(
 def effect_values(
     best: ScoredModel, candidate: Candidate
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return an effect's parameters and errors, of an effect with a phase with positive size."""
+    """Return parameters and standard errors of an effect; with a phase its size is positive."""
     estimates = best.fitted.fit.estimates
     own = own_name(candidate.name)
     if own is not None:

@@ -1,4 +1,4 @@
-"""Candidates fitted with a model's own parameters, and models without one of their effects."""
+"""Fits of a model with candidates added, and without one of its effects."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.thresholds import Thresholds
 
 KICK: Final = 1e-3
-"""Start of a candidate's size over the score's step: the full step leads astray far from the fit,
-and a phase needs a size above 0."""
+"""Initial size of a candidate over its score's step: the full step diverges far from the fit, and a
+phase needs a size above 0."""
 
 FAINT: Final = 5.0
-"""Size of an effect, in standard errors, up to which the covariance gives the fit without it."""
+"""Size of an effect, in standard errors, up to which covariance gives the start without it."""
 
-MIRROR_STEPS: Final = 6  # Most steps of a fit from a mirrored place that must be better
+MIRROR_STEPS: Final = 6  # Most steps of a fit from a mirrored place
 
-EQUIVALENT_STEPS: Final = 25  # Most steps of a fit from another shape that must be as good
+EQUIVALENT_STEPS: Final = 25  # Most steps of a fit from another shape, tested for equivalence
 
 Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
 
@@ -57,10 +57,10 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     places: Sequence[int],
     level: float,
 ) -> FittedModel | None:
-    """Return a model with candidates, fitted within physics; None where the fit diverges.
+    """Return a model with candidates, within physical limits; None if the fit diverges.
 
-    The fit starts at the fitted motion with sizes of nearly 0, in the shapes of the best scores,
-    and where it gains far less than the score promised again at the sizes of the score.
+    The fit starts at the fitted motion with sizes of nearly 0, in the shapes of the best scores; if
+    it gains far less than the score promised, it is repeated from the sizes of the score.
     """
     own = [scores.scores[k] for k in places]
     added = [score.candidate for score in own]
@@ -94,7 +94,7 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
 
 
 def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
-    """Return the next best shapes of a single candidate; none for exponents, found from any."""
+    """Return the next best shapes of one candidate; none with exponents, found from any start."""
     if len(places) > 1:
         return []
     one = scores.scores[places[0]]
@@ -117,7 +117,7 @@ def drop_effect(
     level: float,
     target: float = math.inf,
 ) -> FittedModel | None:
-    """Return a model without one of its effects; None where that is lost or far above ``target``.
+    """Return a model without one of its effects; None if the fit fails or is far above ``target``.
 
     The fit starts at the fitted motion, the other parameters moved by the covariance if the effect
     is small.
@@ -145,7 +145,7 @@ def drop_effect(
 
 
 def _is_faint(fitted: FittedModel, dropped: Candidate) -> bool:
-    """Whether the size of an effect is within a few standard errors of 0."""
+    """Return whether the size of an effect is within a few standard errors of 0."""
     size = dropped.free[0]
     if size not in fitted.fit.names or dropped.phase is not None:
         return False
@@ -162,7 +162,7 @@ def add_effects(
     chosen: Sequence[Candidate],
     level: float,
 ) -> FittedModel | None:
-    """Return a model with all chosen effects, from a reduced one and the values of a full one."""
+    """Return a reduced model with all chosen effects, starting from the values of a full one."""
     added = [c for c in chosen if c.name not in reduced.names]
     known = {name: full.start.get(name, 0.0) for c in added for name in c.free}
     start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
@@ -171,9 +171,9 @@ def add_effects(
 
 
 def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
-    """Return a fit with places mirrored about the rest position, where that is better.
+    """Return the best of a fit and of fits with places mirrored about the rest position.
 
-    A swinging pendulum passes ``th0`` and ``-th0`` alike; no fit changes over by itself.
+    A swinging pendulum passes ``th0`` and ``-th0`` alike; no fit moves from one to the other.
     """
     for candidate in fitted.chosen:
         for start in _mirrored(fitted, candidate):
@@ -186,9 +186,9 @@ def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
 def find_equivalents(
     data: DataSplit, fitted: FittedModel, sought: Mapping[str, Sequence[Score]]
 ) -> dict[str, dict[str, float]]:
-    """Return other shapes with which effects fit equally well, by effect.
+    """Return other shapes of equally good fits, by effect.
 
-    They are mirrored places, and the other frequencies or instants that ``sought`` has by effect.
+    They are mirrored places, and other frequencies or instants from ``sought``.
     """
     found: dict[str, dict[str, float]] = {}
     for candidate in fitted.chosen:
@@ -228,7 +228,7 @@ def _fit_from(
     start: Mapping[str, float],
     steps: int,
 ) -> FittedModel | None:
-    """Return the fit from another start of an effect; None where it diverges."""
+    """Return the fit from another start of an effect; None if it diverges."""
     own = {key.rpartition(".")[2]: value for key, value in start.items()}
     effects = tuple(
         dataclasses.replace(e, parameters={**e.parameters, **own})
@@ -243,10 +243,10 @@ def _fit_from(
 def profile_intervals(
     data: DataSplit, fitted: FittedModel
 ) -> dict[str, dict[str, tuple[float, float]]]:
-    """Return 95 % intervals of effects with a shape, from the profile of the likelihood.
+    """Return 95 % intervals of effects with a shape, from the profile likelihood.
 
-    Size and shape are strongly and nonlinearly correlated; for other effects the covariance is
-    enough.
+    Size and shape are strongly and nonlinearly correlated; for other effects the covariance
+    suffices.
     """
     wanted = {
         f"{c.name}.{name}": (c.name, name)
@@ -271,7 +271,7 @@ def profile_intervals(
         effect, name = wanted[key]
         value = found[key]
         half = Z95 * math.sqrt(fitted.widening) * (fitted.fit.estimates[key].stderr or math.inf)
-        # A profile without an end takes that of the covariance.
+        # An end that the profile does not have is taken from the covariance.
         low, high = (
             value + wider * (end - value) if math.isfinite(end) else value + side * half
             for end, side in zip(found.ends[key], (-1, 1), strict=True)

@@ -46,41 +46,41 @@ PLACES: Final[dict[str, str]] = {
     "drive_phase": "at a phase of the drive of",
     "lab_time": "at a time in the laboratory of",
 }
-"""Words before the place of a missing torque."""
+"""Text before the bin of a missing torque, by quantity."""
 
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 
-WHERE: Final = 3  # Number of places of a residual torque in the summary
+WHERE: Final = 3  # Number of bins of a residual torque in the summary
 
 RANKED: Final = 8  # Number of candidates in the table of scores
 
-MOST_EFFECTS: Final = 3  # Default of the most effects that are added
+MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Discrepancy(Readable):
-    """Where a model and records disagree, and why."""
+    """Result of a diagnosis: where a model and records disagree, and why."""
 
     data: DataSplit  # The records: fitted and held back
     base: ScoredModel  # The baseline
     best: ScoredModel  # The best model; with the verdicts ``none`` and ``unknown`` the baseline
-    nearest: ScoredModel  # The best model with any effects, claimed or not
+    nearest: ScoredModel  # The best model with any effects, accepted by the verdict or not
     assessment: Assessment  # Verdict and the statistics it is based on
     effects: tuple[NamedEffect, ...]  # The named effects
     gap: Gap  # Residuals of the baseline and of the best model
-    torque_before: Torque  # Torque that the baseline lacks
-    torque_after: Torque  # Torque that the best model lacks
-    where: list[dict[str, Any]]  # Bins in which the torque that the baseline lacks stands out
+    torque_before: Torque  # Torque missing in the baseline
+    torque_after: Torque  # Torque missing in the best model
+    where: list[dict[str, Any]]  # Bins in which the torque missing in the baseline is significant
     runs: RunByRun  # Parameters run by run
     scores: Scores  # Scores of all candidates at the baseline
     attempts: tuple[Attempt, ...]  # Candidates that were fitted
-    beside: Scores  # Scores of all others at the best model
+    beside: Scores  # Scores of the other candidates at the best model
     level: float  # Sum of squares of one independent reading
-    without: tuple[str, ...] = ()  # Effects that were no candidates
+    without: tuple[str, ...] = ()  # Effects excluded from the candidates
     most: int = MOST_EFFECTS  # Most effects that could be added
-    own: tuple[Formula, ...] = ()  # Candidates of the user's own
+    own: tuple[Formula, ...] = ()  # The user's own formulas among the candidates
     functions: tuple[FunctionScore, ...] = ()  # Scores of the user's Python functions
-    # Why a part beside the verdict was not computed, by field of the JSON; see ``not_computed``.
+    # Reasons for parts that were not computed, by field of the JSON; see ``not_computed``.
     reasons: Reasons = dataclasses.field(default_factory=dict)
 
     def definition(self, name: str) -> dict[str, Any]:
@@ -105,7 +105,7 @@ class Discrepancy(Readable):
 
     @property
     def equivalent(self) -> list[list[str]]:
-        """Classes of effects that the records do not tell apart, of each named effect."""
+        """Classes of indistinguishable effects, one for each named effect that has one."""
         if not self.effects:
             return []
         classes = (each.equivalent for each in self.assessment.identified)
@@ -113,7 +113,7 @@ class Discrepancy(Readable):
 
     @property
     def clearest(self) -> list[dict[str, Any]]:
-        """The most significant bin of each quantity; its neighbours are similar."""
+        """Most significant bin of each quantity; its neighbours are similar."""
         rows: dict[str, dict[str, Any]] = {}
         for row in self.where:
             rows.setdefault(row["over"], row)
@@ -121,24 +121,24 @@ class Discrepancy(Readable):
 
     @property
     def adds(self) -> bool:
-        """Whether the best model is not the baseline."""
+        """Whether the best model differs from the baseline."""
         return self.best is not self.base
 
     @functools.cached_property
     def not_computed(self) -> Reasons:
-        """Why a part beside the verdict was not computed, by field of the JSON object."""
+        """Reasons for parts that were not computed, by field of the JSON object."""
         for part in (self.forecasts, self.advice, self.cycles):
             del part
         return self.reasons
 
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
-        """Error of both models against the horizon, on the records held back."""
+        """Forecast error of both models against the horizon, on the records held back."""
         return compare_forecasts(self.data, self.base.fits, self.best.fits, self.reasons)
 
     @functools.cached_property
     def advice(self) -> Advice:
-        """What to record next, and the smallest effects that these records would have shown."""
+        """Recommended next record, and detection limits of effects that were not found."""
         return advise(
             self.data,
             self.best,
@@ -241,7 +241,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
 
 
 def _between(found: Discrepancy) -> Iterator[str]:
-    """Yield the parameters that differ between runs by more than their errors."""
+    """Yield a line for each parameter that differs between runs by more than its error."""
     for name in found.best.fitted.fit.names:
         between = found.runs.between(name)
         if between > 0:
@@ -253,7 +253,7 @@ def _between(found: Discrepancy) -> Iterator[str]:
 
 
 def _further(found: Discrepancy) -> Iterator[str]:
-    """Yield what to record next, and the parts that were not computed."""
+    """Yield the recommended next record, and the parts that were not computed."""
     if found.advice.next_experiment is not None:
         yield f"Next: {found.advice.next_experiment}"
     for field, reason in found.not_computed.items():
@@ -261,7 +261,7 @@ def _further(found: Discrepancy) -> Iterator[str]:
 
 
 def _unit(found: Discrepancy, effect: str, parameter: str) -> str:
-    """Return the unit of an effect's parameter; empty where it has none."""
+    """Return the unit of an effect's parameter, or an empty string."""
     return unit_of(f"{effect}.{parameter}", found.definition)
 
 
@@ -278,14 +278,14 @@ def given_out(found: ScoredModel) -> dict[str, float]:
 
 
 def confined(found: Discrepancy) -> Iterator[str]:
-    """Yield the effects of the model that no map over initial conditions can have."""
+    """Yield a line for each effect of the model that no map over initial conditions can include."""
     for effect in found.best.fitted.fit.model.effects:
         if effect.definition["mappable"] == "no":
             yield f"{effect.name}: simulate, compare and diagnose can have it; no map has it"
 
 
 def zeroed(found: Discrepancy) -> Iterator[str]:
-    """Yield the coefficients that are fixed at 0."""
+    """Yield a line for each coefficient fixed at 0."""
     for name in found.best.fitted.zeroed:
         yield f"{name} is held at 0: the fit would make it negative, and no pendulum drives itself"
 

@@ -7,7 +7,7 @@ squares falls by
 ``G = r' x (x' x)^-1 x' r``
 
 when the candidate is fitted (Rao's score test). The same matrix gives the likeness of candidates,
-the scores of pairs, and the smallest effect that the records could show.
+the scores of pairs, and the detection limits.
 
 References
 ----------
@@ -47,18 +47,18 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PASS: Final = 16  # Directions of derivatives that one pass of the integrator computes
+PASS: Final = 16  # Directions of derivatives in one pass of the integrator
 
 CONTAINS: Final = 0.99
-"""Cosine between the responses to two effects from which the one with more parameters has the other
-as a special case."""
+"""Cosine between the responses to two effects above which the one with more parameters has the
+other as a special case."""
 
 SAME: Final = 1e-6
 """Deficit of the cosine from 1 below which two candidates are one effect under two names."""
 
 UNSEEN: Final = 1e-4
-"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which the
-records do not show a candidate; rounding and the integrator's error are not far below."""
+"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which a
+candidate is undetectable; rounding and the integrator's error are not far below."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,8 +68,8 @@ class Score:
     candidate: Candidate  # Effect and shape
     gain: float  # ``G``, the expected fall of the sum of squares
     start: dict[str, float]  # Size and phase of the expected minimum, SI
-    # ``x' x`` of the size: a size ``a`` gains ``a^2`` times this, at the phase where it is least; 0
-    # where the records do not show the effect.
+    # ``x' x`` of the size: a size ``a`` gains ``a^2`` times this, at the least favourable phase; 0
+    # if the effect is undetectable.
     information: float
 
 
@@ -79,16 +79,16 @@ class Scores:
 
     scores: tuple[Score, ...]  # One for each candidate and shape
     columns: tuple[list[int], ...]  # Columns of each in ``gram`` and ``pull``
-    gram: Floats  # Products of unit responses; rows of zeros where the records show none
+    gram: Floats  # Products of unit responses; rows of zeros for undetectable ones
     pull: Floats  # Products of unit responses with the residuals
 
     @classmethod
     def of_none(cls) -> Scores:
-        """Return the scores of no candidate."""
+        """Return scores without any candidate."""
         return cls((), (), np.zeros((0, 0)), np.zeros(0))
 
     def name(self, place: int) -> str:
-        """Return the effect at a place."""
+        """Return the name of the effect at a place."""
         return self.scores[place].candidate.name
 
     def best(self) -> list[int]:
@@ -113,7 +113,7 @@ class Scores:
         return float(np.linalg.norm(left @ self.gram[np.ix_(a, b)] @ right, 2))
 
     def same(self, one: int, other: int) -> bool:
-        """Whether two candidates are one effect under two names."""
+        """Return whether two candidates are one effect under two names."""
         shaped = self.scores[one].candidate.shape or self.scores[other].candidate.shape
         alike = len(self.columns[one]) == len(self.columns[other])
         return not shaped and alike and self.likeness(one, other) > 1 - SAME
@@ -140,7 +140,7 @@ def score_candidates(
     residual = residual - base @ (base.T @ residual)
     sizes = lengths(columns)
     columns /= np.where(sizes > 0, sizes, 1.0)
-    # The second time removes the rounding errors of the first.
+    # The second pass removes the rounding errors of the first.
     for _ in range(2):
         columns -= base @ (base.T @ columns)
     gram, pull = columns.T @ columns, columns.T @ residual
@@ -164,10 +164,10 @@ def candidate_slopes(
     passes: Sequence[Sequence[Candidate]],
     known: Sequence[WindowSlopes] = (),
 ) -> tuple[list[str], list[WindowSlopes]]:
-    """Return a fit's parameters, and the derivatives by them and then by candidates.
+    """Return the names of a fit's parameters, and the derivatives by them and by candidates.
 
-    Each pass has one shape of an effect at most. Where windows are ``known`` the candidates'
-    columns follow theirs, without the parameters.
+    Each pass has at most one shape of an effect. With ``known`` windows the candidates' columns
+    are appended to theirs, without the parameters.
     """
     names: list[str] = []
     windows = list(known)
@@ -194,7 +194,7 @@ def _located(
     windows: Sequence[WindowSlopes],
     model: Rig,
 ) -> list[list[Candidate]]:
-    """Return candidates with the frequencies or instants that residuals show most."""
+    """Return candidates with the frequencies or instants that residuals show most clearly."""
     found: list[list[Candidate]] = []
     responses = calm_responses(data.fitted, windows, model.c_over_m) if pool else []
     for one, *_ in pool if responses else ():
@@ -210,7 +210,7 @@ def _located(
 
 
 def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:
-    """Divide candidates among passes, each with one shape of an effect and few parameters."""
+    """Divide candidates among passes, each with at most one shape of an effect."""
     passes: list[list[Candidate]] = []
     for batch in itertools.zip_longest(*pool):
         left = 0

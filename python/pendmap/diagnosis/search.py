@@ -1,13 +1,14 @@
-"""The search for the effects that a model lacks: forward selection, elimination and swaps.
+"""Search for the effects that a model lacks: forward selection, elimination and swaps.
 
 1. The baseline and the physical core are fitted; the core keeps the effects that it needs.
-2. The error of the best model is added to the noise; sums of squares count in independent readings.
+2. The error of the best model is added to the noise; sums of squares are in independent readings.
 3. All candidates are scored at the best model (Rao), alone and in pairs; at first also at the
    models without one of the core's effects. The best few are fitted with all other parameters.
-4. The model of least cost (Schwarz) is accepted if noise hardly gains as much, if it closes its
-   share of the gap (with a frequency or an instant all of it), and if no held-out set loses.
-5. Accepted effects are dropped if they gain too little beside the others, and replaced by better
-   ones. Of models that the records do not tell apart the simplest and commonest is kept.
+4. The model of least cost (Schwarz) is accepted if noise alone is unlikely to gain as much, if it
+   closes its share of the gap (with a frequency or an instant all of it), and if no held-out set
+   is predicted worse.
+5. Accepted effects are dropped if they gain too little with the others present, and replaced by
+   better ones. Of indistinguishable models the simplest and commonest is kept.
 6. Steps 2 to 5 are repeated until nothing is accepted.
 """
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def search(state: State, core: FittedModel | None, progress: Callable[[int], None]) -> FittedModel:
-    """Return the best model."""
+    """Return the best model; ``progress`` receives the number of its effects after each step."""
     best = state.reweight(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
     best = prune_effects(state, cheapest_start(state, core))
@@ -47,7 +48,7 @@ def search(state: State, core: FittedModel | None, progress: Callable[[int], Non
                 0,
             )
         )
-    # Alternatives of the core's effects are searched at models without these.
+    # Alternatives of the core's effects are searched at models without these effects.
     reduced = [state.leave_out(best, candidate) for candidate in best.chosen]
     starts = [model for model in reduced if follows(state.data, model)]
     best_known: dict[Key, float] = {}
@@ -110,7 +111,7 @@ def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> Fit
 def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list[list[int]]]:
     """Return the candidates, and pairs of them, with the greatest scores at a model.
 
-    Twice the number of candidates to fit: some have no fit within physics.
+    They are twice as many as are fitted: some have no fit within physical limits.
     """
     limits = state.thresholds
     scores = state.scores(fitted)
@@ -193,7 +194,7 @@ def _preferred(state: State, best: FittedModel) -> FittedModel | None:
 def fit_alternatives(
     state: State, best: FittedModel, candidate: Candidate, reduced: FittedModel
 ) -> list[tuple[int, FittedModel | None]]:
-    """Return the candidates that promise most in the place of an effect, with their fits."""
+    """Return the most promising replacements of an effect, with their fits."""
     limits = state.thresholds
     scores = state.scores(reduced)
     gain = reduced.chi2 - best.chi2

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pendmap.model import Formula
 
 SAME: Final = 0.2
-"""Change of a model's error, in its standard error, below which readings keep their weights."""
+"""Change of a run's model error, over its total error, below which readings keep their weights."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ScoredModel:
 
     @property
     def fits(self) -> Fits:
-        """The fits to the records and to those held back."""
+        """Fits to the fitted records and to the records held back."""
         return Fits(self.fitted.fit, self.hold_out.fit)
 
 
@@ -54,15 +54,15 @@ class Attempt:
     """Candidates that were fitted, and whether they were accepted."""
 
     effects: tuple[str, ...]
-    shape: dict[str, float]  # Of the first, nondimensional
+    shape: dict[str, float]  # Shape of the first effect, nondimensional
     score: float  # Gain promised by the score, in independent readings
     # Fall of the cost: sum of squares in independent readings with Schwarz's penalty.
     bic_gain: float
     held_out_gain: (
         float | None
     )  # Least fall on a held-out set, in independent readings; None if unused
-    accepted: bool  # Whether the search went on with them
-    stage: int  # Number of effects of the model without them
+    accepted: bool  # Whether the search continued with them
+    stage: int  # Number of effects before they were added
 
 
 class State:
@@ -86,7 +86,7 @@ class State:
         self._begin(base)
 
     def _begin(self, base: FittedModel) -> None:
-        """Forget all fits but that of the given model."""
+        """Discard all fits except that of a baseline."""
         self.base = self._best = base
         self._fits: dict[Key, FittedModel] = {key_of(()): base}
         self._reduced: set[tuple[Key, str]] = set()
@@ -95,10 +95,10 @@ class State:
         self._held: dict[FittedModel, tuple[HoldOut | None, tuple[float, ...]]] = {}
 
     def reweight(self, best: FittedModel) -> FittedModel:
-        """Add a model's error to the weights of readings, and return the model fitted with them.
+        """Add a model's error to the weights of the readings; return the model fitted with them.
 
-        All fits with other weights are forgotten. Nothing changes where the errors are nearly the
-        same as before, or where a fit diverges with the new ones.
+        All fits with other weights are discarded. Nothing changes if the errors are nearly the same
+        as before, or if a fit diverges with the new ones.
         """
         errors = model_errors(self.records, best)
         pairs = zip(errors, self.errors, self.records.fitted, strict=True)
@@ -129,7 +129,7 @@ class State:
         return self._best.level
 
     def accept(self, fitted: FittedModel) -> None:
-        """Take an accepted model as the best one if it fits better than those before."""
+        """Set the best model to an accepted one that fits better."""
         if fitted.chi2 < self._best.chi2:
             self._best = fitted
 
@@ -144,7 +144,7 @@ class State:
         return best
 
     def converge(self, fitted: FittedModel) -> FittedModel:
-        """Return a converged fit, within physics."""
+        """Return a converged fit, within physical limits."""
         full = converge(self.data, fitted, self.level)
         if full is None or full is fitted:
             return fitted
@@ -172,7 +172,7 @@ class State:
         return self._refits[key]
 
     def leave_out(self, fitted: FittedModel, dropped: Candidate) -> FittedModel:
-        """Return the best reduced model with at most a model's other effects."""
+        """Return the best known model with a subset of a model's effects other than ``dropped``."""
         chosen = tuple(c for c in fitted.chosen if c.name != dropped.name)
         key = key_of(fitted.chosen), dropped.name
         if key not in self._reduced:
@@ -186,15 +186,15 @@ class State:
         return self._best_among(chosen)
 
     def _best_among(self, chosen: Sequence[Candidate]) -> FittedModel:
-        """Return the best known model without effects other than these."""
+        """Return the best known model with a subset of ``chosen``."""
         names = {candidate.name for candidate in chosen}
         known = (t for t in self._fits.values() if names.issuperset(t.names))
         return min(known, key=lambda t: t.chi2)
 
     def simplest(self, best: FittedModel) -> FittedModel:
-        """Return the simplest, then commonest, model that the records do not tell from the best.
+        """Return the simplest, then commonest, model that is indistinguishable from the best.
 
-        That is the given model where none is as good as the best accepted one.
+        This is the given model if no known one is as good as the best accepted one.
         """
         reach = max(self._best.chi2 + self.thresholds.alike * self.level, best.chi2)
         most = self.thresholds.alike * max(best.level, self.level)
@@ -205,13 +205,13 @@ class State:
 
         alike = [t for t in self._fits.values() if t.chi2 <= reach and self.remaining(t) >= 0]
         for fitted in sorted((best, *alike), key=order):
-            # Held-out sets must not tell it from the best one either.
+            # Held-out sets must not distinguish it from the best one either.
             if fitted is best or self._loses_at_most(most, best, fitted):
                 return fitted
         return best
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
-        """Return the hold-out evaluation of a model; None where it diverges."""
+        """Return the hold-out evaluation of a model; None if it diverges."""
         return self._evaluated(fitted)[0]
 
     def hold_out_losses(self, fitted: FittedModel) -> tuple[float, ...]:
@@ -228,17 +228,17 @@ class State:
         return self._held[fitted]
 
     def scored(self, fitted: FittedModel) -> ScoredModel:
-        """Return a model with its hold-out evaluation; FitDiverged where that diverges."""
+        """Return a model with its hold-out evaluation; raise FitDiverged if that diverges."""
         return ScoredModel(fitted, self.hold_out(fitted) or evaluate_hold_out(self.data, fitted))
 
     def remaining(self, fitted: FittedModel) -> int:
-        """Return how many effects may be added to a model; the sensor's zero does not count."""
+        """Return how many effects may be added to a model; the sensor's zero is not included."""
         return self.most - len(set(fitted.names) - {ZERO})
 
     def cost(self, fitted: FittedModel, level: float | None = None) -> float:
         """Return the sum of squares in independent readings with Schwarz's penalty.
 
-        A choice among many values costs twice the logarithm of their number besides.
+        A choice among many values adds twice the logarithm of their number.
         """
         level = level or self.level
         readings = max(fitted.fit.samples / level, self._best.chi2 / level, 3.0)
@@ -268,10 +268,10 @@ class State:
         return min(chance * len(choices) * own, 1.0)
 
     def is_significant(self, reduced: FittedModel, full: FittedModel) -> bool:
-        """Whether further effects gain more than chance, and close their share of the gap.
+        """Return whether further effects gain more than chance, and close their share of the gap.
 
-        A frequency or an instant of a thousand fits part of any gap far above the noise: an effect
-        that has one must close all of it.
+        One of a thousand frequencies or instants always fits part of a gap far above the noise, so
+        an effect that has one must close all of it.
         """
         if self.chance(reduced, full) >= self.thresholds.chance:
             return False
@@ -279,11 +279,11 @@ class State:
         return self.explains(full) or (not sought and self.closes_enough(reduced, full))
 
     def explains(self, fitted: FittedModel) -> bool:
-        """Whether the residuals of a model are explained by noise alone."""
+        """Return whether the residuals of a model are explained by noise alone."""
         return fitted.noise.chance >= self.thresholds.rest
 
     def closes_enough(self, reduced: FittedModel, full: FittedModel) -> bool:
-        """Whether further effects close their share of the gap, or all of it."""
+        """Return whether further effects close their share of the gap, or all of it."""
         return self.explains(full) or self.closed(reduced, full) >= self.thresholds.closes
 
     @staticmethod
@@ -294,10 +294,10 @@ class State:
         return (reduced.chi2 - full.chi2) / gap if gap > 0 else 1.0
 
     def keeps_hold_out(self, reduced: FittedModel, full: FittedModel) -> bool:
-        """Whether further effects lose on no held-out set.
+        """Return whether further effects worsen no held-out set.
 
-        A loss is more than a few independent readings on a set, or a sum of squares of whole runs,
-        with fixed parameters, that rises by more than the factor ``forecast``.
+        A set is worse if its loss exceeds a few independent readings, or if the sum of squares of
+        whole runs, with fixed parameters, rises by more than the factor ``forecast``.
         """
         before, after = self.hold_out(reduced), self.hold_out(full)
         if before is None or after is None:

@@ -1,4 +1,4 @@
-"""A diagnosis as a JSON object."""
+"""JSON object of a diagnosis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def as_json(found: Discrepancy) -> dict[str, Any]:
-    """Return the JSON object of ``pendmap diagnose``, without the paths of files.
+    """Return the JSON object of ``pendmap diagnose``, without the paths of written files.
 
     Parts that were not computed are null, with the reason in ``not_computed``.
     """
@@ -120,7 +120,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
 
 
 def _proposals(found: Discrepancy) -> dict[str, Any] | None:
-    """Return the aim, and the best proposal of each kind of run; None without an outlook."""
+    """Return the aim and the best proposal of each kind of run; None without an outlook."""
     outlook = found.advice.outlook
     if outlook is None:
         return None

@@ -1,4 +1,4 @@
-"""The five verdicts, the alternatives of each effect, and the statistics they are based on."""
+"""The five verdicts, the alternatives of each effect, and the statistics of both."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ if TYPE_CHECKING:
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
-SEVERAL: Final = 1.0  # Standard errors by which the greatest excess of several runs is reduced
+SEVERAL: Final = 1.0  # Standard errors subtracted from the largest excess of several runs
 
-THIRDS: Final = 3  # Parts of a single run; a name must be better without any one of them
+THIRDS: Final = 3  # Number of parts of a single run; a name must be better without any one
 
 COEFFICIENTS: Final = (1.94, 0.13, -1.65, 0.74, 0.8)
 """``b0`` to ``b4`` of the probability of a name, from 163 names, of which 111 were right: 227
 experiments of the seed 8401, 67 of them with disturbances that no effect describes."""
 
 LEAST_CHANCE: Final = 1e-6
-"""Probability by noise alone below which the probability of a name no longer falls."""
+"""Lower bound of the chance of the residuals in the probability of a name."""
 
 GAINS: Final = (10.0, 1e5)  # Range to which gains are clipped for the probability of a name
 
 
 @dataclasses.dataclass(frozen=True)
 class Alternative:
-    """Another effect in the place of one that was accepted."""
+    """An effect that could replace an accepted one."""
 
     candidate: Candidate  # Effect and shape
     gain: float  # Fall of the sum of squares with it, in independent readings
-    # Gain of the accepted effect less its own, each less the gain of a choice by chance: twice the
-    # difference of log-likelihoods.
+    # Gain of the accepted effect minus its own, each minus the gain of a choice by chance: twice
+    # the difference of log-likelihoods.
     behind: float
     separation: float  # ``s = 1 - gain / gain of the accepted effect``
     likeness: float  # Cosine of the angle between the responses of the readings to both
-    refitted: bool  # Whether the gain is that of a fit; else it is the score's
-    # Whether the accepted effect is its special case, and it gains no more than by chance.
+    refitted: bool  # Whether the gain is that of a fit, not of a score
+    # Whether the accepted effect is a special case of it, and it gains no more than by chance.
     contains: bool
-    # Whether the records do not tell them apart: it is behind by less than the threshold, or by the
-    # readings of one run alone, of a single run by a third, unless the accepted effect acts once.
+    # Whether the records do not distinguish them: it is behind by less than the threshold, or by
+    # the readings of one run alone (a third of a single run), unless the accepted effect acts once.
     alike: bool
 
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """An accepted effect among its alternatives."""
+    """An accepted effect with its alternatives."""
 
     candidate: Candidate  # The effect
     gain: float  # Fall of the sum of squares with it, in independent readings
-    closed: float  # Share of the squared gap above the noise that it closes beside the others
+    closed: float  # Share of the squared gap above the noise that it closes with the others
     alternatives: tuple[Alternative, ...]  # The nearest first
 
     @property
     def equivalent(self) -> list[str]:
-        """Names that the records do not tell apart, its own first.
+        """Names that the records do not distinguish, its own first.
 
-        Where there are several, effects that contain one of them are included.
+        If there are several, effects that contain one of them are included.
         """
         alike = [r for r in self.alternatives if r.alike and not r.contains]
         wider = [r for r in self.alternatives if r.contains] if alike else []
@@ -77,13 +77,13 @@ class Identifiability:
 
     @property
     def share(self) -> float:
-        """Share of its likelihood among all names with equal prior odds."""
+        """Share of its likelihood among all names, with equal prior odds."""
         others = [r for r in self.alternatives if not r.contains]
         return 1.0 / (1.0 + sum([math.exp(-0.5 * max(r.behind, 0.0)) for r in others]))
 
 
 def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) -> Identifiability:
-    """Return an effect of the best model among its alternatives."""
+    """Return an effect of the best model with its alternatives."""
     level = best.level
     reduced = state.leave_out(best, candidate)
     gain = (reduced.chi2 - best.chi2) / level
@@ -111,7 +111,7 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
         contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
         alike = behind < state.thresholds.alike
         if fit is not None and not alike and not candidate.once:
-            # The accepted effect must be better without any one run, or any third of a single one.
+            # The accepted effect must be better without any one run, or any third of a single run.
             parts = _by_part(fit) - _by_part(best)
             alike = bool(parts.sum() - parts.max() + chosen * level < 0)
         alternatives.append(
@@ -141,10 +141,10 @@ def _by_part(fitted: FittedModel) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class GoodnessOfFit:
-    """Probabilities that noise alone leaves the residuals of the best model.
+    """Probabilities that noise alone leaves the residuals of the best model, by test.
 
-    A sum of squares hardly shows a form that is nearly right, whose error lies in one direction
-    among hundreds. So each direction is tested by itself.
+    The sum of squares is insensitive to a form that is nearly right, whose error lies in one
+    direction among hundreds, so each direction is tested separately.
     """
 
     # By test: other ``effects`` of the library in every shape (Rao's score at the best model), the
@@ -155,7 +155,7 @@ class GoodnessOfFit:
 
     @property
     def chance(self) -> float:
-        """Least of all probabilities times their number (Bonferroni)."""
+        """Least of all probabilities, times their number (Bonferroni)."""
         return min(min(self.chances.values()) * len(self.chances), 1.0)
 
 
@@ -180,8 +180,8 @@ class Assessment:
     """Verdict and the statistics it is based on."""
 
     # ``none``: the baseline describes the records; ``named``: effects explain all; ``ambiguous``: a
-    # class of effects does, which these records do not tell apart; ``partial``: effects close most
-    # of the gap, but not all; ``unknown``: no candidate explains the gap.
+    # class of indistinguishable effects explains all; ``partial``: effects close most of the gap,
+    # but not all; ``unknown``: no candidate explains the gap.
     verdict: Verdict
     identified: tuple[Identifiability, ...]  # The effects found, among their alternatives
     left: float  # Slow part of the residuals beyond noise, over its standard error
@@ -189,13 +189,13 @@ class Assessment:
     # Greatest such ratio allowed by chance and by the error ``r`` of the noise:
     # ``1 + 4 sqrt(2 / N + 4 r^2)``.
     ratio_allowed: float
-    ratio_held: float  # Sum of squares over degrees of freedom on what was held back
+    ratio_held: float  # Sum of squares over degrees of freedom on the records held back
     closed: float  # Share of the squared gap above the noise that the effects close
     uneven: float  # Difference of parameters between runs, over its standard error (Cochran's Q)
     chance: float  # Probability that noise alone shows the residual torque
     form: GoodnessOfFit
-    probabilities: tuple[float, ...]  # That the name of each effect, or one of its class, is right
-    approximate: bool  # Whether names are given with reserve: the fit is poor, or one is not sure
+    probabilities: tuple[float, ...]  # That each name, or one of its class, is right
+    approximate: bool  # Whether names are given with reserve: the fit is poor, or one is uncertain
 
 
 def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: float) -> Assessment:
@@ -206,7 +206,7 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
     noise, degrees = fitted.noise, max(fitted.fit.degrees, 1)
     allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.data.doubt**2)
     ratio = fitted.chi2 / degrees
-    # The greatest excess of several runs is greater by chance.
+    # The largest of several excesses is larger by chance.
     left = max(noise.z, max(noise.by_run) - SEVERAL)
     held_out = 1.0
     if fitted.chosen:
@@ -258,8 +258,8 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
 def _closed(state: State, best: ScoredModel) -> float:
     """Return the share of the gap that the best model closes in the fitted records.
 
-    The gap is the sum of squares above that of the best model's noise; 1 where it is no more than
-    the scatter of noise.
+    The gap is the sum of squares above that of the best model's noise; the share is 1 if the gap is
+    within the scatter of noise.
     """
     fitted, base = best.fitted, state.base
     degrees = max(fitted.fit.degrees, 1)
@@ -289,7 +289,7 @@ def probabilities(chance: float, gains: Sequence[float]) -> tuple[float, ...]:
     + b3 log10(gain / strongest) + b4 log10(strongest / 100)``, with the ``chance`` of the goodness
     of fit and the gains without each effect over the noise's level. It was fitted to blind
     experiments (``benchmarks/blind/calibration.py``), some without the true effect among the
-    candidates, where the nearest effect or several together take its place.
+    candidates, in which the nearest effect or several together take its place.
     """
     rows = features(chance, gains)
     sums = [sum(b * x for b, x in zip(COEFFICIENTS, row, strict=True)) for row in rows]

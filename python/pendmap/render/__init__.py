@@ -1,6 +1,6 @@
-"""Figures for papers; the only place that imports matplotlib.
+"""Matplotlib figures for papers; the only package that imports matplotlib.
 
-``draw`` looks at what a dataset holds and draws the figure for it. It needs no display.
+``draw`` chooses the figure by the kind of dataset. It needs no display.
 """
 
 from __future__ import annotations
@@ -50,30 +50,28 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 ) -> Path:
     """Draw a dataset into a file.
 
-    Of a basin map: the labels, with the attractors marked and named with their shares, and the
-    settle time beside them; where the labels are unreliable, settle time and net turns lead; where
-    labels tell nothing, the net turns and the finite-time exponent. Of closed orbits: their paths
-    and points in the phase plane. Of a map over two parameters: the kinds of attractor, striped
-    where several coexist, and the largest exponent. Of a bifurcation diagram: stroboscopic angles,
-    sweeps up and down, exponents. Of critical curves: stable regions and their boundaries. Of
-    Melnikov's criterion: the threshold against the frequency. Of a trajectory: time history,
-    energy, phase plane, Poincare section. Of an exponent: growth along the start, the running mean,
-    its distribution. Of a lifetime: the survival curve with its tail, and the mean over where the
-    tail begins.
+    Basin map: labels, attractors with their shares, and settle time; with unreliable labels the
+    settle time and net turns come first; with meaningless labels the net turns and the finite-time
+    exponent. Closed orbits: paths and points in the phase plane. Map over two parameters: kinds of
+    attractor, striped if several coexist, and the largest exponent. Bifurcation diagram:
+    stroboscopic angles, sweeps up and down, exponents. Critical curves: stable regions and their
+    boundaries. Melnikov's criterion: the threshold against the frequency. Trajectory: time history,
+    energy, phase plane, Poincare section. Exponent: growth along the start, the running mean, its
+    distribution. Lifetime: the survival curve with its tail, and the mean lifetime against the
+    start of the tail.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        Result of ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
-        ``pendmap.melnikov`` or ``pendmap.simulate`` returned;
-        ``attrs["kind"]`` tells which. Of a selection (a range, every k-th value, reversed,
-        transposed) the picture shows the cells that are there, at their coordinates, with their
-        shares.
+        ``pendmap.melnikov`` or ``pendmap.simulate``; ``attrs["kind"]`` names the kind. A
+        selection (a range, every k-th value, reversed, transposed) is drawn with its own cells,
+        coordinates and shares.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Draw one part alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
+        Part to draw alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
         over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
         ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
         ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
@@ -90,7 +88,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Any chart as a matplotlib figure, and several charts on one sheet."""
+"""Charts as matplotlib figures, and several charts on one sheet."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ if TYPE_CHECKING:
 LEFT: Final = 0.1
 HEAD: Final = 0.72
 LINE: Final = style.RC["font.size"] * 1.5 / 72
-"""Inches left of the title, of title and subtitle, of a line of words."""
+"""Inches: left margin of the title; title with subtitle; one line of text."""
 CELLS: Final = 1200
-"""Rows and columns of a map that are drawn at most, unless the figure has more pixels."""
+"""Most rows and columns of a drawn map, unless the figure has more pixels."""
 WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
-"""Inches across a panel: of several side by side, of the only one, of those below one another."""
+"""Panel width in inches: several side by side, a single one, several stacked."""
 BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
-"""Inches that names and labels take beside a panel, a bar, those below it, a row of a legend."""
-LEAST: Final = 0.5  # Inches that a panel needs
-HEADING: Final = 0.32  # Inches of the heading of a chart on a sheet
+"""Inches for labels beside a panel, a colour bar, labels below, a row of a legend."""
+LEAST: Final = 0.5  # Least side of a panel, inches
+HEADING: Final = 0.32  # Height of the heading of a chart on a sheet, inches
 SMALLEST: Final = (0.88, 0.72)
-"""Width and height over their own with which a sheet remains readable."""
+"""Least width and height of a readable sheet, as shares of its default size."""
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 _SMALLEST: Final = 0.9
-"""Size of a subtitle's letters, over their own, under which it takes a third line."""
+"""Least font size of a two-line subtitle, over the normal one; below it a third line is used."""
 
 
 def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
-    """Return the figure of a chart or of a sheet; refuse a size in inches without room for it."""
+    """Return the figure of a chart or sheet; raise InputError if ``size``, inches, is too small."""
     if isinstance(chart, Sheet):
         return _sheet(chart, size, dpi)
     figure, needed = _made(chart, size or _size(chart), dpi)
@@ -83,7 +83,7 @@ def figure(
 
 
 def _recoloured(chart: Chart, colormap: str) -> Chart:
-    """Return a chart with this colour map in its images of numbers."""
+    """Return a chart with another colour map in its images of numbers."""
     shown = {panel.name for row in chart.shown for panel in row}
     panels, found = [], False
     for panel in chart.panels:
@@ -104,7 +104,7 @@ def _recoloured(chart: Chart, colormap: str) -> Chart:
 
 
 def _least(chart: Chart, dpi: float) -> Ends:
-    """Return the least size with room for every panel and its words, in tenths of an inch."""
+    """Return the least size with room for every panel and its text, in tenths of an inch."""
     size = _size(chart)
     _, least = _made(chart, size, dpi)
     for _ in range(9):
@@ -121,7 +121,7 @@ def _lacks(size: Ends, needed: Ends) -> bool:
 
 
 def _size(chart: Chart) -> Ends:
-    """Return the size of a chart in inches: its own, or one of its panels' proportions."""
+    """Return the size of a chart in inches: its own, or one from its panels' proportions."""
     if chart.size is not None:
         return chart.size
     rows = chart.shown
@@ -140,7 +140,7 @@ def _aside(row: Sequence[Panel]) -> float:
 
 
 def _rows(named: list[Mark], width: float) -> float:
-    """Return the inches down a legend of these marks."""
+    """Return the height of a legend of these marks in inches."""
     texts = marks.legend(named)[1]
     return ROW * -(-len(texts) // _columns(texts, width)) + 0.1 if texts else 0.0
 
@@ -151,7 +151,7 @@ def _all_marks(chart: Chart) -> list[Mark]:
 
 def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     """Return the figure of a chart, and the size in inches that it needs."""
-    # The layout leaves room for a legend at the edge alone, not for one above notes.
+    # The layout reserves room for a legend at the edge alone, not for one above notes.
     foot = LINE * len(chart.notes) + _rows(_all_marks(chart) if chart.notes else [], size[0])
     figure = headed(size, dpi, chart.title, chart.subtitle, foot=foot)
     for k, line in enumerate(chart.notes):
@@ -168,7 +168,7 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
 def headed(  # noqa: PLR0913 (size, words, and room around)
     size: Ends, dpi: float, title: str, subtitle: str, *, foot: float = 0.0, below: float = 0.0
 ) -> Figure:
-    """Return an empty figure with its head, and inches of room below this and at the foot."""
+    """Return an empty figure with its head, and free inches below the head and at the foot."""
     figure = Figure(figsize=size, dpi=dpi, layout="constrained")
     FigureCanvasAgg(figure)
     top, height = write_head(figure, title, subtitle) + below, size[1]
@@ -179,10 +179,10 @@ def headed(  # noqa: PLR0913 (size, words, and room around)
 
 
 def write_head(figure: Figure, title: str, subtitle: str) -> float:
-    """Write title and subtitle; return the inches that they take.
+    """Write title and subtitle; return their height in inches.
 
-    A subtitle that is too long for one line becomes two, at a semicolon, where these need not be
-    much smaller, and else has a line for each part; a title becomes smaller.
+    A subtitle too long for one line becomes two, broken at a semicolon; if these would need a much
+    smaller font, it becomes one line per part. A long title becomes smaller.
     """
     width, height = (float(side) for side in figure.get_size_inches())
     room = width - 2 * LEFT
@@ -191,7 +191,7 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
     if _SMALLEST * style.longest(lines) > room:
         lines = subtitle.split(";   ")
     shrunk = room / max(style.longest(lines), 1e-3)
-    # Letters of few pixels are set wider than in proportion.
+    # Small fonts are set wider than in proportion.
     font = style.RC["font.size"] * (1.0 if shrunk >= 1 else 0.9 * shrunk)
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     left = LEFT / width
@@ -205,9 +205,9 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
 def fill(
     figure: Figure | SubFigure, chart: Chart, letters: Iterator[str] | None = None
 ) -> dict[str, Axes]:
-    """Draw the panels of a chart into a figure; return the axes by their names.
+    """Draw the panels of a chart into a figure; return the axes by panel name.
 
-    ``letters`` number the panels; without them they begin anew, where there are several.
+    ``letters`` label the panels; without them several panels are labelled from (a).
     """
     rows = chart.shown
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
@@ -262,7 +262,7 @@ def _legend(
 
 
 def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
-    """Return the figure of charts in columns."""
+    """Return the figure of a sheet, its charts in columns."""
     every = [chart for column in sheet.columns for chart in column]
     named = [mark for chart in every for mark in _all_marks(chart)] if sheet.legend else []
     wide = [max(_size(chart)[0] for chart in column) for column in sheet.columns]
@@ -294,7 +294,7 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
 def _block(
     figure: SubFigure, chart: Chart, high: float, letters: Iterator[str], *, own: bool
 ) -> dict[str, Axes]:
-    """Draw a chart of a sheet with its heading, and its own legend beneath it."""
+    """Draw one chart of a sheet with its heading and its own legend below it."""
     wide = figure.bbox.width / _dpi(figure)
     named = _all_marks(chart) if own else []
     heading = HEADING if chart.title else 0.05
@@ -321,7 +321,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
 
 
 def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
-    """Place the panels, fold long titles, write notes beneath; return whether there is room."""
+    """Lay out the panels, fold long titles, write notes; return whether there is room."""
     engine: Any = figure.get_layout_engine()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -343,7 +343,7 @@ def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
 
 
 def _note(axes: Axes, panel: Panel) -> None:
-    """Write paragraphs beneath a small panel, or beside one that stands alone in its row."""
+    """Write paragraphs below a small panel, or beside one that is alone in its row."""
     wide, high = _inches(axes)
     beside = wide > high * 2
     free = wide * (1 - panel.share) / panel.share
@@ -370,7 +370,7 @@ def _note(axes: Axes, panel: Panel) -> None:
 
 
 def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
-    """Return the size in inches in which every panel has the room that its words need."""
+    """Return the size in inches at which every panel has room for its text."""
     width, height = figure.get_size_inches()
     across, down = [], 0.0
     for row in chart.shown:
@@ -389,7 +389,7 @@ def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
 
 
 def _room(axes: Axes, panel: Panel) -> Ends:
-    """Return width and height that a panel needs."""
+    """Return the width and height that a panel needs, in inches."""
     bars = [mark.colours.name for mark in panel.marks if getattr(mark, "colours", None)]  # type: ignore[attr-defined]
     words = [*panel.y.name.split("\n"), *bars]
     high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
@@ -407,18 +407,18 @@ def _inches(axes: Axes) -> Ends:
 
 
 def _dpi(part: FigureBase) -> float:
-    """Return the pixels per inch of the figure that a part belongs to."""
+    """Return the pixels per inch of the figure that contains a part."""
     whole: Any = part.get_figure(root=True)
     return float(whole.dpi)
 
 
 def _entry(text: str) -> float:
-    """Return the inches of a legend's entry with its handle."""
+    """Return the width of a legend entry with its handle, in inches."""
     return style.inches(text, style.RC["legend.fontsize"]) + 0.55
 
 
 def _columns(texts: Sequence[str], room: float) -> int:
-    """Return how many columns a legend has in ``room`` inches, its rows nearly full."""
+    """Return the number of columns of a legend in ``room`` inches, with nearly full rows."""
     if not texts:
         return 1
     fit = max(1, int((room - 0.2) // max(map(_entry, texts))))

@@ -1,4 +1,4 @@
-"""Marks of charts as matplotlib draws them, and what stands for them in a legend."""
+"""Marks of charts drawn with matplotlib, and their legend handles."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Mark
 
-TABLE, APART = 8.0, 0.14  # Size of a table's letters, and inches between its columns at least
-MANY: Final = 2000  # Points from which on they are drawn as pixels also in a file of vectors
+TABLE, APART = 8.0, 0.14  # Font size of a table; least distance between its columns, inches
+MANY: Final = 2000  # Number of points from which they are rasterised in vector files
 
 
 def draw(axes: Axes, mark: Mark) -> None:
@@ -68,7 +68,7 @@ def _line(axes: Axes, mark: charts.Line) -> None:
 
 def _points(axes: Axes, mark: charts.Points) -> None:
     if not np.size(mark.x):
-        return  # it stands in the legend alone
+        return  # it appears in the legend alone
     many = np.size(mark.x) > MANY
     axes.plot(mark.x, mark.y, clip_on=mark.clip, rasterized=many, **_spots(mark))
 
@@ -93,7 +93,7 @@ def _steps(axes: Axes, mark: charts.Steps) -> None:
 
 
 def _areas(axes: Axes, mark: charts.Areas) -> None:
-    # Edges of the same colour: without them a seam shows between neighbours. A hatch has none.
+    # Edges of equal colour hide seams between neighbours. A hatch has no edges.
     look: dict[str, Any] = {"facecolors": mark.colour, "edgecolors": mark.colour, "lw": 0.3}
     if mark.hatch:
         look = {"facecolors": "none", "edgecolors": mark.colour, "hatch": mark.hatch, "lw": 0}
@@ -146,14 +146,14 @@ def _table(axes: Axes, mark: charts.Table) -> None:
 
 
 def _columns(mark: charts.Table) -> list[float]:
-    """Return the inches across each column, its distance from the one before included."""
+    """Return the width of each column in inches, with the distance to the previous one."""
     columns = zip(mark.head, *mark.rows, strict=True)
     texts = ([line for cell in column for line in cell.split("\n")] for column in columns)
     return [APART + max(style.inches(line, TABLE) for line in each) for each in texts]
 
 
 def across(mark: Mark) -> float:
-    """Return the inches that words need across a panel without a frame."""
+    """Return the width that text needs in a panel without a frame, in inches."""
     if isinstance(mark, charts.Table):
         return sum(_columns(mark))
     return style.inches(mark.text, mark.size) if isinstance(mark, charts.Text) else 0.0
@@ -210,7 +210,7 @@ _DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
 
 
 def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
-    """Return handles and texts of the named marks; those of one name stand upon one another."""
+    """Return handles and texts of the named marks; marks of equal name share one entry."""
     named: dict[str, list[Any]] = {}
     for mark in marks:
         if isinstance(mark, charts.Image):

@@ -1,4 +1,4 @@
-"""Figures of records, and of what is made of them."""
+"""Figures of records, comparisons, diagnoses and identifications."""
 
 from __future__ import annotations
 
@@ -27,16 +27,15 @@ def draw_record(
     size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> Path:
-    """Draw what an experiment holds into a file.
+    """Draw the records of an experiment into a file.
 
-    Of one record: the angle with what is for fitting and what is not, the findings at their places
-    and in words, the intervals of its clock, its noise against speed. Of several runs: a strip
-    each.
+    One record: the angle with samples used and not used for fitting, the findings at their times
+    and in words, the sampling intervals, the noise against speed. Several runs: a strip for each.
 
     Parameters
     ----------
     records : Experiment
-        What ``pendmap.read_experiment`` returned.
+        Result of ``pendmap.read_experiment``.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     size : (float, float), optional
@@ -47,7 +46,7 @@ def draw_record(
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -63,21 +62,21 @@ def draw_record(
 
 
 def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
-    """Draw a model beside the records that it is compared with into a file.
+    """Draw a model and the records that it is compared with into a file.
 
     For each run: record and model, the residual with the noise, errors of periods and peaks.
 
     Parameters
     ----------
     comparison : Comparison
-        What :func:`pendmap.comparison.compare` returned.
+        Result of :func:`pendmap.comparison.compare`.
     path : str or path
         As for :func:`pendmap.render.draw`.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -94,22 +93,22 @@ def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Pat
 def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """Draw a diagnosis into a file.
 
-    The residuals of the runs that the baseline misses most, before and after, over the noise; the
-    residual by run, and the error of forecasts against their horizon; the torque that each model
-    lacks over angle and velocity, with 95 % intervals; the scores of the candidates; the first
-    effect's size run by run.
+    The residuals of the runs with the worst baseline fit, before and after, over the noise; the
+    residual by run, and the forecast error against the horizon; the missing torque of each model
+    over angle and velocity, with 95 % intervals; the scores of the candidates; the first effect's
+    size run by run.
 
     Parameters
     ----------
     found : Discrepancy
-        What ``pendmap.diagnosis.diagnose`` returned.
+        Result of ``pendmap.diagnosis.diagnose``.
     path : str or path
         As for :func:`pendmap.render.draw`.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -129,7 +128,7 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     found : Discrepancy
-        What ``pendmap.diagnosis.diagnose`` returned.
+        Result of ``pendmap.diagnosis.diagnose``.
     path : str or path
         ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
         beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
@@ -161,7 +160,7 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
 def draw_runs(
     runs: Sequence[RunPanel], path: str | os.PathLike[str], *, title: str, subtitle: str
 ) -> Path:
-    """Draw the records of an experiment into a file: a panel a run, measured angle against time.
+    """Draw the records of an experiment into a file: a panel per run, measured angle against time.
 
     Parameters
     ----------
@@ -170,12 +169,12 @@ def draw_runs(
     path : str or path
         As for :func:`pendmap.render.draw`.
     title, subtitle : str
-        What stands above all panels.
+        Text above all panels.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -199,12 +198,12 @@ def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Path:
-    """Draw what was identified into a file: figures 4 to 7 of the paper and its table 1.
+    """Draw an identification into a file: figures 4 to 7 of the paper and its table 1.
 
     Parameters
     ----------
     report : IdentificationReport
-        What ``pendmap.identification.identify_experiment`` returned.
+        Result of ``pendmap.identification.identify_experiment``.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     size : (float, float), optional
@@ -212,17 +211,17 @@ def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
     dpi : float, optional
         Pixels per inch, 200 by default.
     parts : sequence of str, optional
-        Which parts, by default all: ``record`` (figure 4: angle, velocity, its sign, odd and even
-        half cycles), ``decrement`` (5: of each three peaks, with the zero error and without),
-        ``decay`` (6: every model beside the record), ``errors`` (7: of periods and peaks) and
+        Parts to draw, by default all: ``record`` (figure 4: angle, velocity, its sign, odd and even
+        half cycles), ``decrement`` (5: from triples of peaks, with the zero error and without),
+        ``decay`` (6: every model with the record), ``errors`` (7: of periods and peaks) and
         ``table`` (table 1).
     title, subtitle : str, optional
-        What stands above; by default the record's name, and what was measured.
+        Text above all parts; by default the record's name and the measured quantities.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------

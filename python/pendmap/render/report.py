@@ -1,4 +1,4 @@
-"""The report of a diagnosis with its figures, one for each of its parts."""
+"""Files of a diagnosis report with its figures."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
     from pendmap.report.document import Document
 
-SUFFIXES: Final = (".html", ".md")  # The kinds of file that a report is
+SUFFIXES: Final = (".html", ".md")  # File suffixes of a report
 
-DPI: Final = 110.0  # Pixels per inch: sharp on a screen, and the file stays under a megabyte
+DPI: Final = 110.0  # Pixels per inch: sharp on a screen, with a file below a megabyte
 
 
 def figures(found: Discrepancy) -> dict[str, Figure]:
-    """Return the figures by the names that the report has for them."""
+    """Return the figures under the names that the report uses."""
     made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(found).items()}
     cycles = diagnosis.cycles(found)
     return made | ({} if cycles is None else {"figure_7": drawing.draw(cycles, dpi=DPI)})
@@ -54,7 +54,7 @@ def write(found: Discrepancy, path: Path) -> Path:
 
 
 def _put(files: Mapping[Path, bytes]) -> None:
-    """Put the files of a report in their places: all of them, or none."""
+    """Write the files of a report: all of them, or none."""
     with contextlib.ExitStack() as places:
         for path, content in files.items():
             places.enter_context(whole_file(path, (*SUFFIXES, ".png"))).write_bytes(content)
@@ -73,7 +73,7 @@ def _html(document: Document, pictures: dict[str, bytes]) -> bytes:
 def _beside(
     path: Path, document: Document, pictures: dict[str, bytes], *, alone: bool = False
 ) -> dict[Path, bytes]:
-    """Return Markdown and its figures beside it, which have its name before theirs."""
+    """Return a Markdown file and its figures; figure names begin with its stem unless ``alone``."""
     names = {n: f"{n}.png" if alone else f"{path.stem}_{n}.png" for n in pictures}
     files = {path.with_name(names[n]): content for n, content in pictures.items()}
     return files | {path: report.as_markdown(document, names).encode()}

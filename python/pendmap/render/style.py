@@ -1,4 +1,4 @@
-"""Look of all figures: type, ticks, colour maps, words that fit, and writing to files."""
+"""Style of all figures: fonts, ticks, colour maps, text widths, and writing to files."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ RC: dict[Any, Any] = {
     "agg.path.chunksize": 20000,
 }
 
-MOST, PIXELS = 100.0, 20000  # Inches and pixels that a side of a figure may have
+MOST, PIXELS = 100.0, 20000  # Largest side of a figure, inches and pixels
 
-DPI = (20, 1200)  # Pixels per inch that may be chosen
+DPI = (20, 1200)  # Least and greatest pixels per inch
 
 
 @functools.lru_cache(maxsize=4096)
 def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
-    """Return the width of a line of text in inches, in the size of ticks where none is given."""
+    """Return the width of a line of text in inches, by default in the font size of ticks."""
     if not text.strip():
         return 0.0
     weight = "bold" if bold else "normal"
@@ -67,12 +67,12 @@ def inches(text: str, size: float | None = None, *, bold: bool = False) -> float
 
 
 def width_of(title: str) -> float:
-    """Return how wide the longest line of a panel's title is, in inches."""
+    """Return the width of the longest line of a panel's title, in inches."""
     return max(inches(line, RC["axes.titlesize"]) for line in title.split("\n"))
 
 
 def folded(title: str, room: float) -> str:
-    """Return a title on two lines of nearly equal length, or more where there is less room."""
+    """Return a title on two lines of nearly equal length, or on three if there is less room."""
     letters = max(len(line) for line in title.split("\n")) or 1
     size = width_of(title) / letters
     lines = title
@@ -84,19 +84,19 @@ def folded(title: str, room: float) -> str:
 
 
 def halves(text: str) -> list[str]:
-    """Return a text on two lines as equal as can be, broken at one of its semicolons."""
+    """Return a text on two lines as equal as possible, broken at one of its semicolons."""
     parts = text.split(";   ")
     both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
     return min(both, key=longest, default=[text])
 
 
 def longest(lines: Sequence[str]) -> float:
-    """Return the inches of the longest line."""
+    """Return the width of the longest line, in inches."""
     return max(inches(line, RC["font.size"]) for line in lines)
 
 
 def colour_map(name: str) -> Colormap:
-    """Return a matplotlib colour map by its name, if there is one."""
+    """Return a copy of a matplotlib colour map; raise InputError for an unknown name."""
     if name not in mpl.colormaps:
         known = "viridis, cividis, magma, inferno, plasma, RdBu_r, PuOr"
         raise InputError(f"no colour map {name!r}; there are for example {known}")
@@ -104,7 +104,7 @@ def colour_map(name: str) -> Colormap:
 
 
 def resolution(dpi: float | None) -> float:
-    """Return the pixels per inch, 200 by default, if they are possible."""
+    """Return the pixels per inch, 200 by default; raise InputError if out of range."""
     if dpi is None:
         return 200.0
     low, high = DPI
@@ -114,7 +114,7 @@ def resolution(dpi: float | None) -> float:
 
 
 def check_size(size: tuple[float, float] | None, dpi: float) -> None:
-    """Refuse a size in inches that no figure has, or more pixels than fit."""
+    """Raise InputError for a size in inches or pixels that is out of range."""
     if size is None:
         return
     if not all(0 < side <= MOST for side in size):
@@ -124,7 +124,7 @@ def check_size(size: tuple[float, float] | None, dpi: float) -> None:
 
 
 def write(figure: Figure, path: Path) -> None:
-    """Write a figure in its suffix's format, undated, so that equal figures are equal files."""
+    """Write a figure in its suffix's format, undated, so that equal figures give equal files."""
     suffix = path.suffix.lower().lstrip(".")
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
     figure.savefig(path, format=suffix, dpi=figure.dpi, metadata=metadata)

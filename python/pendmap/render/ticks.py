@@ -1,4 +1,4 @@
-"""Labels of axes: as many as have room, at round numbers, multiples of pi or powers of ten."""
+"""Tick labels: as many as fit, at round numbers, multiples of pi or powers of ten."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
     from pendmap.charts.chart import Axis
 
-LINE: Final = 0.16  # Inches between labels above one another
-CLOSE: Final = 5.0  # Ratio of its ends under which a logarithmic axis has equally spaced labels
-LONGEST, BEGINNING = 11, 3  # Letters of a name that is turned, and of its part before the dots
+LINE: Final = 0.16  # Least distance between stacked labels, inches
+CLOSE: Final = 5.0  # Ratio of the ends below which a logarithmic axis has equally spaced labels
+LONGEST, BEGINNING = 11, 3  # Letters of a rotated name, and of its part before the ellipsis
 NARROW: Final = 20.0
-"""Ratio of its ends under which a logarithmic axis has labels between powers of ten."""
+"""Ratio of the ends below which a logarithmic axis has labels between powers of ten."""
 
 Labels = list[tuple[float, str]]
 
 
 class Ticks(Locator):
-    """The places of the fullest set of labels that has room; it measures whenever asked."""
+    """Locator of the fullest set of labels that fits; it measures the axes at every call."""
 
     def __init__(self, axes: Axes, which: str, side: Axis) -> None:
         self._axes, self._across, self._side = axes, which == "x", side
         self.labels: dict[float, str] = {}
 
     def __call__(self) -> list[float]:
-        """Return the places."""
+        """Return the tick places."""
         axes, across = self._axes, self._across
         low, high = axes.get_xlim() if across else axes.get_ylim()
         every: Labels = next(
@@ -45,7 +45,7 @@ class Ticks(Locator):
         return list(self.labels)
 
     def tick_values(self, vmin: float, vmax: float) -> Any:  # noqa: ANN401, ARG002 (as inherited)
-        """Return the places, whatever the ends."""
+        """Return the tick places, whatever the limits."""
         return self()
 
     def _fits(self, labels: Labels, low: float, high: float) -> bool:
@@ -71,7 +71,7 @@ class _Names(Formatter):
 
 
 def scale(axes: Axes, which: str, side: Axis) -> None:
-    """Give a side of a panel its scale, ends, labels and name."""
+    """Set scale, limits, labels and name of a side of a panel."""
     axis = axes.xaxis if which == "x" else axes.yaxis
     change = axes.set_xscale if which == "x" else axes.set_yscale
     if side.scale == "log":
@@ -102,7 +102,7 @@ def scale(axes: Axes, which: str, side: Axis) -> None:
 
 
 def _sets(side: Axis, low: float, high: float) -> Iterator[Labels]:
-    """Sets of labels between two ends, the fullest first."""
+    """Yield sets of labels between two ends, the fullest first."""
     if side.scale == "log":
         yield from ([(at, plane.power(at)) for at in places] for places in powers(low, high))
     elif side.scale == "signed":
@@ -118,7 +118,7 @@ def _sets(side: Axis, low: float, high: float) -> Iterator[Labels]:
 
 
 def powers(low: float, high: float) -> Iterator[list[float]]:
-    """Sets of round numbers of a logarithmic axis, the fullest that is wanted first."""
+    """Yield sets of round numbers for a logarithmic axis, the fullest first."""
     tens = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     if high < CLOSE * low:
         ticks = [at for at, _ in plane.plain_ticks(low, high) if low <= at <= high]
@@ -133,17 +133,17 @@ def powers(low: float, high: float) -> Iterator[list[float]]:
 
 
 def signed(inner: float, low: float, high: float) -> Iterator[list[float]]:
-    """Round numbers on both sides of 0 from where the powers begin."""
+    """Yield sets of round numbers on both sides of 0, from ``inner`` outward."""
     first, last = round(math.log10(inner)), math.floor(math.log10(max(-low, high)))
     for steps, every in (((1, 2, 5), 1), ((1, 3), 1), *(((1,), k) for k in range(1, 40))):
-        # From the greatest down: it says how far the axis reaches.
+        # From the largest down, so that the extent of the axis is labelled.
         sizes = sorted(m * 10.0**k for k in range(last, first - 1, -every) for m in steps)
         ticks = [*(-size for size in reversed(sizes)), 0.0, *sizes]
         yield [tick for tick in ticks if low <= tick <= high]
 
 
 def turn(axes: Axes) -> None:
-    """Write names beneath a panel level where they have room, else on two lines, or turned."""
+    """Write names below a panel horizontally if they fit, else on two lines, or rotated."""
     places, texts = list(axes.get_xticks()), [one.get_text() for one in axes.get_xticklabels()]
     if len(texts) < 2 or isinstance(axes.xaxis.get_major_locator(), Ticks):  # noqa: PLR2004
         return
@@ -157,14 +157,14 @@ def turn(axes: Axes) -> None:
 
 
 def short(name: str) -> str:
-    """Return a name of at most ``LONGEST`` letters; numbers, which tell runs apart, come last."""
+    """Return a name of at most ``LONGEST`` letters that keeps its end, often a run number."""
     if len(name) <= LONGEST:
         return name
     return f"{name[:BEGINNING]}\N{HORIZONTAL ELLIPSIS}{name[BEGINNING + 1 - LONGEST :]}"
 
 
 def _folded(name: str) -> str:
-    """Return a name on two lines, divided behind the mark that is nearest to its middle."""
+    """Return a name on two lines, divided after the separator nearest to its middle."""
     marks = [k for k, letter in enumerate(name[:-1], start=1) if letter in "_- ."]
     at = min(marks, key=lambda k: abs(2 * k - len(name)), default=0)
     return f"{name[:at]}\n{name[at:]}" if at else name

@@ -1,4 +1,4 @@
-"""Figures in files: complete, or not there."""
+"""Figure files, written complete or not at all."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.chart import Chart, Sheet
 
-SUFFIXES = (".png", ".svg", ".pdf")  # The kinds of file that can be drawn
+SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
 
 
 def save(
@@ -41,7 +41,7 @@ def written(
 ) -> Path:
     """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-    ``size`` and ``dpi`` are what was asked for; impossible ones are refused.
+    ``size`` and ``dpi`` are the requested values; impossible ones are refused.
     """
     resolution = style.resolution(dpi)
     style.check_size(size, resolution)

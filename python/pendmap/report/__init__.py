@@ -1,4 +1,4 @@
-"""Reports in Markdown and HTML, both made of one structure."""
+"""Reports in Markdown and HTML from one document structure."""
 
 from __future__ import annotations
 

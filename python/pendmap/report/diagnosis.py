@@ -1,4 +1,4 @@
-"""The report of a diagnosis."""
+"""Report of a diagnosis."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ if TYPE_CHECKING:
 SI: Final = "rad/s\N{SUPERSCRIPT TWO}"
 
 EQUATION: Final = "theta'' + (c/m) v + w0^2 (1 + a(t)) sin(theta) = -Tr sign(v)"
-"""The baseline, as in the paper, with the velocity named as in effects."""
+"""Baseline equation of the paper, with the velocity denoted as in effects."""
 
-ALTERNATIVES: Final = 4  # Number of alternatives of an effect in its table
+ALTERNATIVES: Final = 4  # Number of alternatives in the table of an effect
 
 
 def diagnosis(found: Discrepancy) -> Document:
     """Return the report of a diagnosis.
 
     Its parts are the verdict, the gap, the residual torque, periods and peaks, the added effects,
-    the ranking of candidates, parameters run by run, the next experiment, and what was left out,
-    with the smallest size at which each effect that was not found would have shown.
+    the ranking of candidates, parameters run by run, the next experiment, exclusions, and the
+    detection limits of effects that were not found.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _terms(found: Discrepancy) -> Iterator[str]:
 
 
 def _elsewhere(effect: NamedEffect) -> str:
-    """Return the other places where an effect fits equally well."""
+    """Return the other shapes with which an effect fits equally well."""
     return "".join(
         f". With {name} = {number(value, 4)} it does as well: the records do not tell which"
         for name, value in effect.elsewhere.items()
@@ -126,7 +126,7 @@ def _elsewhere(effect: NamedEffect) -> str:
 
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> str:
-    """Return the strength of an effect over the records, against friction and gravity."""
+    """Return the strength of an effect over the records, relative to friction and gravity."""
     reasons: Reasons = {}
     fit = found.best.fitted.fit
     strength = compute_part(
@@ -183,7 +183,7 @@ def _said(estimate: Estimate, wider: float) -> str:
 
 
 def parameters_by_run(found: Discrepancy) -> Iterator[str | Picture]:
-    """Yield the sizes of the effects in each run by itself."""
+    """Yield the size of each effect in each run."""
     yield "## Run by run"
     sizes = [each.candidate.free[0] for each in found.assessment.identified]
     names = [run.name for run in found.data.fitted]
@@ -275,7 +275,7 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[str]:
 
 
 def _why(alternative: Alternative) -> str:
-    """Return why an alternative was not accepted."""
+    """Return the reason why an alternative was not accepted."""
     if alternative.contains:
         return "does the same with more parameters and gains no more"
     if alternative.alike:

@@ -1,4 +1,4 @@
-"""A report as blocks of Markdown (CommonMark with GitHub's tables), written as one file or as HTML.
+"""Reports as blocks of Markdown (CommonMark with GitHub's tables), with output as Markdown or HTML.
 
 Names of files and columns may contain any character: they pass through :func:`plain` or
 :func:`code`, which show them unchanged.
@@ -30,15 +30,15 @@ figcaption { color: #666; font-size: .9rem; }
 """
 
 SPECIAL: Final = re.compile(r"([\\`*_{}\[\]<>#~$&!])")
-"""Characters that are marks in Markdown."""
+"""Characters with a meaning in Markdown."""
 
 AHEAD: Final = re.compile(r"^(\s*\d*)([-+=.)])(?!\d)")
-"""Characters that are marks in Markdown at the start of a line."""
+"""Characters with a meaning in Markdown at the start of a line."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Picture:
-    """A figure by its name, and its caption."""
+    """Name and caption of a figure."""
 
     name: str
     caption: str
@@ -46,7 +46,7 @@ class Picture:
 
 @dataclasses.dataclass(frozen=True)
 class Document:
-    """A report: a plain title, and blocks of Markdown without headings above the second level."""
+    """A report: a plain title, and Markdown blocks with headings of the second level or below."""
 
     title: str
     blocks: tuple[str | Picture, ...]
@@ -63,7 +63,7 @@ def plain(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Return a span of code, in one more backtick than the text has in a row."""
+    """Return a code span, delimited by one more backtick than occurs in a row in the text."""
     text = text.replace("\n", " ")
     marks = "`" * (max((len(run) for run in re.findall("`+", text)), default=0) + 1)
     pad = " " if text.startswith("`") or text.endswith("`") else ""
@@ -71,12 +71,12 @@ def code(text: str) -> str:
 
 
 def bullets(texts: Iterable[str]) -> str:
-    """Return a list."""
+    """Return a bulleted list."""
     return "\n".join(f"- {text}" for text in texts)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[str] = ()) -> str:
-    """Return a table whose first column and those in ``words`` hold words, the others numbers."""
+    """Return a table; the first column and those in ``words`` are text, the others numbers."""
     ends = ["---" if not k or name in words else "--:" for k, name in enumerate(head)]
     lines = [" | ".join(cell.replace("|", r"\|") for cell in cells) for cells in (head, *rows)]
     first, *others = (f"| {line} |" for line in lines)
@@ -91,7 +91,7 @@ def as_markdown(document: Document, pictures: Mapping[str, str]) -> str:
     document : Document
         The report.
     pictures : mapping of str to str
-        File of each figure, relative to that of the report; other figures are left out.
+        File of each figure, relative to that of the report; figures without one are left out.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def as_html(document: Document, pictures: Mapping[str, bytes]) -> str:
     document : Document
         The report.
     pictures : mapping of str to bytes
-        PNG file of each figure; other figures are left out.
+        PNG file of each figure; figures without one are left out.
 
     Returns
     -------

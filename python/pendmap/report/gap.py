@@ -1,4 +1,4 @@
-"""Verdict, gap, residual torque, and periods and peaks in the report of a diagnosis."""
+"""Sections of a diagnosis report: verdict, gap, residual torque, periods and peaks."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ PROBABILITY: Final = (
     "weaker the effect is beside the strongest."
 )
 
-RARE: Final = 1e-9  # Least probability that is given
+RARE: Final = 1e-9  # Smallest reported probability
 
 UNEVEN: Final = 1.5
-"""Ratio of the noise at high speed to that at low speed from which it is mentioned."""
+"""Ratio of the noise at high speed to that at low speed above which the report mentions it."""
 
-LIKE: Final = 1.3  # Root mean square over the noise up to which both look alike
+LIKE: Final = 1.3  # Root mean square residual over the noise up to which both appear equal
 
 QUIET: Final = 20
-"""Percentage of the readings, those with the least noise, for which residuals are compared."""
+"""Percentage of the readings, those with the least noise, whose residuals are compared."""
 
 
 def verdict(found: Discrepancy) -> Iterator[str]:
@@ -70,7 +70,7 @@ def verdict(found: Discrepancy) -> Iterator[str]:
 
 
 def _statistics(found: Discrepancy) -> Iterator[str]:
-    """Yield the statistics of the verdict."""
+    """Yield the statistics on which the verdict is based."""
     judged = found.assessment
     form, limits = judged.form, Thresholds()
     yield (
@@ -103,7 +103,7 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
 
 
 def gap(found: Discrepancy) -> Iterator[str | Picture]:
-    """Yield the gap before and after, and the error of forecasts."""
+    """Yield the gap before and after, and the forecast errors."""
     own = found.gap
     floor = mrad(own.held_out_noise_floor)
     rows = [
@@ -142,7 +142,7 @@ def gap(found: Discrepancy) -> Iterator[str | Picture]:
 
 
 def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
-    """Yield rows of the error at some horizons."""
+    """Yield table rows of the forecast error at some horizons."""
     last = forecast.horizon.size - 1
     for k in dict.fromkeys((0, last // 4, last // 2, last)):
         yield (
@@ -155,7 +155,7 @@ def _ahead(forecast: Forecast) -> Iterator[tuple[str, ...]]:
 
 
 def where(found: Discrepancy) -> Iterator[str | Picture]:
-    """Yield the bins where torque is lacking, and the errors of periods and peaks."""
+    """Yield the bins with a missing torque, and the errors of periods and peaks."""
     yield "## Where the gap is"
     if found.where:
         yield "The torque per moment of inertia that the baseline lacks stands out most clearly:"
@@ -204,7 +204,7 @@ def _place(row: dict[str, Any]) -> str:
 
 
 def noise_of(found: Discrepancy) -> Iterator[str]:
-    """Yield which noise is meant, and where chi-squared shows more than root mean squares."""
+    """Yield notes on the noise, and on chi-squared if it shows more than root mean squares."""
     residuals, noise = [], []
     for run, own in zip(found.data.fitted, found.best.fitted.fit.residuals, strict=False):
         good = np.isfinite(own) & run.counted
@@ -235,7 +235,7 @@ def noise_of(found: Discrepancy) -> Iterator[str]:
 
 
 def _block_means(found: Discrepancy) -> Iterator[str]:
-    """Yield the runs whose dense readings were averaged."""
+    """Yield a note for each run whose dense readings were averaged."""
     data = found.data
     for run, k in zip(data.fitted, data.fitted_of, strict=True):
         size = data.runs[k].time.size

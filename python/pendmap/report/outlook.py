@@ -1,4 +1,4 @@
-"""The next experiment, what was left out, and detection limits in the report of a diagnosis."""
+"""Sections of a diagnosis report: the next experiment, exclusions and detection limits."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ LIMITS: Final = (
 """Header of the table of detection limits."""
 
 MORE: Final = 1.5
-"""Effective noise over that of the readings above which the difference is explained."""
+"""Effective noise over that of the readings above which the report explains the difference."""
 
 FIGURES: Final = {
     "separation": "separation",
     "interval": "half an interval of 95 %, over the value",
     "limits": "smallest size seen, over that now",
 }
-"""Predicted figure of each proposal, by aim."""
+"""Name of the figure of merit of a proposal, by aim."""
 
 
 def following(found: Discrepancy) -> Iterator[str]:
-    """Yield what to record next, and the prediction for each kind of run."""
+    """Yield the recommended next record, and the prediction for each kind of run."""
     yield "## The next experiment"
     advice = found.advice
     if advice.next_experiment is not None:
@@ -62,7 +62,7 @@ def following(found: Discrepancy) -> Iterator[str]:
 
 
 def _meaning(outlook: Outlook) -> str:
-    """Return the meaning of the figure of merit in the table of proposals."""
+    """Return an explanation of the figure of merit in the table of proposals."""
     if outlook.aim == "separation":
         return (
             "The separation is the part of the gain of one name that the other cannot follow; from "
@@ -103,7 +103,7 @@ def _proposals(outlook: Outlook) -> str:
 
 
 def set_aside(found: Discrepancy) -> Iterator[str]:
-    """Yield what was not used, not computed or not accepted, and the detection limits."""
+    """Yield the parts not used, not computed or not accepted, and the detection limits."""
     yield "## What was left out, and what would have shown"
     said = left_out(found.data.experiment, found.data.runs)
     texts = [plain(said.capitalize()) + "."] if said else []
@@ -155,7 +155,7 @@ def set_aside(found: Discrepancy) -> Iterator[str]:
 
 
 def _limit(found: Discrepancy, effect: str, limit: Limit) -> tuple[str, ...]:
-    """Return the row of an effect in the table of limits."""
+    """Return the row of an effect in the table of detection limits."""
 
     def said(candidate: Candidate) -> str:
         return ", ".join(f"{name} = {number(value)}" for name, value in candidate.shape.items())

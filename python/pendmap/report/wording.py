@@ -1,4 +1,4 @@
-"""Numbers and phrases that several parts of a report share."""
+"""Formatting of numbers and phrases shared by the parts of a report."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy, NamedEffect
 
 SMALL, LARGE = -4, 6
-"""Powers of ten, from the first and below the second, of numbers without an exponent."""
+"""Powers of ten of numbers without an exponent: first one included, first one excluded."""
 
-FAINT: Final = 1e-7  # Least standard error without an exponent
+FAINT: Final = 1e-7  # Least standard error of a number without an exponent
 
 RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with some digits; with an exponent where it is very small or large."""
+    """Return a number with some digits; with an exponent if it is very small or large."""
     if not value or not math.isfinite(value):
         return f"{value:g}"
     power = _power(float(f"{value:.{digits - 1}e}"))
@@ -35,7 +35,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def within(value: float, width: float) -> str:
-    """Return a number to two digits of its uncertainty, with an exponent where it is small."""
+    """Return a number to two digits of its uncertainty, with an exponent if it is small."""
     most = max(abs(value), abs(width))
     if not math.isfinite(most) or not 0 < most < 10.0**SMALL:
         return written(value, width)
@@ -44,7 +44,7 @@ def within(value: float, width: float) -> str:
 
 
 def stated(value: float, error: float) -> str:
-    """Return a number with its standard error to two digits, with one exponent."""
+    """Return a number with its standard error to two digits, with a common exponent."""
     if not (error and math.isfinite(error)):
         return number(value, 5)
     power = 0
@@ -69,12 +69,12 @@ def mrad(value: float) -> str:
 
 
 def gained(value: float) -> str:
-    """Return a score, or a difference of sums of squares."""
+    """Return a score or a difference of sums of squares as text."""
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"  # noqa: PLR2004 (three digits)
 
 
 def chance(probability: float) -> str:
-    """Return a probability in percent, never certain."""
+    """Return a probability in percent, never as 0 or 100 %."""
     if probability > 0.999:  # noqa: PLR2004 (as far as it is known)
         return "above 99.9 %"
     if probability < 0.001:  # noqa: PLR2004
@@ -88,13 +88,13 @@ def share(part: float) -> str:
 
 
 def joined(names: Iterable[str], last: str = "and") -> str:
-    """Return names joined as in a sentence."""
+    """Return names joined by commas and a last conjunction."""
     each = [code(name) for name in names]
     return f" {last} ".join([", ".join(each[:-1]), each[-1]] if len(each) > 1 else each)
 
 
 def values(effect: NamedEffect) -> str:
-    """Return an effect with its parameters, their intervals of 95 % and their units."""
+    """Return an effect's parameters with 95 % intervals and units."""
     said = []
     for name, value in effect.parameters.items():
         unit = unit_of(f"{effect.name}.{name}", lambda _: effect.definition)
@@ -109,7 +109,7 @@ def values(effect: NamedEffect) -> str:
 
 
 def lead(found: Discrepancy) -> str:
-    """Return a diagnosis in one sentence."""
+    """Return a summary of a diagnosis in one sentence."""
     names = joined(effect.name for effect in found.effects)
     several = len(found.effects) > 1
     nearest = found.nearest.fitted.names
@@ -155,7 +155,7 @@ def before_and_after(
     rows: Iterable[Sequence[str]],
     words: Sequence[str] = (),
 ) -> str:
-    """Return a table, without the columns ``after`` where the best model is the baseline."""
+    """Return a table, without the columns ``after`` if the best model is the baseline."""
     if found.adds:
         return table(head, rows, words)
     kept = [k for k, name in enumerate(head) if not name.startswith(("after", "moved"))]

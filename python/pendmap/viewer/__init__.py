@@ -1,8 +1,8 @@
-"""Recordings for the Rerun viewer; the only place that imports rerun.
+"""Recordings for the Rerun viewer; the only package that imports rerun.
 
-``record`` looks at what a dataset holds and writes its recording, ``record_identification`` writes
-that of what was found in records, ``record_discrepancy`` that of what a model lacks;
-``open_viewer`` shows one; ``Live`` sends a trajectory to a running viewer while it is computed.
+``record`` writes the recording of a dataset, ``record_identification`` that of an identification,
+``record_discrepancy`` that of a diagnosis; ``open_viewer`` shows a recording; ``Live`` sends a
+trajectory to a running viewer during its computation.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ __all__ = [
     "record_identification",
 ]
 
-SUFFIXES = (".rrd",)  # The kind of file a recording is
+SUFFIXES = (".rrd",)  # File suffix of a recording
 
 CELLS = 4096
-"""Rows and columns of an image at most: graphics processors take no larger ones for sure."""
+"""Most rows and columns of an image; not all graphics processors take larger ones."""
 
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
@@ -72,7 +72,7 @@ _OF_RECORDS = {
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
-    """Import recordings of records when they are asked for: importing fits takes half a second."""
+    """Import recordings of records on demand: importing fits takes half a second."""
     if name not in _OF_RECORDS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_OF_RECORDS[name]), name)
@@ -81,18 +81,18 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
 def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write the recording of a dataset, with the layout in which the viewer shows it.
 
-    Of a basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
-    ``/turns/data/turns``, ``/exponent/data/exponent`` (those layers that tell something, the
-    leading one in front), ``/legend`` and ``/summary``. Of closed orbits: ``/phase/data/NUMBER``
-    with ``path`` and ``points``, ``/legend`` and ``/summary``. Of a map over two parameters:
-    ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``. Of a bifurcation
-    diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Of an exponent:
-    ``/growth/data/own``, ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or,
-    of a closed orbit, ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Of a
-    lifetime: ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
-    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Of critical curves:
-    ``/tongues/data/{plus,minus,undamped,fold,own}`` and the same under ``/paper`` in the plane of
-    eq. 1.4. Of Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Of a trajectory:
+    Basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
+    ``/turns/data/turns``, ``/exponent/data/exponent`` (meaningful layers, the leading one in
+    front), ``/legend`` and ``/summary``. Closed orbits: ``/phase/data/NUMBER`` with ``path`` and
+    ``points``, ``/legend`` and ``/summary``. Map over two parameters: ``/kinds/data/kinds``,
+    ``/{exponent,attractors,undecided}/data/values``. Bifurcation diagram:
+    ``/{bifurcation,velocity,exponent}/data/NUMBER``. Exponent: ``/growth/data/own``,
+    ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or, for a closed orbit,
+    ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Lifetime:
+    ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
+    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Critical curves:
+    ``/tongues/data/{plus,minus,undamped,fold,own}``, also under ``/paper`` in the plane of
+    eq. 1.4. Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
     ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
     ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
@@ -100,17 +100,17 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     dataset : xarray.Dataset
-        What ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        Result of ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
-        ``pendmap.melnikov`` or ``pendmap.simulate`` returned; ``attrs["kind"]`` tells which. Of a
-        selection the recording shows the cells that are there, as :func:`pendmap.render.draw`.
+        ``pendmap.melnikov`` or ``pendmap.simulate``; ``attrs["kind"]`` names the kind. A
+        selection is shown with its own cells, as by :func:`pendmap.render.draw`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The recording of a basin map: labels, attractors, settle time, net turns, exponent."""
+"""Recording of a basin map: labels, attractors, settle time, net turns, exponent."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CELLS = 4096
-"""Rows and columns of an image at most: graphics processors take no larger ones for sure."""
+"""Most rows and columns of an image; not all graphics processors take larger ones."""
 
-SAMPLE = 1000  # Rows and columns of the sample from which the limits of a colour scale are taken
+SAMPLE = 1000  # Rows and columns of the sample that gives the limits of a colour scale
 
 _SAME = {name: name for name in ("turns", "exponent", "probability", "entropy")}
-ROOTS = {"labels": "basin", "settle": "settle"} | _SAME  # Where each layer is logged
+ROOTS = {"labels": "basin", "settle": "settle"} | _SAME  # Path at which each layer is logged
 
 _LEAF = {"labels": "labels", "settle": "steps"} | _SAME
 _COLOUR_MAPS = {"settle": "viridis", "exponent": "magma"}
@@ -33,7 +33,7 @@ _TURNS_MOST = 30000
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
-    """Return the layout: one tab a layer, the leading one in front, legend and summary beside."""
+    """Return the layout: one tab per layer, the leading one in front; legend and summary aside."""
     shown = layering.layers(dataset)
     listed = legend.entries(dataset)
     rows = -(-len(listed) // 4)
@@ -58,7 +58,7 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log every layer that tells something, the attractors and the legend."""
+    """Log every meaningful layer, the attractors and the legend."""
     around = _frame(dataset)
     shown = layering.layers(dataset)
     listed = legend.entries(dataset)
@@ -84,7 +84,7 @@ def _frame(dataset: xr.Dataset) -> frame.Frame:
 
 
 def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame:
-    """Return a frame that holds every attractor's points, where no map is drawn with them."""
+    """Return a frame that contains every attractor's points, for a plane without a map."""
     velocity = np.concatenate([entry.points[:, 1] for entry in listed])
     low, high = float(velocity.min()), float(velocity.max())
     pad = max(0.06 * (high - low), 0.05)
@@ -112,7 +112,7 @@ def _image(
 
 
 def _classes(dataset: xr.Dataset, shift: int) -> list[Any]:
-    """Return class, name and colour of each label, failed and undecided cells included."""
+    """Return class, name and colour of each label, including failed and undecided cells."""
     names = dict(zip(dataset["id"].values, dataset["attractor"].values, strict=True))
     names = {-1: "failed", 0: "undecided"} | {int(i): str(name) for i, name in names.items()}
     shades = legend.colours(dataset)
@@ -132,7 +132,7 @@ def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame
 def _scalar(
     stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame, layer: str
 ) -> None:
-    """Log a layer of numbers; cells without one have their label's colour on top."""
+    """Log a scalar layer; cells without a value have their label's colour on top."""
     array = dataset[layering.VARIABLES[layer]]
     values, sample = (plane.pixels(dataset, array, most) for most in (CELLS, SAMPLE))
     absent = values < 0 if layer == "settle" else ~np.isfinite(values)
@@ -162,7 +162,7 @@ def _scalar(
 
 
 def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the net turns as classes, each named by its number: class = turns + offset."""
+    """Log the net turns as classes named by their number: class = turns + offset."""
     turns = plane.pixels(dataset, dataset["net_turns"], CELLS)
     label = plane.pixels(dataset, dataset["label"], CELLS)
     most = int(min(max(-int(turns.min()), int(turns.max()), 1), _TURNS_MOST))
@@ -195,7 +195,7 @@ def _cover(
     layer: str,
     absent: npt.NDArray[np.bool_],
 ) -> None:
-    """Log the labels, shifted by 2, of cells without a value over a layer; 0 shows through."""
+    """Log the labels, shifted by 2, of cells without a value over a layer; 0 is transparent."""
     label = plane.pixels(dataset, dataset["label"], CELLS)
     cover = np.where(absent, label + 2, 0).astype(np.uint16)
     path = f"{ROOTS[layer]}/data/without"
@@ -213,7 +213,7 @@ def _attractors(
     *,
     named: bool,
 ) -> None:
-    """Log the attractors' points, those of orbits in two rings and with the name at the first."""
+    """Log the attractors' points; points of orbits have two rings, and a name at the first one."""
     path = f"{root}/data/attractors"
     spots: list[tuple[float, float]] = []
     orbits: list[tuple[float, float]] = []
@@ -247,7 +247,7 @@ def _attractors(
 
 
 def _swatches(stream: rr.RecordingStream, listed: list[legend.Entry], around: frame.Frame) -> None:
-    """Log the legend below the map: a spot of each colour with the name under it."""
+    """Log the legend below the map: a spot of each colour with the name below it."""
     at = [
         (125.0 + 250.0 * (k % 4), around.height + 170.0 + 110.0 * (k // 4))
         for k in range(len(listed))
@@ -265,7 +265,7 @@ def _swatches(stream: rr.RecordingStream, listed: list[legend.Entry], around: fr
 
 
 def _tint(colour: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Return a colour halfway to white, for letters upon the map."""
+    """Return a colour halfway to white, for text on the map."""
     red, green, blue = ((255 + part) // 2 for part in colour)
     return red, green, blue
 

@@ -1,4 +1,4 @@
-"""Any chart as a recording: panels with frame and ticks in 2D views, marks in their own units."""
+"""Any chart as a recording: panels with frame and ticks in 2D views, marks in the axes' units."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
     Log = Callable[[rr.RecordingStream, str, Any, "Place"], None]
 
 PALE: Final = {charts.INK: frame.INK, charts.QUIET: frame.INK}
-"""Colours that would not be seen on a dark background, and what stands for them."""
+"""Colours that are invisible on a dark background, with their replacements."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a panel lies in a view; logarithmic axes show powers of ten."""
+    """Position of a panel in a view; logarithmic axes show powers of ten."""
 
     panel: Panel
     frame: frame.Frame
 
     @classmethod
     def of(cls, panel: Panel, ratio: float) -> Place:
-        """Return the place of a panel of this ratio of height to width."""
+        """Return the place of a panel with this ratio of height to width."""
         sides = [_side(panel, which) for which in "xy"]
         (x, across), (y, up) = sides
         angles = (panel.x.scale == "angle", panel.y.scale == "angle")
         return cls(panel, frame.Frame(x, y, (across, up), ratio, angles))
 
     def points(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
-        """Return points, shape (n, 2), as the axes count them."""
+        """Return points, shape (n, 2), in the coordinates of the axes."""
         both = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         sides = (self.panel.x, self.panel.y)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -56,12 +56,12 @@ class Place:
         return np.stack(scaled, axis=-1)
 
     def lines(self, *lines: Floats) -> list[Floats]:
-        """Return the parts of lines that are numbers and lie in the panel: a view clips nothing."""
+        """Return the finite parts of lines within the panel, because a view does not clip."""
         return frame.pieces(lines, *zip(self.frame.x, self.frame.y, strict=True))
 
 
 def _side(panel: Panel, which: str) -> tuple[charts.Ends, str]:
-    """Return the ends and the name of an axis, of a logarithmic one as powers of ten."""
+    """Return the limits and the name of an axis; powers of ten for a logarithmic one."""
     side: Axis = getattr(panel, which)
     ends = side.ends or holding(*(_values(mark, which) for mark in panel.marks))
     if side.scale != "log":
@@ -81,7 +81,7 @@ def _values(mark: Mark, which: str) -> npt.ArrayLike:
 
 
 def blueprint(chart: Chart) -> rrb.Blueprint:
-    """Return the layout: the panels, legend and summary beside them."""
+    """Return the layout: the panels, with legend and summary beside them."""
     views = [
         Place.of(panel, chart.ratio).frame.view(panel.where, _title(panel))
         for panel in chart.panels
@@ -109,7 +109,7 @@ def _recorded(panel: Panel) -> bool:
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset, chart: Chart) -> None:
-    """Log every panel of a chart, the legend and the dataset's summary; nothing moves."""
+    """Log every panel of a chart, the legend and the dataset's summary, all static."""
     frame.summary(stream, dataset)
     named: dict[str, str] = {}
     for panel in chart.panels:
@@ -121,7 +121,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset, chart: Chart) -> None:
 
 
 def legend(marks: Sequence[Mark]) -> dict[str, str]:
-    """Return the names of recorded marks and their colours in words."""
+    """Return the names of recorded marks, with their colours in words."""
     named = {mark.name: palette.in_words(mark.colour) for mark in marks if mark.name and mark.path}
     for mark in marks:
         if isinstance(mark, charts.Image):
@@ -130,7 +130,7 @@ def legend(marks: Sequence[Mark]) -> dict[str, str]:
 
 
 def log_panel(stream: rr.RecordingStream, place: Place) -> None:
-    """Log the frame of a panel and its marks that have a path."""
+    """Log the frame of a panel and those of its marks that have a path."""
     root = place.panel.where
     place.frame.log(stream, root)
     for mark in place.panel.marks:
@@ -159,7 +159,7 @@ def _line(stream: rr.RecordingStream, path: str, mark: charts.Line, place: Place
     if mark.step:
         x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
         if y.size > 1 and y[-1] == y[-2]:
-            x, y = x[:-1], y[:-1]  # the last value holds up to its edge alone
+            x, y = x[:-1], y[:-1]  # the last value extends to its edge only
     _strips(stream, path, mark, place.lines(place.points(x, y)), mark.width)
 
 
@@ -192,7 +192,7 @@ def _level(stream: rr.RecordingStream, path: str, mark: charts.Level, place: Pla
 
 
 def _image(stream: rr.RecordingStream, path: str, mark: charts.Image, place: Place) -> None:
-    """Log classes with names and colours; numbers as colours, blue to red, and their bar."""
+    """Log classes with names and colours, or numbers as colours from blue to red with their bar."""
     stream.log(path, place.frame.of_pixels(mark.values.shape), static=True)
     if mark.colours is None:
         context = [(k, n, palette.parts(colour)) for k, (n, colour) in enumerate(mark.classes)]
@@ -200,7 +200,7 @@ def _image(stream: rr.RecordingStream, path: str, mark: charts.Image, place: Pla
         stream.log(path, rr.SegmentationImage(mark.values, opacity=1.0), static=True)
         return
     low, high = mark.colours.low, mark.colours.high
-    # Those with two halves are about 0; others have the same scale about their least value.
+    # Scales with two halves are centred at 0, others at their least value.
     middle, half = low, max(high - low, 1e-9)
     if mark.colours.scale == "centred":
         middle, half = 0.0, max(abs(low), abs(high))

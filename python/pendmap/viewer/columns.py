@@ -1,4 +1,4 @@
-"""Whole columns of a recording: points and strips that move as time goes on."""
+"""Whole columns of a recording: points and line strips that move with time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pendmap.viewer import frame
 Floats = npt.NDArray[np.float64]
 
 FASTEST, LATEST = 1e30, 9e9
-"""Velocity and time that a recording can hold: its places are single precision, its times ns."""
+"""Largest velocity and time in a recording: positions are single precision, times ns."""
 
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 2)
 _STRIP = pa.list_(pa.field("item", _POINT, nullable=False))
@@ -22,7 +22,7 @@ _STRIP = pa.list_(pa.field("item", _POINT, nullable=False))
 
 @dataclass(frozen=True)
 class Look:
-    """Colour, and radius in points of the screen; what has a greater order lies on top."""
+    """Colour, radius in screen points, and drawing order (greater is on top)."""
 
     colour: tuple[int, int, int]
     size: float
@@ -30,7 +30,7 @@ class Look:
 
 
 def at(time: Floats) -> rr.TimeColumn:
-    """Return the instants of a column."""
+    """Return the time column of these instants."""
     return rr.TimeColumn(frame.TIMELINE, duration=time)
 
 
@@ -42,7 +42,7 @@ def points(
     look: Look,
     *further: rr.TimeColumn,
 ) -> None:
-    """Log one point an instant, shape (n, 2)."""
+    """Log one point per instant, shape (n, 2)."""
     style = rr.Points2D.from_fields(
         colors=[look.colour], radii=rr.Radius.ui_points(look.size), draw_order=look.order
     )
@@ -59,7 +59,7 @@ def strips(
     lines: Floats,
     look: Look,
 ) -> None:
-    """Log one strip an instant, shape (n, m, 2), as Arrow arrays: lists take fifty times longer."""
+    """Log one strip per instant, shape (n, m, 2), as Arrow arrays: lists are 50 times slower."""
     style = rr.LineStrips2D.from_fields(
         colors=[look.colour], radii=rr.Radius.ui_points(look.size), draw_order=look.order
     )

@@ -1,4 +1,4 @@
-"""A record beside its model: readings, residual, velocities, at the instants that are drawn."""
+"""A record with its model: readings, residual, velocities, at the drawn instants."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 INSTANTS = 20000
-"""Instants of a run that are drawn; of a longer one every k-th, unless that leaves too few of each
-swing."""
+"""Greatest number of drawn instants of a run; of a longer one every k-th is drawn, unless too few
+per swing would remain."""
 
-PER_SWING = 24  # Instants of a swing that are kept
+PER_SWING = 24  # Least number of drawn instants per swing
 
-GAP = 8.0  # Intervals, over the usual one, from which on nothing is drawn across a gap
+GAP = 8.0  # Interval, over the median, above which a gap is not bridged
 
 SLOPE = 0.05
-"""Part of a swing over which the record's velocity is a difference: a longer one cuts its peaks
-(by 0.4 % here), a shorter one lets the noise through."""
+"""Part of a swing over which the record's velocity is a difference: a longer one reduces its peaks
+(by 0.4 % here), a shorter one amplifies the noise."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A record and its model, all in s, rad and rad/s; what is not known is no number.
+    """A record and its model, all in s, rad and rad/s; unknown values are NaN.
 
     ``speed`` is measured or a difference, ``left_out`` marks samples that are not for fitting.
-    ``model`` is what the sensor would read, empty without a model; ``model_time`` is ``time`` but
-    for a record of peaks alone, which is ``sparse``. ``residual`` is record less model, ``peaks``
-    are in the turn in which they are drawn, ``sigma`` is the noise of a reading, 0 if not known.
-    A row without numbers ends what is before a gap.
+    ``model`` includes the sensor's errors and is empty without a model; ``model_time`` is ``time``
+    except for a record of peaks alone, which is ``sparse``. ``residual`` is record minus model,
+    ``peaks`` are in the turn in which they are drawn, ``sigma`` is the noise of a reading, 0 if
+    unknown. A row of NaN marks a gap.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Comparison:
 
 
 def comparisons(report: IdentificationReport) -> list[Comparison]:
-    """Return every run that was fitted, or else the decay with the best model's simulation."""
+    """Return every fitted run, or else the decay with the best model's simulation."""
     joint = report.joint
     if joint is None:
         return [_simulated(report)]
@@ -67,8 +67,8 @@ def comparisons(report: IdentificationReport) -> list[Comparison]:
     for k, (run, reading) in enumerate(zip(joint.runs, joint.readings, strict=True)):
         (theta, speed), residual = joint.fit.curves[k], joint.fit.residuals[k]
         counted = run.trusted & np.isfinite(theta)
-        # The fit gives the angle itself: the sensor's errors are added, as they are nearby where a
-        # sample does not count; those of a sensor on the rod are none of an angle.
+        # The fit gives the angle itself. The sensor's errors are added, interpolated over samples
+        # that are not used; errors of a sensor on the rod do not apply to the angle.
         off = run.theta - residual - theta if run.rod_sensor is None else 0 * theta
         offset = off[counted]
         error = np.interp(run.time, run.time[counted], offset) if offset.size else 0.0
@@ -115,7 +115,7 @@ def _simulated(report: IdentificationReport) -> Comparison:
 
 
 def _of_peaks(run: Run, peaks: Peaks, curve: CubicHermiteSpline | None, w0: float) -> Comparison:
-    """Return peaks alone with the model's curve; they turn, so that their velocity is 0."""
+    """Return peaks alone with the model's curve; their velocity is 0."""
     time, none = peaks.time, np.empty(0)
     model_time, model, speed, residual = none, none, none, np.full(time.size, math.nan)
     if curve is not None:
@@ -143,7 +143,7 @@ def _of_peaks(run: Run, peaks: Peaks, curve: CubicHermiteSpline | None, w0: floa
 def _drawn(
     run: Run, columns: tuple[Floats, Floats, Floats], peaks: Peaks, w0: float, sigma: float
 ) -> Comparison:
-    """Return model, its velocity and the residual beside a run, thinned and cut at gaps."""
+    """Return model, its velocity and the residual for a run, thinned and cut at gaps."""
     step = float(np.median(np.diff(run.time)))
     kept, cuts, instants = drawn_at(run.time, w0)
     model, model_speed, residual = columns
@@ -168,9 +168,9 @@ def _drawn(
 
 
 def drawn_at(time: Floats, w0: float) -> tuple[slice, npt.NDArray[np.int64], Floats]:
-    """Return the samples of a run that are drawn, places among them of gaps, all instants (s).
+    """Return the drawn samples of a run, the positions of gaps among them, and all instants (s).
 
-    ``w0`` is the natural frequency in rad/s, 0 where it is not known.
+    ``w0`` is the natural frequency in rad/s, 0 if unknown.
     """
     step = float(np.median(np.diff(time)))
     swing = math.tau / w0 / step if w0 else math.inf
@@ -183,7 +183,7 @@ def drawn_at(time: Floats, w0: float) -> tuple[slice, npt.NDArray[np.int64], Flo
 
 
 def _speed(run: Run, w0: float, step: float) -> Floats:
-    """Return the velocity that was measured, or else differences between trusted samples."""
+    """Return the measured velocity, or else differences between trusted samples."""
     if run.velocity is not None:
         return np.where(run.trusted, run.velocity, math.nan)
     speed = np.full(run.time.size, math.nan)
@@ -200,7 +200,7 @@ def _speed(run: Run, w0: float, step: float) -> Floats:
 
 
 def _in_turn(peaks: Peaks, run: Run) -> Peaks:
-    """Return peaks in the turns in which the record has them: theirs end in the one of rest."""
+    """Return peaks shifted by whole turns to the record; theirs end in the turn of rest."""
     if not len(peaks):
         return peaks
     near = np.interp(peaks.time, run.time, run.theta)

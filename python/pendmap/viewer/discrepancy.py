@@ -1,4 +1,4 @@
-"""The recording of a diagnosis: record and both models side by side, residuals, the report."""
+"""Recording of a diagnosis: record and both models side by side, residuals, the report."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ RATIO: Final = 0.56  # Height of a panel over its width
 RECORD: Final = Series("record", (128, 128, 128), 1.0)
 BEFORE: Final = Series("before", (213, 94, 0), 1.6)
 AFTER: Final = Series("after", (0, 114, 178), 1.6)
-APART: Final = 2.5  # Lengths of the arm between two pivots
+APART: Final = 2.5  # Distance between two pivots, arm lengths
 THIN, BROAD = (0.8, 4.0, 3.0), (3.0, 10.0, 1.0)
-"""Radii of arm and bob, in points of the screen, and which lies on top: the greater one."""
+"""Radii of arm and bob, in screen points, and drawing order (greater is on top)."""
 SEEN: Final = 0.3
-"""Angle by which the old model's pendulum stands off where it is off by three times its residual's
-root mean square, rad."""
-MOST: Final = 1000.0  # Greatest magnification of the deviations that are drawn
+"""Angle at which the old model's pendulum is drawn at a residual of three times the root mean
+square, rad."""
+MOST: Final = 1000.0  # Greatest magnification of the drawn deviations
 
 
 @dataclass(frozen=True)
 class Beside:
-    """A record (s, rad) and what two models leave of it (rad), with the noise of a reading.
+    """A record (s, rad) and the residuals of two models (rad), with the noise of a reading.
 
-    A row without numbers ends what is before a gap; what does not count is no number.
+    A row of NaN marks a gap; samples that are not used are NaN.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Beside:
 
     @property
     def rms(self) -> float:
-        """Root mean square of what the old model leaves, rad; 0 where nothing counts."""
+        """Root mean square residual of the old model, rad; 0 if no sample is used."""
         known = self.before[np.isfinite(self.before)]
         return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
@@ -63,26 +63,26 @@ class Beside:
 def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """Write the recording of a diagnosis, with the layout in which the viewer shows it.
 
-    For each run, ``k`` from 1, those held out last: three pendulums side by side,
-    ``/run_k/pendulum/data/{record,before,after}/{arm,bob}``, the models' deviations from the record
-    drawn larger by a factor that the view names; ``/run_k/angle/{record,before,after}`` (rad) and
-    ``/run_k/residual/{before,after,above,below}`` (mrad; two standard deviations of the noise about
-    0), on the timeline ``sim_time``, the record's own seconds. The torque that both models lack in
-    ``/torque/{angle,velocity,amplitude,drive_phase,lab_time}/data/{before,after}``, the error of
-    forecasts in ``/forecast/{free,forced}/data/{before,after,noise}``, the report's text in
-    ``/summary``.
+    For each run, ``k`` from 1, with held-out runs last: three pendulums side by side,
+    ``/run_k/pendulum/data/{record,before,after}/{arm,bob}``, the models' deviations from the
+    record magnified by a factor in the view's name; ``/run_k/angle/{record,before,after}`` (rad)
+    and ``/run_k/residual/{before,after,above,below}`` (mrad; two standard deviations of the noise
+    about 0), on the timeline ``sim_time``, the record's own seconds. The missing torque of both
+    models is in ``/torque/{angle,velocity,amplitude,drive_phase,lab_time}/data/{before,after}``,
+    the forecast error in ``/forecast/{free,forced}/data/{before,after,noise}``, the report's text
+    in ``/summary``.
 
     Parameters
     ----------
     found : Discrepancy
-        What :func:`pendmap.diagnosis.diagnose` returned.
+        Result of :func:`pendmap.diagnosis.diagnose`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     if panels:
         views = [place.frame.view(place.panel.where, place.panel.title) for place in panels]
         tabs.append(rrb.Grid(*views, grid_columns=2, name="Gap"))
-    # The run that the baseline misses most lies in front.
+    # The run with the worst baseline fit is in front.
     worst = int(np.argmax([one.rms / one.sigma for one in shown]))
     aside = rrb.TextDocumentView(origin="/summary", name="Report")
     estimates = [(n, e.value) for n, e in found.best.fitted.fit.estimates.items()]
@@ -135,7 +135,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
 
 
 def _beside(found: Discrepancy) -> list[Beside]:
-    """Return all runs, those that were held back whole after the others."""
+    """Return all runs, with whole runs held out after the others."""
     data, base, best = found.data, found.base, found.best
     fits, w0 = (base.fitted.fit, best.fitted.fit), found.base.fitted.fit.model.w0
     held = (base.hold_out.fit, best.hold_out.fit)
@@ -143,7 +143,7 @@ def _beside(found: Discrepancy) -> list[Beside]:
     for k, run in enumerate(data.fitted):
         left = [_left(run, fit, k) for fit in fits]
         if data.inside and data.fitted_of[k] in data.held_of:
-            # The stretches held back lie within the run, and the motion passes through them.
+            # The stretches held back lie within the run, and the motion continues through them.
             place = data.held_of.index(data.fitted_of[k])
             back = [_left(data.held[place], fit, place) for fit in held]
             left = [np.where(np.isfinite(b), b, a) for a, b in zip(left, back, strict=True)]
@@ -172,14 +172,14 @@ def _drawn(run: FitRun, left: list[Floats], name: str, w0: float) -> Beside:
 
 
 def _magnified(shown: list[Beside]) -> float:
-    """Return how much larger deviations of the pendulums are drawn: 1, 2, 5, 10, ..."""
+    """Return the magnification of the pendulums' deviations: 1, 2, 5, 10, ..."""
     wanted = SEEN / (3 * max(*(one.rms for one in shown), 1e-12))
     power = 10.0 ** math.floor(math.log10(wanted))
     return float(np.clip(max(m * power for m in (1, 2, 5) if m * power <= wanted), 1.0, MOST))
 
 
 def _views(root: str, one: Beside, larger: float) -> rrb.Container:
-    """Return the views of a run: three pendulums above, angles and residuals beneath."""
+    """Return the views of a run: three pendulums above, angles and residuals below."""
     times = f", deviations {larger:g} times larger" if larger > 1 else ""
     pendulums = rrb.Spatial2DView(
         origin=f"/{root}/pendulum",
@@ -199,8 +199,8 @@ def _views(root: str, one: Beside, larger: float) -> rrb.Container:
 def _log(stream: rr.RecordingStream, root: str, one: Beside, larger: float) -> None:
     """Log one run: angles, residuals, and three pendulums side by side.
 
-    A model's pendulum hangs as the record's, which is thin behind it, and how far it is off that is
-    ``larger`` times larger.
+    A model's pendulum is drawn at the record's angle plus its deviation magnified by ``larger``;
+    the record's pendulum is thin behind it.
     """
     runs.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
     at = f"{root}/pendulum"

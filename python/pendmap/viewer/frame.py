@@ -1,4 +1,4 @@
-"""Parts of all recordings: the recording itself, and the frame of a panel on the screen."""
+"""Parts shared by all recordings: the recording itself, and the axes of a panel."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-INK = (150, 150, 150)  # Lines and labels in a mid tone: the background may be light or dark
+INK = (150, 150, 150)  # Mid grey of lines and labels: the background may be light or dark
 
-SIDE = 1000.0  # Width of a frame on the screen, in the view's own units
+SIDE = 1000.0  # Width of a frame, units of the view
 
-SHORT = 8  # Letters of a name that has room beside the ticks
+SHORT = 8  # Greatest number of letters of an axis name beside the ticks
 
 TIMELINE = "sim_time"
 
@@ -37,13 +37,13 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     known = ("label", "regime", "entry_theta", "theta", "theta_point", "p", "p_melnikov")
     telling = next(name for name in (*known, *dataset.data_vars) if name in dataset)
     content.update(np.ascontiguousarray(dataset[telling].values).data)
-    for name in sorted(map(str, dataset.indexes)):  # which part of a result it is
+    for name in sorted(map(str, dataset.indexes)):  # identifies the selected part of a result
         content.update(repr((name, dataset[name].values.tolist())).encode())
     return identified(content.hexdigest())
 
 
 def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
-    """Return an empty recording of this name, without the time of day in it.
+    """Return an empty recording with an identifier, without the time of day.
 
     The viewer shows all recordings of an application in the layout of the one opened first.
     """
@@ -54,7 +54,7 @@ def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
 
 @contextlib.contextmanager
 def strict() -> Iterator[None]:
-    """Let the recording library raise where it would only warn and leave something out."""
+    """Make the recording library raise errors instead of warning and dropping data."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
     try:
@@ -67,9 +67,9 @@ def strict() -> Iterator[None]:
 def written(
     stream: rr.RecordingStream, layout: rrb.BlueprintLike, path: Path
 ) -> Iterator[rr.RecordingStream]:
-    """Collect what is logged in the block in memory, with its layout, and write it at the end.
+    """Collect the data logged in the block in memory, with a layout, and write them at the end.
 
-    The library's own way to a file waits for ever where the disk takes no more.
+    The library's own file output blocks indefinitely when the disk is full.
     """
     try:
         with stream:
@@ -104,7 +104,7 @@ def text(stream: rr.RecordingStream, path: str, markdown: str) -> None:
 
 
 def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
-    """Return the layout of a window: these views side by side, none that the viewer would add."""
+    """Return the layout of a window: these views side by side, without automatic ones."""
     return rrb.Blueprint(
         rrb.Horizontal(*views, column_shares=list(shares)),
         rrb.BlueprintPanel(state="collapsed"),
@@ -117,12 +117,12 @@ def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blu
 
 @dataclass(frozen=True)
 class Frame:
-    """A rectangle with two axes, and where it lies in a 2D view.
+    """A rectangle with two axes, and its position in a 2D view.
 
-    A 2D view counts downward and draws both directions to one scale. So everything under
-    ``root/data`` is logged in physical units, one static transform there brings it to the screen,
-    and the frame with its ticks is drawn under ``root/axes``, ``SIDE`` wide. ``ratio`` is height
-    over width; ``angles`` says which axes have multiples of pi as labels.
+    A 2D view has y downward and one scale for both directions. So everything under ``root/data`` is
+    logged in physical units, one static transform maps it to the screen, and the frame with its
+    ticks is drawn under ``root/axes``, ``SIDE`` wide. ``ratio`` is height over width; ``angles``
+    tells which axes have multiples of pi as labels.
     """
 
     x: tuple[float, float]
@@ -133,14 +133,14 @@ class Frame:
 
     @classmethod
     def phase(cls, x: tuple[float, float], y: tuple[float, float], units: Units) -> Frame:
-        """Return the frame of a phase plane, neither a slit nor a tower."""
+        """Return the frame of a phase plane, with a bounded ratio of its sides."""
         low, high = (units.bare(bound, VELOCITY) for bound in y)
         ratio = min(max((high - low) / (x[1] - x[0]), 0.3), 1.3)
         return cls(x, y, (names.ANGLE, names.speed(units)), ratio, (True, False))
 
     @property
     def height(self) -> float:
-        """Height on the screen."""
+        """Height in units of the view."""
         return SIDE * self.ratio
 
     def to_screen(self) -> rr.Transform3D:
@@ -200,7 +200,7 @@ class Frame:
             places.append([-70, at - 22])
             labels.append(label)
         below, beside = self.axes
-        # A name longer than a symbol has no room beside the ticks.
+        # A long name does not fit beside the ticks.
         above = len(beside) > SHORT
         places += [[w / 2, h + 75], [0, -85] if above else [-135, h / 2 - 22]]
         labels += [plane.shifted(below, across), plane.shifted(beside, up)]
@@ -257,9 +257,9 @@ def pieces(
     low: npt.ArrayLike = -np.inf,
     high: npt.ArrayLike = np.inf,
 ) -> list[npt.NDArray[np.float64]]:
-    """Return the parts of lines, shape (n, 2) each, that are numbers from ``low`` to ``high``.
+    """Return the parts of lines, shape (n, 2) each, with finite values from ``low`` to ``high``.
 
-    Two places or more a part: what is left out is a gap, where nothing is drawn across.
+    Each part has two or more points; between parts nothing is drawn.
     """
     low, high = np.asarray(low), np.asarray(high)
     found = []
@@ -272,9 +272,9 @@ def pieces(
 
 
 def _plain(value: object) -> float | str | None:
-    """Return a property's value as a number or text, None where it is neither.
+    """Return a property's value as a number or text, or None for another type.
 
-    A property keeps one type in all recordings of a process, so that whole numbers are floats too.
+    A property keeps one type in all recordings of a process, so whole numbers become floats.
     """
     if isinstance(value, str):
         return value

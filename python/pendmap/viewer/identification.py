@@ -1,4 +1,4 @@
-"""The recording of an identification: record, model, residual, and both pendulums swinging."""
+"""Recording of an identification: record, model, residual, and both pendulums in motion."""
 
 from __future__ import annotations
 
@@ -29,47 +29,47 @@ if TYPE_CHECKING:
     from pendmap.identification import Estimate, IdentificationReport
 
 
-# The model is drawn broad, and the record thin upon it: so both are seen where they agree.
+# The model is drawn broad with the thin record on top, so that both remain visible.
 RECORD: Final = Series("record", (230, 159, 0), 1.2)
 MODEL: Final = Series("model", (0, 114, 178), 4.0)
 PEAKS: Final = Series("peaks", (213, 94, 0))
 RESIDUAL: Final = Series("record less model", (0, 158, 115))
 LEFT_OUT: Final = Series("not for fitting", (204, 121, 167))
 THIN, BROAD = (1.5, 7.0, 3.0), (4.5, 13.0, 1.0)
-"""Radii of arm and bob, in points of the screen, and order, of the record and of the model."""
-CLOSE: Final = 4.0  # Swings that the close view shows on either side of the cursor
+"""Radii of arm and bob, in screen points, and drawing order, of the record and of the model."""
+CLOSE: Final = 4.0  # Half width of the close view about the cursor, swings
 SMALL, MARGIN = 2.0, 1.15
-"""Swings under the first, rad, get a phase plane that is wider than they are by the second."""
-REACH: Final = 1.15  # Half the width of the view of the pendulums, in lengths of the arm
-COMPARED: Final = ("w0", "c_over_m", "Tr")  # Parameters by which all methods are compared
+"""Amplitude below which the phase plane is enlarged, rad, and its width over the amplitude."""
+REACH: Final = 1.15  # Half width of the view of the pendulums, arm lengths
+COMPARED: Final = ("w0", "c_over_m", "Tr")  # Parameters in which all methods are compared
 
 
 def record_identification(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
     """Write the recording of an identification, with the layout in which the viewer shows it.
 
-    For each run that was fitted, ``k`` from 1: ``/run_k/angle/{record,model,peaks,left_out}``,
+    For each fitted run, ``k`` from 1: ``/run_k/angle/{record,model,peaks,left_out}``,
     ``/run_k/residual/{residual,above,below}`` (mrad; two standard deviations of the noise about 0),
     two pendulums on one pivot in ``/run_k/pendulum/data/{record,model}/{arm,bob}``, and
-    ``/run_k/phase/data/{curve,record,record_now,model_now}``; the tables of what was found in
-    ``/summary``; all on the timeline ``sim_time``, the record's own seconds. The model's angle is
-    what the sensor would read of it, its zero error included.
+    ``/run_k/phase/data/{curve,record,record_now,model_now}``; tables of the estimates in
+    ``/summary``; all on the timeline ``sim_time``, the record's own seconds. The model's angle
+    includes the sensor's zero error.
 
-    Of a run longer than 20,000 samples every k-th is drawn, unless that leaves fewer than 24 of
-    each swing. Where the trajectory was not fitted, the best method's model is simulated from the
-    first peak; where no method could be applied, the record is shown alone. The record's pendulum
-    stands still where nothing was read: in a gap, or between peaks alone.
+    In a run longer than 20,000 samples every k-th is drawn, unless fewer than 24 of each swing
+    would remain. If the trajectory was not fitted, the best method's model is simulated from the
+    first peak; if no method is applicable, the record is shown alone. The record's pendulum does
+    not move between readings: in a gap, or between peaks alone.
 
     Parameters
     ----------
     report : IdentificationReport
-        What :func:`pendmap.identification.identify_experiment` returned.
+        Result of :func:`pendmap.identification.identify_experiment`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
     Returns
     -------
     Path
-        The file, complete.
+        The written file.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
     try:
         w0 = float(report.model.w0)
     except InputError:
-        w0 = 1.0  # it gives views their proportions
+        w0 = 1.0  # only sets the proportions of views
     tabs = [_views(f"run_{k}", one, w0) for k, one in enumerate(shown, 1)]
     front = tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs, active_tab=0)
     aside = rrb.TextDocumentView(origin="/summary", name="What was found")
@@ -105,7 +105,7 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
 
 
 def _known(report: IdentificationReport) -> dict[str, float | str]:
-    """Return the properties of a recording: what the best method found."""
+    """Return the properties of a recording: the estimates of the best method."""
     known: dict[str, float | str] = {"kind": "identification"}
     best = next((found for found in report.methods.values() if found.sound), None)
     if best is not None:
@@ -120,7 +120,7 @@ def _known(report: IdentificationReport) -> dict[str, float | str]:
 
 
 def _page(report: IdentificationReport) -> Iterator[str]:
-    """Yield the tables of what was found, with intervals, and everything that was warned of."""
+    """Yield tables of the estimates with intervals, and all warnings."""
     best = next((found for found in report.methods.values() if found.sound), None)
     if best is None:
         yield from ("**No method could be applied.**", "")
@@ -138,7 +138,7 @@ def _page(report: IdentificationReport) -> Iterator[str]:
             f"Residuals: {fit.rms:.3g} rad rms in {readings}; noise seen without a model: "
             f"{noise} rad."
         )
-    # A table a parameter: one of all would be too wide for a column of the window.
+    # One table per parameter: a single one would be too wide for a column of the window.
     for parameter in COMPARED:
         known = {n: m.estimates for n, m in report.methods.items() if parameter in m.estimates}
         if known:
@@ -147,7 +147,7 @@ def _page(report: IdentificationReport) -> Iterator[str]:
             for method, estimates in known.items():
                 yield f"| {method.replace('_', ' ')} | {_cells(estimates[parameter])} |"
     yield from ("", "## Warnings, and the record", "")
-    # The lines of estimates stand in the tables.
+    # The lines of the estimates are already in the tables.
     yield from (f"- {line}" for line in as_text(report) if not line.startswith(" "))
 
 
@@ -185,7 +185,7 @@ def _views(root: str, one: Comparison, w0: float) -> rrb.Container:
         ),
     ]
     if np.isfinite(one.residual).any():
-        # The axis holds the residuals that count and the noise's band.
+        # The axis contains the residuals used and the band of the noise.
         least = max(1.5 * runs.BAND * one.sigma, 1e-12)
         reach = 1.05 * runs.MILLI * max(float(np.nanmax(np.abs(one.residual))), least)
         right.append(
@@ -203,7 +203,7 @@ def _views(root: str, one: Comparison, w0: float) -> rrb.Container:
 
 
 def _whole(one: Comparison) -> rrb.TimeAxis:
-    """Return an axis that holds the whole record."""
+    """Return a time axis that contains the whole record."""
     if not one.time.size:
         return rrb.TimeAxis()
     low, high = float(one.time[0]), float(one.time[-1])
@@ -213,7 +213,7 @@ def _whole(one: Comparison) -> rrb.TimeAxis:
 
 
 def _frame(one: Comparison, w0: float) -> frame.Frame:
-    """Return a frame that holds record and model: the whole circle, or small swings enlarged."""
+    """Return a frame with record and model: the whole circle, or small swings enlarged."""
     known = np.isfinite(one.record) & ~one.left_out
     theta = np.concatenate([one.record[known], one.model[np.isfinite(one.model)]])
     speed = np.concatenate([one.speed[known], one.model_speed])
@@ -225,7 +225,7 @@ def _frame(one: Comparison, w0: float) -> frame.Frame:
 
 
 def _log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> None:
-    """Log one run: angles and peaks, the residual over the noise, pendulums, the phase plane."""
+    """Log one run: angles and peaks, the residual with the noise, pendulums, the phase plane."""
     out, angle, left = one.left_out, f"{root}/angle", f"{root}/residual"
     record = replace(RECORD, width=0.0) if one.sparse else RECORD
     runs.series(stream, f"{angle}/model", one.model_time, one.model, MODEL)
@@ -244,7 +244,7 @@ def _log(stream: rr.RecordingStream, root: str, one: Comparison, w0: float) -> N
 
 
 def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
-    """Log both pendulums on one pivot: the model's broad, the record's thin and upon it."""
+    """Log both pendulums on one pivot: the model broad, the record thin on top."""
     runs.pivots(stream, path, [0.0])
     parts = [(RECORD, one.time, one.record, THIN)]
     if one.model.size:
@@ -263,7 +263,7 @@ def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
 
 
 def _phase(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
-    """Log the model's whole curve, the record's points, and the points that run along both."""
+    """Log the model's whole curve, the record's points, and the moving points of both."""
     known = np.isfinite(one.record) & np.isfinite(one.speed) & ~one.left_out
     places = np.stack([plane.wrapped(one.record[known]), one.speed[known]], axis=1)
     if known.any():

@@ -1,4 +1,4 @@
-"""A trajectory in a running viewer, while it is computed."""
+"""A trajectory sent to a running viewer during its computation."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
     from pendmap.model import Pendulum, Rig
 
-ADDRESS: Final = "127.0.0.1:9876"  # Where a viewer listens unless it is told otherwise
+ADDRESS: Final = "127.0.0.1:9876"  # Default address of a viewer
 
-BLOCK: Final = 1000  # Samples that are sent at a time, at least
+BLOCK: Final = 1000  # Least number of samples sent at a time
 _PROBE: Final = 2.0
 _FLUSH: Final = 20.0
 _MOVING: Final = 200_000
-"""Samples up to which everything moves at each of them; afterwards at some of each block."""
+"""Number of samples up to which the pendulum moves at each; later at some of each block."""
 _LATER: Final = 1000
 _PORTS: Final = 65_535
 
@@ -38,14 +38,14 @@ class NobodyListensError(ViewerError):
 def check_address(address: str) -> tuple[str, int]:
     """Return host and port of ``HOST:PORT``, at which a viewer listens.
 
-    A connection without a listener would wait for a quarter of a minute, and then say nothing.
+    A connection without a listener would block for 15 seconds without an error.
 
     Raises
     ------
     InputError
-        If it is no address.
+        If the address is malformed.
     NobodyListensError
-        If nobody listens there; the message says what to start.
+        If no viewer listens there; the message tells what to start.
     """
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
@@ -63,7 +63,7 @@ def check_address(address: str) -> tuple[str, int]:
 
 
 class Live:
-    """Sends the samples of a trajectory to a viewer in blocks, as ``live`` of pendmap.simulate.
+    """Sender of a trajectory's samples to a viewer, in blocks; the ``live`` of pendmap.simulate.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Live:
         self._waiting: list[Floats] = []
         self._before = np.empty((3, 0))
         self._sent = 0
-        # A new name each time: to the viewer, one name is one recording.
+        # A new name each time: the viewer merges recordings of equal name.
         self._stream: rr.RecordingStream = frame.identified(uuid.uuid4().hex)
         with frame.strict():
             url = f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
@@ -102,7 +102,7 @@ class Live:
             frame.text(self._stream, "summary", f"{model.title}\n\nUnder way.")
 
     def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
-        """Take samples; send them when there are enough."""
+        """Collect samples; send them once there are enough."""
         self._waiting.append(np.stack([time, theta, velocity]))
         if sum(part.shape[1] for part in self._waiting) >= BLOCK:
             self._send()
@@ -113,7 +113,7 @@ class Live:
         Raises
         ------
         ViewerError
-            If the viewer went away.
+            If the viewer is no longer there.
         """
         self._send()
         velocity = dataset["velocity"].values
@@ -153,7 +153,7 @@ class Live:
         self._before = whole[:, -kept:]
 
     def _widen(self, velocity: Floats) -> None:
-        """Draw the frames anew where the motion is faster than they hold."""
+        """Redraw the frames if the motion exceeds their velocities."""
         fastest = float(np.abs(velocity).max())
         if fastest > self._around.y[1]:
             self._frame(1.5 * fastest * np.array([-1.0, 1.0]))

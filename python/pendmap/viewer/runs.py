@@ -1,4 +1,4 @@
-"""Runs of records in recordings: time series, residuals over the noise, pendulums that swing."""
+"""Recordings of runs: time series, residuals with the noise, moving pendulums."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
 
 MINUS, SIGMA = "\N{MINUS SIGN}", "\N{GREEK SMALL LETTER SIGMA}"
-BAND: Final = 2.0  # Half the width of the band that noise alone would fill, in standard deviations
-MILLI: Final = 1e3  # Residuals are in mrad: the axis would have too many digits otherwise
-LEGEND: Final = rrb.Corner2D.RightTop  # Corner of a legend: a decay leaves room there
+BAND: Final = 2.0  # Half width of the band of noise, standard deviations
+MILLI: Final = 1e3  # Residuals are in mrad, which needs fewer digits on the axis
+LEGEND: Final = rrb.Corner2D.RightTop  # Corner of a legend, which a decay leaves free
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ def write(  # noqa: PLR0913, PLR0917 (where, what, and how it is shown)
     layout: rrb.Blueprint,
     log: Callable[[rr.RecordingStream], None],
 ) -> Path:
-    """Write a recording with its name, properties, of which ``kind`` is one, and page of text."""
+    """Write a recording with its name, properties (including ``kind``) and page of text."""
     kind = known["kind"]
     with whole_file(path, (".rrd",)) as part, frame.strict():
-        # A layout holds for all recordings of an application, and this one has its own views.
+        # A layout holds for all recordings of an application, so this one has its own application.
         recording = frame.identified(content, f"pendmap {kind} {content[:6]}")
         with frame.written(recording, layout, part):
             recording.send_recording_name(f"{kind} of {source}")
@@ -62,7 +62,7 @@ def write(  # noqa: PLR0913, PLR0917 (where, what, and how it is shown)
 
 
 def content_of(found: object, arrays: Iterable[Floats]) -> str:
-    """Return a name that tells what was recorded: other readings or estimates, another name."""
+    """Return an identifier of the recorded content, which changes with readings and estimates."""
     digest = hashlib.blake2b(repr(found).encode(), digest_size=12)
     for each in arrays:
         digest.update(np.ascontiguousarray(each).data)
@@ -70,7 +70,7 @@ def content_of(found: object, arrays: Iterable[Floats]) -> str:
 
 
 def refuse_late(name: object, times: Iterable[Floats]) -> None:
-    """Refuse times that a recording cannot hold."""
+    """Raise InputError for times that a recording cannot hold."""
     latest = max(float(np.max(np.abs(time), initial=0.0)) for time in times)
     if latest > columns.LATEST:
         raise InputError(
@@ -81,7 +81,7 @@ def refuse_late(name: object, times: Iterable[Floats]) -> None:
 def series(
     stream: rr.RecordingStream, path: str, time: Floats, values: Floats, look: Series
 ) -> None:
-    """Log a time series, if it has any instant; a line is thinned to its lowest and highest."""
+    """Log a time series, if not empty; a line is thinned to its lowest and highest values."""
     if not time.size:
         return
     style: rr.SeriesLines | rr.SeriesPoints = (
@@ -101,7 +101,7 @@ def series(
 def residual(
     stream: rr.RecordingStream, path: str, time: Floats, left: Floats, look: Series
 ) -> None:
-    """Log what a model leaves (rad) in mrad, with its root mean square in the name."""
+    """Log a residual (rad) in mrad, with its root mean square in the name."""
     known = left[np.isfinite(left)]
     if known.size:
         rms = MILLI * math.sqrt(float(np.mean(known**2)))
@@ -110,7 +110,7 @@ def residual(
 
 
 def noise(stream: rr.RecordingStream, path: str, time: Floats, sigma: float) -> None:
-    """Log the lines between which noise alone would leave 95 % of a residual."""
+    """Log the lines between which noise alone would keep 95 % of a residual."""
     for name, sign, said in (("above", 1, "+"), ("below", -1, MINUS)):
         band = np.full(2, MILLI * sign * BAND * sigma)
         text = f"{said}{BAND:g} {SIGMA} of the noise, {said}{abs(band[0]):.3g} mrad"
@@ -126,7 +126,7 @@ def pendulum(  # noqa: PLR0913, PLR0917 (where, when, how)
     size: tuple[float, float, float],
     pivot: float = 0.0,
 ) -> None:
-    """Log a pendulum: radii of arm and bob in points, and its order: the greater lies on top."""
+    """Log a pendulum: radii of arm and bob in points, and drawing order (greater is on top)."""
     arm, bob, order = size
     known = np.isfinite(theta)
     at = np.stack([pivot + np.sin(theta), -np.cos(theta)], axis=1)[known]
@@ -136,7 +136,7 @@ def pendulum(  # noqa: PLR0913, PLR0917 (where, when, how)
 
 
 def pivots(stream: rr.RecordingStream, path: str, places: Iterable[float]) -> None:
-    """Log the pivots at these places, and that the pendulums' axis y points upward."""
+    """Log the pivots at these positions, and the upward y axis of the pendulums."""
     upward = rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0]))
     stream.log(f"{path}/data", upward, static=True)
     at = [[place, 0.0] for place in places]

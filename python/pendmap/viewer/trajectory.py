@@ -1,4 +1,4 @@
-"""The recording of one trajectory: the moving pendulum, phase plane, Poincare section, state."""
+"""Recording of one trajectory: moving pendulum, phase plane, Poincare section, state."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ LINE = (120, 150, 190)
 PIVOT = (0, 158, 115)
 TRAIL = (230, 159, 0)
 
-TRAIL_POINTS = 48  # Points of the bob's trail, which is one forcing period long
+TRAIL_POINTS = 48  # Greatest number of points of the bob's trail, which is one forcing period long
 
 TRAILS = 20000
-"""Trails that are logged at most; the trail of a longer trajectory moves on in larger steps."""
+"""Greatest number of trails logged; for a longer trajectory they are logged in larger steps."""
 
-MANY = 1000  # Points of a section above which they are drawn smaller
+MANY = 1000  # Number of points of a section above which they are drawn smaller
 
 MOVING = 100_000
-"""Samples at the beginning and at the end of a long trajectory at which everything moves."""
+"""Samples at each end of a long trajectory for which the moving pendulum is logged."""
 
 BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
 
 CURVE, CURVE_PERIODS = 200_000, 100
-"""Samples and periods of the phase curve that are drawn at most, the last ones."""
+"""Greatest numbers of samples and periods of the phase curve, counted from the end."""
 
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
@@ -58,14 +58,14 @@ _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of a trajectory: times, angles, velocities, three arrays of one length."""
+    """Samples of a trajectory: times, angles, velocities, three arrays of equal length."""
 
     time: Floats
     theta: Floats
     velocity: Floats
 
     def part(self, first: int, last: int) -> Motion:
-        """Return the samples from one number up to, without, another."""
+        """Return the samples from index ``first`` up to, but excluding, ``last``."""
         cut = slice(first, last)
         return Motion(self.time[cut], self.theta[cut], self.velocity[cut])
 
@@ -76,7 +76,7 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
 
 
 def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
-    """Return the same of a trajectory with these attributes, in this frame."""
+    """Return the layout for a trajectory with these attributes, in a given frame."""
     so_far = rrb.VisibleTimeRange(
         frame.TIMELINE,
         start=rrb.TimeRangeBoundary.infinite(),
@@ -108,7 +108,7 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log everything in columns, on the timeline ``sim_time`` and, once a period, on ``period``."""
+    """Log everything in columns, on the timeline ``sim_time`` and, once a period, ``period``."""
     time = dataset["time"].values.astype(float)
     theta = dataset["theta"].values.astype(float)
     velocity = dataset["velocity"].values.astype(float)
@@ -134,7 +134,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the summary of the trajectory, and which part of a long one is shown."""
+    """Log the summary of the trajectory, and the part shown of a long one."""
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
     units = Units.of(dataset.attrs)
     if units.si:
@@ -152,7 +152,7 @@ def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def refuse_beyond(time: Floats, velocity: Floats) -> None:
-    """Refuse what a recording cannot hold: its places are single precision, its times ns."""
+    """Raise InputError for velocities or times that a recording cannot hold."""
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
@@ -161,18 +161,18 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
 
 
 def frame_of(attrs: Attributes, velocity: Floats) -> frame.Frame:
-    """Return the frame of the phase plane that holds these velocities."""
+    """Return the frame of the phase plane that contains these velocities."""
     return frame.Frame.phase((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
 
 
 def _stroke(attrs: Attributes) -> float:
-    """Return the amplitude of the pivot's motion in lengths of the pendulum, p / omega^2."""
+    """Return the amplitude of the pivot's motion in pendulum lengths, p / omega^2."""
     omega = float(attrs["omega"])
     return abs(float(attrs["p"])) / omega**2 if omega else 0.0
 
 
 def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) -> None:
-    """Log what does not move: frames, the rail of the pivot."""
+    """Log the static parts: frames, and the rail of the pivot."""
     for root in ("phase", "poincare"):
         around.log(stream, root)
     stroke = _stroke(attrs)
@@ -185,7 +185,7 @@ def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) ->
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: int) -> None:
-    """Log angle, velocity and energy against time, by their extremes in each of ``bins``."""
+    """Log angle, velocity and energy against time, by their extremes in each of ``bins`` bins."""
     units, theta, velocity = Units.of(attrs), motion.theta, motion.velocity
     for name, values in (
         ("theta", theta),
@@ -208,11 +208,11 @@ def moving(
     since: int = 0,
     every: int = 1,
 ) -> None:
-    """Log the pendulum in lengths of its arm, x to the right, y upward, and its phase point.
+    """Log the pendulum in arm lengths, x to the right, y upward, and its phase point.
 
     The effective gravity 1 + p cos(omega tau + phase) is that of a pivot at height
-    -(p / omega^2) cos(omega tau + phase). Samples before ``since`` have been logged and are there
-    for the trail; of the others one of ``every`` is.
+    -(p / omega^2) cos(omega tau + phase). Samples before ``since`` are already logged and only used
+    for the trail; every ``every``-th of the others is logged.
     """
     time, theta, velocity = motion.time, motion.theta, motion.velocity
     omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))
@@ -235,7 +235,7 @@ def moving(
 
 
 def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
-    """Return how many samples ago the points of the trail are, falling to 0: about one period."""
+    """Return the sample offsets of the trail's points, falling to 0, over about one period."""
     tau = Units.of(attrs).bare(time, TIME)
     turns = float(attrs["omega"]) or 1.0
     samples = (
@@ -247,7 +247,7 @@ def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
 
 
 def rest(stream: rr.RecordingStream, time: float) -> None:
-    """Log that what moves is not shown from this time on."""
+    """Clear the moving parts from this time on."""
     stream.set_time(frame.TIMELINE, duration=time)
     for path in ("pendulum/data", "phase/data/now"):
         stream.log(path, rr.Clear(recursive=True))
@@ -255,7 +255,7 @@ def rest(stream: rr.RecordingStream, time: float) -> None:
 
 
 def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Motion) -> None:
-    """Log the curve in the phase plane of the last periods, broken where the angle wraps."""
+    """Log the phase-plane curve of the last periods, broken where the angle wraps."""
     period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
     first = int(np.searchsorted(motion.time, motion.time[-1] - CURVE_PERIODS * period))
     first = max(first, motion.time.size - CURVE)
@@ -273,7 +273,7 @@ def section(
     velocity: Floats,
     period: npt.NDArray[np.int64],
 ) -> None:
-    """Log one point a period; the view shows those up to the cursor, so the section grows."""
+    """Log one point per period; the view shows those up to the cursor, so the section grows."""
     at = np.stack([plane.wrapped(theta), velocity], axis=1)
     size = 1.4 if time.size > MANY else 2.5
     number = rr.TimeColumn("period", sequence=period.astype(np.int64))

@@ -1,4 +1,4 @@
-"""Opening the viewer's window on a recording."""
+"""Start of the viewer on a recording."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from pendmap.errors import InputError
 
 MAGIC = b"RRF2"  # First bytes of a recording
 
-PATIENCE = 2.0  # Seconds in which a viewer that cannot start is expected to say so
+PATIENCE = 2.0  # Time in which a viewer that cannot start is expected to exit, s
 
 
 _NO_DISPLAY = "there is no display (DISPLAY is not set)"
 
-_RUNNING: list[subprocess.Popen[bytes]] = []  # viewers left running, lest they count as forgotten
+_RUNNING: list[subprocess.Popen[bytes]] = []  # running viewers, referenced to avoid warnings
 
 
 class ViewerError(RuntimeError):
@@ -51,18 +51,18 @@ def open_viewer(path: str | os.PathLike[str]) -> int:
     Returns
     -------
     int
-        The process number of the viewer, which runs on by itself.
+        Process number of the viewer, which keeps running.
 
     Raises
     ------
     RecordingNotFoundError
         If there is no such file.
     NotARecordingError
-        If the file is something else, or empty.
+        If the file is not a recording, or empty.
     NoDisplayError
-        If there is no display; the message says what to do instead.
+        If there is no display; the message tells what to do instead.
     ViewerError
-        If the viewer is not installed or ends at once; the message carries what it said.
+        If the viewer is not installed or ends at once; the message contains its output.
     """
     file = _checked(Path(path))
     if not _display():
@@ -100,7 +100,7 @@ def _checked(file: Path) -> Path:
 
 
 def check_display() -> None:
-    """Refuse to go on where no window can be opened.
+    """Raise an error if no window can be opened.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def check_display() -> None:
 
 
 def _display() -> bool:
-    """Whether a display is set; whether it answers is seen when the viewer starts."""
+    """Return whether a display is set; whether it responds is known only when the viewer starts."""
     names = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
     return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
 
@@ -131,7 +131,7 @@ def _elsewhere(file: Path, why: str) -> str:
 
 
 def _program() -> Path:
-    """Return the viewer itself; the ``rerun`` on PATH is only a script around it."""
+    """Return the viewer's executable; the ``rerun`` on PATH is only a script that calls it."""
     name = "rerun.exe" if sys.platform == "win32" else "rerun"
     package = importlib.util.find_spec("rerun_cli")
     for folder in package.submodule_search_locations or [] if package else []:

@@ -1,8 +1,8 @@
-"""A virtual rig: experiments whose truth is known, to try identification and diagnosis on.
+"""A virtual rig: simulated experiments with known truth, for tests of identification and diagnosis.
 
-It stands apart on purpose. Its equation, integrator and formulas share no code with the models
-that are fitted to its records, and it imports none of them: else a test on its records would only
-show that the package agrees with itself.
+Its equation, integrator and formulas deliberately share no code with the models that are fitted
+to its records, and it imports none of them: otherwise a test on its records would only show that
+the package agrees with itself.
 """
 
 from __future__ import annotations

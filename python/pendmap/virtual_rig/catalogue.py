@@ -1,4 +1,4 @@
-"""All effects by name, and how a user asks for them."""
+"""All effects by name, and the parsing and drawing of requested effects."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ EFFECTS: Final[dict[str, type[Effect]]] = {
     for kind in vars(module).values()
     if isinstance(kind, type) and issubclass(kind, Effect) and "formula" in vars(kind)
 }
-"""Every effect with a formula, by name and variant, in the order of the files."""
+"""Every effect with a formula, by name and variant, in the order of the modules."""
 
-ANY: Final = "any"  # Asks for an effect that the seed chooses
-NONE: Final = "none"  # Asks for a rig without hidden effects
+ANY: Final = "any"  # Requests an effect that the seed chooses
+NONE: Final = "none"  # Requests a rig without hidden effects
 
 
 def describe() -> list[dict[str, str]]:
-    """Return name, group, formula, runs needed and parameters with ranges of each effect.
+    """Return name, group, formula, required kind of run and parameter ranges of each effect.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def _range(field: dataclasses.Field[float]) -> str:
 
 
 def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> list[Effect]:
-    """Draw the effects asked for, in their order; ``any`` chooses what such kinds of runs show.
+    """Draw the requested effects in order; ``any`` chooses one that these kinds of runs show.
 
     An entry is ``name``, ``name:variant`` or ``any``, with parameters as in
     ``quadratic_drag,q=0.01``, or ``none`` alone; ``scale`` multiplies every size that is drawn.
@@ -87,7 +87,7 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
 
 
 def draws_size(text: str) -> bool:
-    """Return whether an entry of :func:`draw` has a size that is drawn, or is not known."""
+    """Return whether an entry of :func:`draw` has a size that is drawn, or an unknown name."""
     if text == NONE:
         return False
     name, given = _parse(text)

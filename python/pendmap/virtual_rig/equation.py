@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Parameters:
-    """The paper's rig, in SI.
+    """Parameters of the paper's rig, in SI.
 
     ``th'' + c_over_m th' + w0**2 (1 + a(t)) sin th = -friction sign(th')``, eq. 2.1 of Horton,
     Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A.
@@ -40,7 +40,7 @@ class Parameters:
 
 
 class Equation:
-    """Accelerations of all R runs of an experiment, which began at ``lab``, s, shape (R,)."""
+    """Accelerations of R runs, which begin at the lab times ``lab``, s, shape (R,)."""
 
     def __init__(
         self, parameters: Parameters, drive: Drive, lab: Floats, effects: Sequence[Effect]
@@ -72,7 +72,7 @@ class Equation:
         direction: Floats,
         side: Floats,
     ) -> Motion:
-        """Return the motion of lanes; :class:`Motion` says which shapes."""
+        """Return the motion of lanes; :class:`Motion` gives the shapes."""
         m = Motion()
         m.run, m.time, m.theta, m.velocity = run, time, theta, velocity
         m.direction, m.side, m.w0 = direction, side, self.parameters.w0
@@ -83,7 +83,7 @@ class Equation:
         return m
 
     def smooth(self, m: Motion, own: Floats) -> Floats:
-        """Return all but dry friction, per inertia, rad/s^2, shape (L, K)."""
+        """Return the acceleration without dry friction, rad/s^2, shape (L, K), for unit inertia."""
         p = self.parameters
         total = -p.c_over_m * m.velocity - p.w0**2 * (1 + m.vertical) * m.sin
         if not isinstance(m.lateral, float):
@@ -101,7 +101,7 @@ class Equation:
         return level
 
     def rates(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
-        """Return accelerations, 0 of lanes that stick, and rates of the effects' own variables."""
+        """Return accelerations, 0 for sticking lanes, and rates of the effects' state variables."""
         force = self.smooth(m, own) - m.direction * self.friction(m)
         inertia: Floats | float = 1.0
         for effect in self.effects:
@@ -117,12 +117,12 @@ class Equation:
         return acceleration, np.concatenate(parts, axis=-1)
 
     def begin(self, m: Motion) -> Floats:
-        """Return the effects' own variables where a motion begins, shape (L, K, states)."""
+        """Return the initial values of the effects' state variables, shape (L, K, states)."""
         parts = [effect.begin(m) for effect in self.effects if effect.states]
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
 
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
-        """Return times since the run began, s, and jumps of the velocity there, rad/s."""
+        """Return times since the run began, s, and velocity jumps at them, rad/s."""
         lab = float(self.lab[run])
         found = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
         return sorted((time - lab, jump) for time, jump in found)

@@ -1,4 +1,4 @@
-"""The first event within each step: where the velocity, a margin or the load passes zero."""
+"""The first event of each step: a zero of the velocity, of a slip margin or of the load."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.lanes import Indices, Lanes, Step
 
 _TINY: Final = 1e-4
-"""Where a velocity that starts at zero is evaluated first, as a share of a sixteenth step."""
-_ROUNDING: Final = 1e-12  # Velocity that may be rounding, rad/s
+"""First evaluation of a velocity that starts at zero, as a share of a sixteenth of a step."""
+_ROUNDING: Final = 1e-12  # Velocity below which rounding dominates, rad/s
 
 PLACES: Final[Floats] = np.arange(17) / 16
 """Places within a step where signs are evaluated, shape (17,)."""
@@ -41,7 +41,7 @@ def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> NDArray[
 def turn_of(
     velocity: list[float], acceleration: list[float], direction: float, seen: Floats
 ) -> float | None:
-    """Return the first place after s = 0 where a velocity becomes zero, if any.
+    """Return the first place after s = 0 at which a velocity becomes zero, or None.
 
     ``velocity`` and ``acceleration`` are Legendre coefficients over the step, ``seen`` is
     ``direction * velocity`` at the 17 places.
@@ -58,12 +58,12 @@ def turn_of(
         if k == 1 and seen[0] <= 0:
             low = _TINY * high
             if forward(low) <= 0:
-                # It slipped for no time, or rounding hides whether it did: time has to go on.
+                # The slip took no time, or rounding hides it: time must advance.
                 return low if abs(seen[1]) > _ROUNDING else high
         if seen[k] <= 0:
             return root(forward, low, high)
         if slope(low) < 0 < slope(high):
-            # A dip between two places: the velocity is least where the acceleration is zero.
+            # A minimum between two places: it lies at the zero of the acceleration.
             least = root(slope, low, high)
             if forward(least) <= 0:
                 return root(forward, low, least)
@@ -71,7 +71,7 @@ def turn_of(
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the zero of a function between two ends; the smaller end where rounding hides it."""
+    """Return the zero of a function in an interval, or the end of smaller value if signs agree."""
     at_low, at_high = function(low), function(high)
     if at_low * at_high >= 0:
         return low if abs(at_low) < abs(at_high) else high
@@ -79,11 +79,11 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
-    """Return the first place after s = 0 where a margin is used up, if any; 17 are ``seen``."""
+    """Return the first place at which a margin, ``seen`` at PLACES, becomes negative, or None."""
     for k in range(1, PLACES.size):
         low, high = PLACES[k - 1], PLACES[k]
         if seen[k] < 0:
-            # A margin of 0 where the stick begins is used up at once, but time has to go on.
+            # A margin of 0 at the start of a stick is exhausted at once, but time must advance.
             return root(margin, low, high) if seen[k - 1] > 0 else low + _TINY * (high - low)
         if 1 < k < PLACES.size - 1 and _dips(seen[k - 1 : k + 2]):
             ends = (PLACES[k - 1], PLACES[k + 1])
@@ -94,7 +94,7 @@ def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
 
 
 def _dips(three: Floats) -> bool:
-    """Whether the parabola through three neighbours may go below zero between them."""
+    """Return whether the parabola through three neighbours may become negative between them."""
     before, here, after = (float(x) for x in three)
     bend = before - 2 * here + after
     if not (here <= before and here <= after and bend > 0):
@@ -103,7 +103,7 @@ def _dips(three: Floats) -> bool:
 
 
 class Switch(NamedTuple):
-    """Where in a step, as a share of it, and what happens: a word of :meth:`Lanes.happen`."""
+    """Place of an event within a step, from 0 to 1, and its kind as in :meth:`Lanes.happen`."""
 
     place: float
     what: str
@@ -128,11 +128,11 @@ def _keep(found: dict[int, Switch], k: int, place: float | None, what: str) -> N
 
 
 def _turns(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) -> None:
-    """Velocity zeros of lanes that slide."""
+    """Add the velocity zeros of sliding lanes."""
     direction = lanes.direction[step.lane[rows]]
     sign = direction[:, np.newaxis]
     velocity = sign * (step.velocity[rows] @ _BASIS[:, :-1].T)
-    # Exactly, so that rounding does not take a start from rest for one above or below it.
+    # Set exactly, so that rounding does not give a start from rest a sign.
     velocity[:, 0] = np.abs(lanes.velocity[step.lane[rows]])
     acceleration = sign * (step.acceleration[rows] @ _BASIS[:, :-2].T)
     for n in np.flatnonzero(may_turn(velocity, acceleration, step.length[rows])).tolist():
@@ -142,7 +142,7 @@ def _turns(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) ->
 
 
 def _releases(lanes: Lanes, step: Step, k: int, found: dict[int, Switch]) -> None:
-    """Where a lane that sticks slips, and which way."""
+    """Add the place and direction at which a sticking lane slips."""
     lane = int(step.lane[k])
 
     def margins(places: Floats) -> tuple[Floats, Floats]:
@@ -155,7 +155,7 @@ def _releases(lanes: Lanes, step: Step, k: int, found: dict[int, Switch]) -> Non
 
 
 def _unloads(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) -> None:
-    """Where the load on the bearing changes sign."""
+    """Add the places at which the load on the bearing changes sign."""
 
     def load(rows: Indices, places: Floats) -> Floats:
         lane = step.lane[rows]
@@ -165,7 +165,7 @@ def _unloads(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) 
         return lanes.side[lane, np.newaxis] * lanes.motion(lane, time, theta, velocity).load
 
     seen = load(rows, PLACES)
-    # Between two places it does not fall by more than it changes from one to the next somewhere.
+    # Its fall between two places is taken as at most the largest change between neighbours.
     near = seen.min(axis=1) < np.abs(np.diff(seen, axis=1)).max(axis=1)
     for n in np.flatnonzero(near).tolist():
         row = rows[n : n + 1]

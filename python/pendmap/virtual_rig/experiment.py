@@ -1,4 +1,4 @@
-"""An experiment made: clean motion, record and truth of every run."""
+"""Simulation of an experiment: noise-free motion, record and truth of every run."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.path import Floats, Path
 
-WINDOW: Final = 1.0  # Length of the pieces over which the gap is measured, s: chaos stays small
-_AFTER_REST: Final = 3.0  # Length of a record after the pendulum has come to rest, s
+WINDOW: Final = 1.0  # Length of segments over which the gap is measured, s; limits chaotic growth
+_AFTER_REST: Final = 3.0  # Time recorded after the pendulum has come to rest, s
 _MOST_SAMPLES: Final = 10_000_000
 """Largest number of samples of all runs; their records take 250 megabytes."""
 _RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)  # Streams of random numbers
@@ -44,7 +44,7 @@ class Request:
         Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
         ``quadratic_drag,q=0.01``; or ``none`` alone.
     size : float
-        Multiplies the size of every effect that is drawn; above 0, and 1 where none is.
+        Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
     free, forced : int
@@ -96,7 +96,7 @@ class Request:
             raise InputError(f"seed must be 0 or more, got {self.seed}")
         if not (math.isfinite(self.size) and self.size > 0):
             raise InputError(f"size must be a finite number above 0, got {self.size:g}")
-        # A rig far outside these ranges takes too long: the steps follow its quickest time.
+        # A rig far outside these ranges takes too long: steps follow its shortest time scale.
         check_ranges(
             self,
             w0=(0.1, 100.0, "rad/s"),
@@ -118,7 +118,7 @@ class Request:
             )
 
     def _refuse_idle(self) -> None:
-        """Refuse settings that would change nothing."""
+        """Refuse settings without effect."""
         asked = self.effects or PRESETS[self.preset].effects
         if self.size != 1 and not any(draws_size(text) for text in asked):
             raise InputError(
@@ -156,26 +156,26 @@ class Request:
         return free, preset.forced if self.forced is None else self.forced
 
     def stream(self, *path: int) -> np.random.Generator:
-        """Return the stream of random numbers of a part of the experiment."""
+        """Return the random stream of one part of the experiment."""
         return np.random.default_rng([self.seed, *path])
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One run: its plan, its motion and its record.
+    """One run: its plan, its noise-free motion and its record.
 
     Parameters
     ----------
     plan : RunPlan
         The planned run.
     path : Path
-        The clean motion.
+        Noise-free motion.
     time, angle : array, shape (N,)
         The record: s and rad.
     lost : int
-        Samples that the record lacks.
+        Number of samples lost from the record.
     gap : float
-        Change of the reading by the effects within a second, rad rms; no parameter is adapted.
+        Rms change of the reading by the effects within a second, rad, without refitted parameters.
     """
 
     plan: RunPlan
@@ -188,7 +188,7 @@ class Run:
 
 @dataclasses.dataclass(frozen=True)
 class Experiment:
-    """All runs, and the truth about them."""
+    """All runs of an experiment, with its truth."""
 
     request: Request
     parameters: Parameters
@@ -199,7 +199,7 @@ class Experiment:
 
     @property
     def gap(self) -> float:
-        """Change of the reading by the effects within a second, rad rms over all samples."""
+        """Rms change of the reading by the effects within a second, rad, over all samples."""
         weights = [run.time.size for run in self.runs]
         return math.sqrt(float(np.average([run.gap**2 for run in self.runs], weights=weights)))
 
@@ -207,7 +207,7 @@ class Experiment:
 def make(request: Request) -> Experiment:
     """Draw an experiment, integrate its runs and read its sensor.
 
-    A request gives one experiment, bit for bit on one machine.
+    Equal requests give equal experiments, bit for bit on one machine.
 
     Raises
     ------
@@ -291,7 +291,7 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
 
 
 def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
-    """Return runs with another length, and equal pauses between them."""
+    """Return the runs with another duration and unchanged pauses between them."""
     result, lab = [], 0.0
     for k, plan in enumerate(plans):
         result.append(dataclasses.replace(plan, duration=duration, lab_time=round(lab, 1)))
@@ -317,7 +317,7 @@ def _integrate(equation: Equation, plans: list[RunPlan], readings: list[Effect])
 
 
 def _true(time: Floats, readings: list[Effect]) -> Floats:
-    """Return the true times of what is recorded at ``time``."""
+    """Return the true times of samples recorded at ``time``."""
     for effect in readings:
         time = effect.clock(time)
     return time
@@ -331,7 +331,7 @@ def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
 
 
 def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
-    """Return the motion minus that of a rig without effects, set back on it every second, rad."""
+    """Return the motion minus that of a rig without effects, restarted on it every second, rad."""
     begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
     ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]
     starts = Starts(
@@ -356,10 +356,10 @@ def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list
 PARAMETERS: Final = Parameters(w0=6.2, c_over_m=2 * 0.004 * 6.2, friction=0.08)
 """A rig like that of Horton, Wiercigroch & Xu (2008), figures 4 to 7 and table 1.
 
-The paper gives no numbers; these have periods and a length of the decay like its figures.
+The paper gives no numbers; these yield periods and a decay time like those in its figures.
 """
 RELEASE: Final = 3.0  # Angle of the release at rest, rad
-SECONDS: Final = 86.0  # Length of the record, s: the pendulum comes to rest before
+SECONDS: Final = 86.0  # Length of the record, s: the pendulum comes to rest before its end
 SENSOR: Final = Sensor(rate=100.0, counts=4096, noise=math.radians(0.1))
 OFFSET: Final = math.radians(0.05)  # Reading of the encoder at rest, rad
 

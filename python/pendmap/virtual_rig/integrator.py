@@ -1,9 +1,9 @@
-"""The virtual rig's integrator: many runs side by side, dry friction exactly.
+"""The virtual rig's integrator: many runs in parallel, with exact dry friction.
 
-Each round makes one step for every run, each with its own length. The signs of the velocity
-and of the load on the bearing are held through a step, so that the equation is smooth there; where
-one changes, the step ends. A pendulum whose velocity is zero sticks exactly while the sum of all
-torques is within the dry friction.
+Each iteration makes one step for every run, each with its own length. The signs of the velocity
+and of the load on the bearing are held through a step, so that the equation is smooth there; a
+step ends at a change of sign. A pendulum at rest sticks exactly while the sum of all other torques
+is at most the dry friction.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def integrate(equation: Equation, starts: Starts) -> list[Path]:
-    """Integrate runs, or parts of them, from their starts to their ends: a path for each start."""
+    """Integrate runs, or parts of them, from start to end; return a path for each start."""
     lanes = Lanes(equation, starts)
     live = np.flatnonzero(starts.end > starts.begin)
     while live.size:
@@ -36,7 +36,7 @@ def integrate(equation: Equation, starts: Starts) -> list[Path]:
 
 
 def _commit(lanes: Lanes, step: Step) -> None:
-    """Take over the steps that are good, each up to its first event."""
+    """Apply the accepted steps, each up to its first event."""
     rows = np.flatnonzero(step.good)
     lane, length = step.lane[rows], step.length[rows]
     switches = first_switches(lanes, step, rows)

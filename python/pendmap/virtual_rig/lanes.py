@@ -1,4 +1,4 @@
-"""State of the runs that are integrated side by side: their steps and their events."""
+"""State of the lanes (runs under parallel integration), their steps and their events."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 Indices = NDArray[np.intp]
 
-_FIRST: Final = 0.25  # Length of the first step over the longest
+_FIRST: Final = 0.25  # Length of the first step over the longest allowed
 
 TOLERANCE: Final = 1e-11
-"""Largest last coefficients of a velocity's polynomial, rad/s; else a step is repeated."""
-_FIXED: Final = 3e-13  # Change of the velocity at which the iteration ends, rad/s
+"""Largest of the last coefficients of an accepted velocity polynomial, rad/s."""
+_FIXED: Final = 3e-13  # Change of the velocity at which the fixed-point iteration ends, rad/s
 _ITERATIONS: Final = 25
-"""Most iterations of a step; one that needs more is repeated with a shorter length."""
+"""Most fixed-point iterations of a step; without convergence a shorter step is tried."""
 _SHORTEST: Final = 1e-9
-"""A step that is taken whatever its error, s; corners of the equation end there."""
-_SMALLEST: Final = 1e-300  # Least error of a step, rad/s, that a division takes
+"""Length of a step that is accepted whatever its error, s; corners of the equation end there."""
+_SMALLEST: Final = 1e-300  # Lower bound of a step's error in the step-size formula, rad/s
 
 
 @dataclasses.dataclass(frozen=True)
 class Starts:
-    """Where N integrations begin and end; all arrays have the shape (N,)."""
+    """Initial states and time spans of N integrations; all arrays have the shape (N,)."""
 
-    run: Indices  # of the equation
+    run: Indices  # index of the run in the equation
     begin: Floats  # since the run began, s
     end: Floats
     theta: Floats  # at begin, rad
@@ -43,10 +43,10 @@ class Starts:
 class Lanes:
     """State of N lanes, each at its own time, in arrays of shape (N,).
 
-    ``time``, ``theta``, ``velocity`` are s, rad, rad/s; ``own``, shape (N, M), the effects' own
-    variables; ``direction`` and ``side`` the signs of velocity (0 sticks) and load. The next step
-    takes ``wish`` s, at most ``longest``, a radian of the swing or of the drive, and ends at
-    ``stop`` at the latest: a kick or the end.
+    ``time``, ``theta``, ``velocity`` are in s, rad, rad/s; ``own``, shape (N, M), are the effects'
+    state variables; ``direction`` and ``side`` the signs of velocity (0: sticking) and load. The
+    next step has the length ``wish``, s, at most ``longest``, one radian of the swing or of the
+    drive, and ends at ``stop`` at the latest: a kick or the end.
     """
 
     def __init__(self, equation: Equation, starts: Starts) -> None:
@@ -80,7 +80,7 @@ class Lanes:
             self.direction[lane] = self._slips(lane)
 
     def motion(self, lane: Indices, time: Floats, theta: Floats, velocity: Floats) -> Motion:
-        """Motion of L lanes at K times each; the others of shape (L, K)."""
+        """Return the motion of L lanes at K times each; other arguments have the shape (L, K)."""
         return self.equation.motion(
             self.run[lane, np.newaxis],
             time,
@@ -91,10 +91,10 @@ class Lanes:
         )
 
     def margins(self, lane: int, after: Floats, own: Floats) -> tuple[Floats, Floats]:
-        """Return the margins, rad/s^2, of a lane held still, at S times ``after`` its own, s.
+        """Return the slip margins, rad/s^2, of a lane at rest, at S times ``after`` its own, s.
 
-        It slips up where the first is negative, down where the second is; ``own``, shape (S, M),
-        holds the effects' own variables.
+        It slips to positive angles where the first is negative, to negative angles where the second
+        is; ``own``, shape (S, M), holds the effects' state variables.
         """
         still = np.zeros((1, after.size))
         time, theta = self.time[lane] + after[np.newaxis], self.theta[lane] + still
@@ -106,7 +106,7 @@ class Lanes:
         return up[0], (load + self.equation.friction(motion))[0]
 
     def happen(self, lane: int, what: str) -> None:
-        """Let an event happen to a lane: ``rest``, ``up``, ``down`` (released so) or ``unload``."""
+        """Apply an event to a lane: ``rest``, ``up`` or ``down`` (released so), or ``unload``."""
         if what == "unload":
             self.side[lane] = -self.side[lane]
             return
@@ -141,20 +141,20 @@ class Lanes:
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """A step of L lanes; polynomials are Legendre coefficients over it."""
+    """One step of L lanes; polynomials are Legendre coefficients over the step."""
 
     lane: Indices  # shape (L,)
     length: Floats  # s, shape (L,)
     acceleration: Floats  # shape (L, NODES)
     velocity: Floats  # shape (L, NODES + 1)
     theta: Floats  # shape (L, NODES + 2)
-    own: Floats  # the effects' own variables, shape (L, NODES + 1, M)
+    own: Floats  # the effects' state variables, shape (L, NODES + 1, M)
     good: NDArray[np.bool_]  # whether the step is accurate enough, shape (L,)
     wish: Floats  # length of the next step, s, shape (L,)
 
 
 def solve(lanes: Lanes, lane: Indices) -> Step:
-    """Solve one step of some lanes; the last two coefficients of a polynomial are its error."""
+    """Solve one step of some lanes; the last two coefficients estimate a polynomial's error."""
     wished = lanes.wish[lane]
     length = np.minimum(wished, lanes.stop[lane] - lanes.time[lane])
     h = length[:, np.newaxis]
@@ -174,7 +174,7 @@ def solve(lanes: Lanes, lane: Indices) -> Step:
     factor = 0.9 * (TOLERANCE / np.maximum(tail, _SMALLEST)) ** (1 / gauss.NODES)
     factor = np.where(fixed, np.clip(factor, 0.2, 2.0), 0.4)
     wish = np.clip(length * factor, _SHORTEST, lanes.longest)
-    # A step that had to end early says nothing against the length that was wished for.
+    # A step shortened by ``stop`` is no evidence against the proposed length.
     early = good & (length < wished)
     wish = np.where(early, np.maximum(wish, wished), wish)
     return Step(lane, length, acceleration, velocity, theta, own, good, wish)
@@ -183,7 +183,7 @@ def solve(lanes: Lanes, lane: Indices) -> Step:
 def _iterate(
     lanes: Lanes, lane: Indices, length: Floats
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return accelerations and the effects' rates at the Gauss points, and where both converged."""
+    """Return accelerations and state rates at the Gauss points, and which lanes converged."""
     h = length[:, np.newaxis]
     time = lanes.time[lane, np.newaxis] + h * gauss.POINTS
     velocity0, own0 = lanes.velocity[lane, np.newaxis], lanes.own[lane, np.newaxis, :]

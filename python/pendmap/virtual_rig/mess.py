@@ -1,8 +1,8 @@
-"""Weak disturbances that no effect describes, beside the main effect of a rig.
+"""Weak disturbances that no effect describes, in addition to the main effect of a rig.
 
 They are a texture of the bearing (torque and friction as random series in the angle), a slow drift
-of the sensor's zero, and noise with a correlation time of a part of a second to some seconds. Each
-has a random share of the size, a multiple of the sensor's noise.
+of the sensor's zero, and noise with a correlation time of a fraction of a second to some seconds.
+Each has a random share of the total size, which is a multiple of the sensor's noise.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
     from pendmap.virtual_rig.sensor import Sensor
 
-ORDERS: Final = (2, 40)  # Orders per turn of a texture, the least and the greatest
-TERMS: Final = 8  # Terms of a texture, and of a drift
-TORQUE: Final = 0.1  # Torque of a texture, in units of w0^2, that moves readings by about 1 rad
+ORDERS: Final = (2, 40)  # Least and greatest order per turn of a texture
+TERMS: Final = 8  # Number of terms of a texture and of a drift
+TORQUE: Final = 0.1  # Torque of a texture, in units of w0^2, that changes readings by about 1 rad
 FRICTION: Final = 0.005
-"""Friction of a texture, in units of w0^2, that moves readings by about 1 rad."""
+"""Friction of a texture, in units of w0^2, that changes readings by about 1 rad."""
 
 
 class Texture(Effect):
-    """Races that are not round: torque and friction vary with the angle.
+    """Uneven bearing races: torque and friction vary with the angle.
 
     ``+torque sum c_k sin(n_k th + psi_k) - friction |sum d_k sin(n_k th + phi_k)| sign v``
     """
@@ -44,11 +44,11 @@ class Texture(Effect):
     series: tuple[Floats, ...]
 
     def __post_init__(self) -> None:
-        """Check nothing: the numbers are drawn."""
+        """Skip the range checks: the numbers are drawn."""
 
     @classmethod
     def made(cls, rng: Generator, torque: float, friction: float) -> Texture:
-        """Draw a texture whose series have the root mean square 1."""
+        """Draw a texture whose series have a root mean square of 1."""
         series: list[Floats] = []
         for _ in range(2):
             orders = rng.choice(np.arange(ORDERS[0], ORDERS[1] + 1), TERMS, replace=False)
@@ -81,7 +81,7 @@ class Mess:
 
     @classmethod
     def made(cls, rng: Generator, size: float, w0: float, longest: float) -> Mess:
-        """Draw disturbances that move readings by about ``size`` rad rms until ``longest`` s."""
+        """Draw disturbances that change readings by about ``size`` rad rms until ``longest`` s."""
         shares = size * np.sqrt(rng.dirichlet(np.ones(4)))
         slow = 2 * math.pi / np.exp(rng.uniform(math.log(60), math.log(60 + longest), TERMS))
         weights = rng.standard_normal(TERMS) / slow
@@ -91,7 +91,7 @@ class Mess:
         return cls(texture, drift, float(shares[3]), float(np.exp(rng.uniform(-3.0, 1.0))))
 
     def reading(self, lab: Floats, sensor: Sensor, rng: Generator) -> Floats:
-        """Return what drift and noise add to readings at times in the laboratory, rad."""
+        """Return the contribution of drift and noise to readings at lab times, rad."""
         weights, slow, phases = self.drift
         drift = np.sin(lab[:, None] * slow + phases) @ weights
         rho = math.exp(-1 / (sensor.rate * self.time))
@@ -100,7 +100,7 @@ class Mess:
         return np.asarray(drift + self.noise * fading(white, rho), np.float64)
 
     def describe(self) -> dict[str, Any]:
-        """Return what is written into the truth."""
+        """Return the entries of the truth file."""
         return {
             "torque_rms": self.texture.torque,
             "friction_rms": self.texture.friction_size,

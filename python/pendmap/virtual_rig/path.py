@@ -1,9 +1,9 @@
-"""The clean motion of one run, continuous in time, by Gauss collocation.
+"""The noise-free motion of one run, continuous in time, by Gauss collocation.
 
 Within a step of length ``h`` from ``t0``, ``s = (t - t0) / h`` in [0, 1], the acceleration is the
 polynomial of degree ``NODES - 1`` through its values at the Gauss-Legendre points. Velocity and
-angle are its exact integrals: the Gauss method, of order ``2 NODES`` at the step's end, of order
-``NODES + 2`` in the angle within (Hairer, Norsett & Wanner 1993, Solving Ordinary Differential
+angle are its exact integrals: the Gauss method, of order ``2 NODES`` at the end of a step, of order
+``NODES + 2`` in the angle inside it (Hairer, Norsett & Wanner 1993, Solving Ordinary Differential
 Equations I, section II.7). Polynomials are rows of coefficients of the Legendre polynomials
 ``P_k(2 s - 1)``.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-NODES: Final = 10  # Gauss points of a step
+NODES: Final = 10  # Gauss points per step
 
 _X, _WEIGHTS = legendre.leggauss(NODES)
 
@@ -35,7 +35,7 @@ COEFFICIENTS: Final[Floats] = (
 
 
 def _integral(count: int) -> Floats:
-    """Integral over s from 0, from ``count`` coefficients to one more."""
+    """Return the coefficients of the integral over s from 0, shape (count + 1, count)."""
     # d s = d x / 2 in the variable x = 2 s - 1 of the Legendre polynomials.
     return np.asarray(legendre.legint(np.eye(count), lbnd=-1, axis=0)) / 2
 
@@ -45,22 +45,22 @@ INTEGRAL: Final[Floats] = _integral(NODES)
 
 
 def basis(s: Floats, count: int) -> Floats:
-    """Legendre polynomials at ``s``, shape (..., count)."""
+    """Return the Legendre polynomials at ``s``, shape (..., count)."""
     return np.asarray(legendre.legvander(2 * s - 1, count - 1))
 
 
 FIRST: Final[Floats] = basis(POINTS, NODES + 1) @ INTEGRAL @ COEFFICIENTS
-"""Values at ``POINTS`` of the integral of a polynomial, from its values there."""
+"""Values of a polynomial's integral at ``POINTS``, from the polynomial's values there."""
 
 SECOND_INTEGRAL: Final[Floats] = _integral(NODES + 1)
-"""Coefficients of the integral of a polynomial of NODES + 1, shape (NODES + 2, NODES + 1)."""
+"""Coefficients of the integral of NODES + 1 coefficients, shape (NODES + 2, NODES + 1)."""
 
 SECOND: Final[Floats] = basis(POINTS, NODES + 2) @ SECOND_INTEGRAL @ INTEGRAL @ COEFFICIENTS
-"""Values at ``POINTS`` of the second integral of a polynomial, from its values there."""
+"""Values of a polynomial's second integral at ``POINTS``, from the polynomial's values there."""
 
 
 def value(coefficients: Sequence[float], s: float) -> float:
-    """Value of one polynomial at one ``s`` (Clenshaw's recurrence)."""
+    """Return the value of one polynomial at one ``s`` (Clenshaw's recurrence)."""
     x = 2 * s - 1
     last, before = 0.0, 0.0
     for k in range(len(coefficients) - 1, 0, -1):
@@ -73,7 +73,7 @@ def value(coefficients: Sequence[float], s: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Event:
-    """A velocity zero, or the end of a stick."""
+    """A zero of the velocity, or the end of a sticking interval."""
 
     time: float  # since the run began, s
     what: str  # turn, stick or release
@@ -81,9 +81,9 @@ class Event:
 
 
 class Path:
-    """Angle and velocity of one run at any time; a polynomial for each step of the integrator.
+    """Angle and velocity of one run at any time: a polynomial for each integration step.
 
-    ``lab`` is the time in the laboratory at which the run begins, s.
+    ``lab`` is the lab time at which the run begins, s.
     """
 
     def __init__(self) -> None:
@@ -118,6 +118,6 @@ class Path:
         begins = np.array(self._begins)
         step = np.clip(np.searchsorted(begins, time, side="right") - 1, 0, begins.size - 1)
         s = (time - begins[step]) / np.array(self._lengths)[step]
-        # The step that holds both ends is clipped, so that rounding never extrapolates.
+        # Places are clipped to their step, so that rounding never extrapolates.
         polynomials = basis(np.clip(s, 0.0, 1.0), count)
         return np.asarray(np.einsum("nk,nk->n", polynomials, np.array(coefficients)[step]))

@@ -1,4 +1,4 @@
-"""The runs of an experiment, drawn from its seed."""
+"""Presets of the virtual rig, and the runs that they draw from a seed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """The plan of one run.
+    """The initial state, duration and drive of one run.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class RunPlan:
     p, frequency, phase : float
         The drive ``p cos(Omega t + phi)``, Omega in rad/s; ``p`` is 0 in a free run.
     lab_time : float
-        When the run begins, s.
+        Lab time at the start of the run, s.
     """
 
     kind: str
@@ -42,25 +42,25 @@ class RunPlan:
 
 @dataclasses.dataclass(frozen=True)
 class Preset:
-    """An experiment by name, with the ranges that its parts are drawn from."""
+    """A named experiment: numbers of runs, and ranges of the random draws."""
 
     about: str
-    free: int  # runs
+    free: int  # number of runs
     forced: int
     duration: tuple[float, float]  # of a run, s
     c_over_m: tuple[float, float]  # 1/s
     friction: tuple[float, float]  # Tr, rad/s^2
     noise: tuple[float, float]  # degrees, drawn log-uniformly
-    effects: tuple[str, ...]  # hidden if nothing is asked for
+    effects: tuple[str, ...]  # hidden effects if the request names none
     until_rest: bool = False  # a record ends a little after the pendulum has come to rest
 
     def parameters(self, rng: Generator) -> Parameters:
-        """Draw the rig without its effects."""
+        """Draw the parameters of the rig without effects."""
         w0 = rng.uniform(6.0, 6.4)
         return Parameters(w0, rng.uniform(*self.c_over_m), rng.uniform(*self.friction))
 
     def plan(self, rng: Generator, w0: float, counts: tuple[int, int]) -> list[RunPlan]:
-        """Draw free and forced runs in turn, one after another in lab time."""
+        """Draw alternating free and forced runs, one after another in lab time."""
         free = [(_free(rng, k, w0, alone=self.until_rest)) for k in range(counts[0])]
         forced = [_FORCED[k % len(_FORCED)](rng, w0) for k in range(counts[1])]
         mixed = []
@@ -75,7 +75,7 @@ class Preset:
 
 
 def _free(rng: Generator, k: int, w0: float, *, alone: bool) -> RunPlan:
-    """The k-th free decay: releases at rest from wide to narrow, every fifth flung round."""
+    """Return the k-th free decay: releases at rest from large to small angles, a fifth rotating."""
     sign = float(rng.choice((-1.0, 1.0)))
     if alone:
         return RunPlan("free", sign * rng.uniform(2.9, 3.05), 0.0, 0.0)
@@ -93,30 +93,30 @@ def _forced(rng: Generator, frequency: float, p: float, theta: float, velocity: 
 
 
 def _swinging(rng: Generator, w0: float) -> RunPlan:
-    """The first resonance: an oscillation at half the drive's frequency."""
+    """Return a run near the principal resonance: oscillation at half the drive's frequency."""
     frequency, p = rng.uniform(1.9, 2.04) * w0, rng.uniform(0.2, 0.6)
     theta = rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 1.2)
     return _forced(rng, frequency, p, float(theta), 0.0)
 
 
 def _rotating(rng: Generator, w0: float) -> RunPlan:
-    """Near the rotation with one turn a forcing period, either way."""
+    """Return a run near the rotation with one turn per forcing period, in either direction."""
     way = float(rng.choice((-1.0, 1.0)))
     plan = _forced(rng, rng.uniform(1.2, 2.0) * w0, rng.uniform(0.4, 1.0), 0.0, 0.0)
-    # There the angle follows the drive's phase, and is quickest where the pivot pulls down most.
+    # On it the angle follows the drive's phase, fastest at the largest downward acceleration.
     theta = way * (plan.phase + rng.uniform(-0.6, 0.2))
     velocity = way * plan.frequency * (1 + 0.25 * math.cos(plan.phase))
     return dataclasses.replace(plan, theta=theta, velocity=velocity)
 
 
 def _slow(rng: Generator, w0: float) -> RunPlan:
-    """Driven about as slowly as it swings: the second resonance."""
+    """Return a run near the second resonance: drive near the natural frequency."""
     frequency, p = rng.uniform(0.85, 1.1) * w0, rng.uniform(0.3, 1.0)
     return _forced(rng, frequency, p, rng.uniform(-2.5, 2.5), rng.uniform(-0.5, 0.5) * w0)
 
 
 def _strong(rng: Generator, w0: float) -> RunPlan:
-    """Strongly driven from far off: wide swings, turns, chaos for a while."""
+    """Return a strongly driven run with a random start: large swings, rotations, chaos."""
     frequency, p = rng.uniform(1.8, 2.1) * w0, rng.uniform(0.6, 1.0)
     return _forced(rng, frequency, p, rng.uniform(-2.5, 2.5), rng.uniform(-1.0, 1.0) * w0)
 
@@ -156,4 +156,4 @@ PRESETS: Final[dict[str, Preset]] = {
         effects=("any",),
     ),
 }
-"""The experiments that have a name."""
+"""Presets by name."""

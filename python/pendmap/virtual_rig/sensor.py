@@ -1,4 +1,4 @@
-"""The sensor: counts, noise, lost and false samples, an unsteady clock."""
+"""The sensor: encoder counts, noise, lost samples, outliers and sampling jitter."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LONGEST_GAP: Final = 20  # Longest gap of a dropout, samples
 
 
 def check_ranges(owner: object, **ranges: tuple[float, float, str]) -> None:
-    """Refuse attributes outside their ranges (least, greatest, unit); ``None`` is allowed."""
+    """Raise InputError for attributes outside (least, greatest, unit); ``None`` is allowed."""
     for name, (low, high, unit) in ranges.items():
         value = getattr(owner, name)
         if value is not None and not low <= value <= high:
@@ -31,18 +31,18 @@ def check_ranges(owner: object, **ranges: tuple[float, float, str]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Sensor:
-    """The reading and the record of the angle.
+    """Sensor settings; conversion of noise-free readings into a record.
 
     ``theta_rad = count round((reading + noise) / count)`` with ``count = 2 pi / counts``.
     """
 
     rate: float = 100.0  # samples a second, Hz
-    counts: int = 4096  # a turn; 0 reads without steps
-    noise: float = 0.0  # standard deviation before it is counted, rad
+    counts: int = 4096  # counts per turn; 0 for no quantisation
+    noise: float = 0.0  # standard deviation before quantisation, rad
     correlation: float = 0.0  # of the noise from one sample to the next, AR(1); 0 is white
     dropouts: float = 0.0  # share of the samples that are lost, in gaps of up to 20
-    outliers: float = 0.0  # share of the samples that are false by 0.2 rad or more
-    jitter: float = 0.0  # standard deviation of the instants, s; the nominal ones are kept
+    outliers: float = 0.0  # share of the samples with an error of 0.2 rad or more
+    jitter: float = 0.0  # standard deviation of the sampling instants, s; times are nominal
 
     def __post_init__(self) -> None:
         check_ranges(
@@ -58,23 +58,23 @@ class Sensor:
 
     @property
     def count(self) -> float:
-        """One count, rad; 0 if there are none."""
+        """Angle of one count, rad; 0 without quantisation."""
         return 2 * math.pi / self.counts if self.counts else 0.0
 
     def times(self, duration: float) -> Floats:
-        """Nominal times of the samples of a run, s."""
+        """Return the nominal sample times of a run, s."""
         return np.arange(math.floor(duration * self.rate + 1e-9) + 1) / self.rate
 
     def instants(self, times: Floats, rng: Generator) -> Floats:
-        """When the samples are really taken, s, in order and not before the run begins."""
+        """Return the actual sampling instants, s, in order and not before the run begins."""
         if self.jitter == 0:
             return times
         shifted = times + self.jitter * rng.standard_normal(times.size)
         return np.sort(np.clip(shifted, times[0], times[-1]))
 
     def write_down(self, reading: Floats, rng: Generator) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the angles of the record, rad, and which samples it keeps; shapes (N,)."""
-        # All draws are made whatever the sizes are: no setting changes the draws of another.
+        """Return the recorded angles, rad, and which samples are kept; shapes (N,)."""
+        # All draws are made whatever the settings, so that no setting changes the draws of another.
         count = reading.size
         white = rng.standard_normal(count)
         false, shift = rng.random(count), rng.uniform(0.2, math.pi, count)
@@ -88,7 +88,7 @@ class Sensor:
         if self.counts:
             value = self.count * np.round(value / self.count)
         keep = np.ones(count, bool)
-        # A sample is lost if one of the gaps that begin at random covers it.
+        # A sample is lost if it lies in one of the gaps, which begin at random.
         mean = (1 + _LONGEST_GAP) / 2
         begins = np.flatnonzero(lost < -math.log1p(-self.dropouts) / mean)
         for k in begins:

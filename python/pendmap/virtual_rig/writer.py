@@ -1,4 +1,4 @@
-"""The experiment's folder, and the truth beside it."""
+"""Files of an experiment: its folder, and the truth file next to it."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ FORMAT_VERSION: Final = 1  # Version of the layout of the truth file
 
 _FILES: Final = re.compile(r"experiment\.toml|run_\d+\.csv")  # Names of the files of an experiment
 _GRAVITY: Final = 9.81
-_ENOUGH: Final = 3  # Least number of runs of a kind of which one is held out
+_ENOUGH: Final = 3  # Least number of runs of one kind for a run to be held out
 
 
 @dataclasses.dataclass(frozen=True)
 class Places:
-    """Where an experiment is written.
+    """Paths of an experiment and of its truth.
 
     Parameters
     ----------
     experiment : Path
         The folder.
     truth : Path
-        The file beside it, ``FOLDER.truth.toml``.
+        The file next to it, ``FOLDER.truth.toml``.
     """
 
     experiment: Path
@@ -43,7 +43,7 @@ class Places:
 
 
 def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
-    """Return where an experiment is to be written, checked before anything is computed.
+    """Return the paths of an experiment, checked before anything is computed.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
 def write(experiment: Experiment, where: Places) -> None:
     """Write the folder and the truth of an experiment: both complete, or neither.
 
-    They are written beside their places and renamed at the end; an interrupt waits until then.
+    They are written to temporary paths and renamed at the end; an interrupt waits until then.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def write(experiment: Experiment, where: Places) -> None:
     ):
         folder.mkdir()
         for k, run in enumerate(experiment.runs):
-            # 12 digits keep every count apart, and an angle without counts to 1e-11 rad.
+            # 12 digits distinguish all counts, and give an angle without counts to 1e-11 rad.
             rows = zip(run.time.tolist(), run.angle.tolist(), strict=True)
             lines = ["t_s,theta_rad", *(f"{time:.6f},{angle:.12g}" for time, angle in rows)]
             (folder / _file(k)).write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -110,7 +110,7 @@ def _file(k: int) -> str:
 
 
 def _description(experiment: Experiment) -> dict[str, Any]:
-    """Return what somebody who did the experiment would know."""
+    """Return the description known to an experimenter: no truth."""
     rig: dict[str, Any] = {"gravity": _GRAVITY, "w0": round(experiment.parameters.w0, 1)}
     if experiment.sensor.counts:
         rig["encoder_counts"] = experiment.sensor.counts
@@ -127,9 +127,9 @@ def _description(experiment: Experiment) -> dict[str, Any]:
 
 
 def held_out(experiment: Experiment) -> set[int]:
-    """Return the runs kept from fits: of each kind with 3 or more runs the last but one.
+    """Return the held-out runs: of each kind with 3 or more runs, the last but one.
 
-    Runs before and after it, quicker and slower ones, are fitted.
+    Runs before and after it, faster and slower ones, are fitted.
     """
     kinds: dict[str, list[int]] = {}
     for k, run in enumerate(experiment.runs):
@@ -138,7 +138,7 @@ def held_out(experiment: Experiment) -> set[int]:
 
 
 def _truth(experiment: Experiment) -> dict[str, Any]:
-    """Return all that was drawn and hidden."""
+    """Return the truth: all drawn and hidden values."""
     request, parameters, sensor = experiment.request, experiment.parameters, experiment.sensor
     asked = {k: v for k, v in dataclasses.asdict(request).items() if v not in (None, ())}
     return {
@@ -165,7 +165,7 @@ def _truth(experiment: Experiment) -> dict[str, Any]:
             "jitter_s": sensor.jitter,
         },
         **({} if experiment.mess is None else {"mess": experiment.mess.describe()}),
-        # Without adapting any parameter, set back on the true motion every second.
+        # No parameter is refitted; the comparison restarts on the true motion every second.
         "gap_rms_rad": experiment.gap,
         "run": [_run(k, run) for k, run in enumerate(experiment.runs)],
     }

@@ -1,1 +1,1 @@
-"""Proposals of the next record, and the smallest effects that records would have shown."""
+"""Proposals of the next record, and detection limits of effects."""

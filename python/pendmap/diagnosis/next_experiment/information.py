@@ -43,23 +43,23 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FOLLOWED: Final = 1e-9
-"""Information of a direction over the greatest, below which it is not determined."""
+"""Eigenvalue of information over the largest below which a direction is undetermined."""
 
 ALL: Final = 2e-6
-"""Part of a column's information that remains with the others fitted, below which it is 0."""
+"""Share of a column's information, with the others fitted, below which it is set to 0."""
 
 PER_SWING: Final = 25.0
-"""Most samples a small swing at which a proposal is computed; more readings have smaller errors."""
+"""Most samples per small swing of a simulated proposal; standard errors are scaled to match."""
 
 MOVING: Final = 1e-9
-"""Velocity over ``w0`` below which a pendulum rests and its readings carry no information."""
+"""Velocity over ``w0`` below which the pendulum is at rest: its readings carry no information."""
 
 FEWEST: Final = 3  # Fewest readings of a run in a fit
 
 
 @dataclasses.dataclass(frozen=True)
 class Information:
-    """The information of records about columns."""
+    """Fisher information of records about columns of derivatives."""
 
     matrix: Floats  # ``X' X``, in SI
 
@@ -71,12 +71,12 @@ class Information:
         f = self.matrix
         kept, through = f[np.ix_(columns, columns)], f[np.ix_(columns, others)]
         own = kept - through @ self.covariance(others) @ through.T
-        # Less is rounding and the integrator's error.
+        # Smaller values are rounding and the integrator's error.
         shown = np.diag(own) > ALL * np.diag(kept)
         return np.where(np.outer(shown, shown), own, 0.0)
 
     def followed(self, columns: Sequence[int], by: Sequence[int], beside: Sequence[int]) -> Floats:
-        """Return the coefficients of ``by`` that fit columns best beside others, (n of by, n)."""
+        """Return the coefficients of ``by`` in the fit to columns, with others, (n of by, n)."""
         every = [*by, *beside]
         found = self.covariance(every) @ self.matrix[np.ix_(every, columns)]
         return np.asarray(found[: len(by)], np.float64)
@@ -92,7 +92,7 @@ class Information:
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """Derivatives at a fit, window by window."""
+    """Derivatives of the readings at a fit, window by window."""
 
     shared: tuple[str, ...]  # Fitted parameters of all runs, the first columns
     places: dict[str, list[int]]  # Columns of each candidate: size, and phase if it has one
@@ -100,7 +100,7 @@ class Columns:
 
     @property
     def count(self) -> int:
-        """Number of columns that belong to all runs."""
+        """Number of columns shared by all runs."""
         return len(self.shared) + sum(len(own) for own in self.places.values())
 
     @classmethod
@@ -131,7 +131,7 @@ class Columns:
     ) -> Information:
         """Return the information of all runs, or of the first samples of one.
 
-        ``hold``: without the stretches that would be held back.
+        ``hold``: without the stretches that would be held out.
         """
         total = np.zeros((self.count, self.count))
         rows: dict[int, list[Floats]] = {}
@@ -157,7 +157,7 @@ def _of_one_run(name: str) -> bool:
 
 
 def _cut(window: WindowSlopes, samples: int, *, hold: bool) -> WindowSlopes | None:
-    """Return the part of a window that lies within the first samples of its run."""
+    """Return the part of a window within the first samples of its run."""
     length = min(samples - window.first, len(window.residual))
     if length < 3:  # noqa: PLR2004 (two are the state)
         return None
@@ -174,7 +174,7 @@ def _cut(window: WindowSlopes, samples: int, *, hold: bool) -> WindowSlopes | No
 
 
 class Prospects:
-    """Information of proposals, by default of all that the rig could do, run by the model found.
+    """Information of proposals, by default of all possible ones, simulated with the model found.
 
     Proposals in which the model diverges are left out, with their number and reason in ``reasons``.
     """
@@ -200,7 +200,7 @@ class Prospects:
                 longest[start] = max(longest.get(start, 0.0), proposal.length_s)
         read = float(np.median([np.median(np.diff(run.time)) for run in data.fitted]))
         self._step = max(read, math.tau / fit.model.w0 / PER_SWING)
-        # Fewer samples have accordingly smaller errors.
+        # Standard errors are scaled to the smaller number of samples.
         scale = math.sqrt(read / self._step)
         self._starts, runs, windows = _simulated(data, found, longest, self._step, scale, reasons)
         self.menu = [p for p in menu if all(start in self._starts for start in p.starts)]
@@ -241,7 +241,7 @@ def _simulated(  # noqa: PLR0913, PLR0917 (the model, the runs, how they are rea
     scale: float,
     reasons: Reasons,
 ) -> tuple[list[Start], list[FitRun], Windows]:
-    """Return starts, runs and windows that the model could run, with errors times ``scale``."""
+    """Return starts, runs and windows that the model can simulate, with errors times ``scale``."""
     motion, w0 = Motion.of(found.fitted.fit), found.fitted.fit.model.w0
     readings = [data.readings[k] for k in data.fitted_of]
     floor = float(np.median([reading.sigma for reading in readings]))

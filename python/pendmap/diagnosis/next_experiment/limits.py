@@ -1,4 +1,4 @@
-"""Advice on the next record, and the smallest effects that records would have shown."""
+"""Advice on the next record, and detection limits of the effects that were not found."""
 
 from __future__ import annotations
 
@@ -28,35 +28,35 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-SURELY: Final = 0.95  # Probability of finding an effect of the size of its limit
+SURELY: Final = 0.95  # Probability of detection of an effect at its detection limit
 
-HUGE: Final = 10.0  # Limit over the greatest typical size above which an effect is not visible
+HUGE: Final = 10.0  # Limit over the largest typical size above which an effect is undetectable
 
 NOTHING: Final = "No free decay or run under the drive adds to these records."
 
-MARGIN: Final = 1e-6  # Least probability that is given: no model is known better
+MARGIN: Final = 1e-6  # Smallest reported probability of a wrong name; errors of the model exceed it
 
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
     """Smallest size of an effect that would have been found with 95 % probability."""
 
-    size: float  # SI, in the visible shape that shows it least; infinite where none is visible
+    size: float  # SI, for the least detectable of its detectable shapes; infinite if none is
     candidate: Candidate  # The effect in that shape
-    unseen: tuple[Candidate, ...] = ()  # Shapes that are not visible, where others are
+    unseen: tuple[Candidate, ...] = ()  # Undetectable shapes, if others are detectable
 
 
 @dataclasses.dataclass(frozen=True)
 class Advice:
-    """What to record next."""
+    """The recommended next record, detection limits and predicted outcomes."""
 
-    next_experiment: str | None  # In a sentence or two; None where it cannot be computed
+    next_experiment: str | None  # In a sentence or two; None if it cannot be computed
     limits: dict[str, Limit]  # Of each effect that was not found
-    outlook: Outlook | None  # Predicted outcomes; None where the model can run no proposal
+    outlook: Outlook | None  # Predicted outcomes; None if the model can simulate no proposal
 
     @property
     def best(self) -> Prospect | None:
-        """The proposal in ``next_experiment``."""
+        """Prospect of the proposal in ``next_experiment``."""
         return None if self.outlook is None else self.outlook.best
 
 
@@ -65,9 +65,9 @@ def detection_limits(
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
-    A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect beside
-    the fitted parameters and initial states. The gain has a noncentral chi-squared distribution and
-    must exceed the threshold of the search.
+    A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect,
+    orthogonal to the fitted parameters and initial states. The gain has a noncentral chi-squared
+    distribution and must exceed the threshold of the search.
     """
     from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
 
@@ -119,10 +119,10 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     level: float,
     reasons: Reasons,
 ) -> Advice:
-    """Return what to record next.
+    """Return the recommended next record, detection limits and predicted outcomes.
 
-    The aim is to tell equivalent names apart (``s G`` of 25), named or not; else to halve the
-    widest interval of named effects; else to show smaller effects.
+    The aim is to distinguish equivalent names (``s G`` of 25), whatever the verdict; else to halve
+    the widest interval of named effects; else to lower the detection limits.
     """
     limits = detection_limits(scores, level, best.fitted.names, best.fitted.fit.model.units)
 
@@ -162,7 +162,7 @@ def _sentences(assessment: Assessment, outlook: Outlook | None, *, driven: bool)
 
 
 def _revealed(assessment: Assessment, name: str) -> str:
-    """Return what reveals an effect, by the library."""
+    """Return the library's description of the records that reveal an effect."""
     every = (
         c
         for s in assessment.identified
@@ -188,7 +188,7 @@ def _recommendation(outlook: Outlook, best: Prospect) -> str:
     names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
     enough = ""
     if not outlook.reaches(best):
-        # Information adds up, run by run.
+        # Information of independent runs adds up.
         part = (outlook.wanted - outlook.now) / (best.value - outlook.now)
         runs = math.ceil(len(best.proposal.runs) * part)
         enough = f"; about {runs} such runs are needed"

@@ -1,10 +1,10 @@
-"""What each proposed experiment would decide, predicted from sensitivities.
+"""Predicted outcome of each proposed experiment, from sensitivities.
 
-``s G`` decides between two names of one effect: the part of the gain of one that the other, fitted
+``s G`` separates two names of one effect: it is the part of the gain of one that the other, fitted
 with all parameters and new initial states, does not reach. Twice the difference of log-likelihoods
 has this mean and the variance ``4 s G``, so the wrong name wins with the probability
-``Phi(-sqrt(s G) / 2)``. A new record adds to ``s G`` by its information, whichever name is right.
-The width of an interval and the smallest visible size are proportional to the inverse root of
+``Phi(-sqrt(s G) / 2)``. A new record increases ``s G`` by its information, whichever name is right.
+The width of an interval and the smallest detectable size are proportional to the inverse root of
 information.
 """
 
@@ -35,22 +35,22 @@ if TYPE_CHECKING:
 CLEAR: Final = 25.0  # ``s G`` from which a wrong name has a probability of at most 0.6 %
 
 HALF: Final = 0.5
-"""Interval, or detection limits, over the present ones, that a proposal should reach."""
+"""Target of a proposal: interval width or detection limits over the present ones."""
 
-NOTHING: Final = 1.0  # ``s G`` below which no experiment tells two names apart
+NOTHING: Final = 1.0  # Increase of ``s G`` below which no experiment distinguishes two names
 
-MOST: Final = 3  # Number of effects, those whose limits fall most, that are named
+MOST: Final = 3  # Number of effects that are named: those whose detection limits fall most
 
 Aim = Literal["separation", "interval", "limits"]
 
 
 @dataclasses.dataclass(frozen=True)
 class _Pair:
-    """An effect that was found and an alternative that is not told from it."""
+    """An effect that was found and an alternative that is indistinguishable from it."""
 
     effect: Candidate
     alternative: Alternative
-    shapes: tuple[Candidate, ...]  # Of the alternative
+    shapes: tuple[Candidate, ...]  # Shapes of the alternative
 
 
 def predict_separation(
@@ -60,7 +60,7 @@ def predict_separation(
     level: float,
     reasons: Reasons,
 ) -> Outlook:
-    """Return the separation by each proposal of names that are not told apart."""
+    """Return the predicted separation of indistinguishable names after each proposal."""
     pairs = [
         _Pair(each.candidate, alternative, _shapes(alternative.candidate))
         for each in identified
@@ -111,14 +111,14 @@ def _shapes(candidate: Candidate) -> tuple[Candidate, ...]:
 
 
 def _separation(ahead: Prospects, total: Information, found: ScoredModel, pair: _Pair) -> float:
-    """Return the least difference of the sum of squares between two names, either being right."""
+    """Return the least difference of the sum of squares of two names, whichever is right."""
     shared = ahead.now.shared
     own = [shared.index(n) for n in (*pair.effect.free, *pair.effect.adapted) if n in shared]
     base = [k for k in range(len(shared)) if k not in own]
     size = [shared.index(pair.effect.free[0])]
     value = found.fitted.fit[pair.effect.free[0]] ** 2
     places = [ahead.now.places[shape.title] for shape in pair.shapes]
-    # The alternative takes the nearest shape.
+    # The alternative is fitted in its nearest shape.
     right = min(float(total.own(size, [*base, *p])[0, 0]) for p in places)
     nearest = min(places, key=lambda p: float(ahead.old.own(size, [*base, *p])[0, 0]))
     weights = ahead.old.followed(size, nearest, base)[:, 0]
@@ -129,10 +129,10 @@ def _separation(ahead: Prospects, total: Information, found: ScoredModel, pair: 
 def predict_interval(
     data: DataSplit, found: ScoredModel, level: float, reasons: Reasons
 ) -> Outlook | None:
-    """Return the widest interval of an effect's size after each proposal."""
+    """Return the predicted widest interval of an effect's size after each proposal."""
     ahead = Prospects(data, found, (), reasons)
     shared = ahead.now.shared
-    # An effect that acts once does not recur.
+    # An effect that acts once does not occur in a new record.
     sizes = [c.free[0] for c in found.fitted.chosen if c.free[0] in shared and not c.once]
     if not sizes:
         return None
@@ -152,12 +152,12 @@ def predict_interval(
 def predict_limits(
     data: DataSplit, found: ScoredModel, scores: Scores, reasons: Reasons
 ) -> Outlook | None:
-    """Return the smallest visible sizes after each proposal."""
+    """Return the predicted detection limits, over the present ones, after each proposal."""
     faintest: dict[str, Candidate] = {}
     least: dict[str, float] = {}
     for score in scores.scores:
         name = score.candidate.name
-        shown = score.information or math.inf  # a shape that does not show at all says little
+        shown = score.information or math.inf  # undetectable shapes are not compared
         if name not in least or shown < least[name]:
             faintest[name], least[name] = score.candidate, shown
     if not faintest:
@@ -167,7 +167,7 @@ def predict_limits(
     ratios = []
     for total in map(ahead.after, ahead.menu):
         then = _shown(ahead, total, faintest)
-        # Effects that did not show at any size may show then.
+        # Effects that are undetectable at any size may become detectable.
         ratios.append({n: math.sqrt(now[n] / then[n]) for n in now if then[n] > 0})
     prospects = tuple(
         Prospect(proposal, float(np.median(list(ratio.values()))))
@@ -185,7 +185,7 @@ def predict_limits(
 def _shown(
     ahead: Prospects, total: Information, candidates: Mapping[str, Candidate]
 ) -> dict[str, float]:
-    """Return the information about each size, at the phase where it is least."""
+    """Return the information about each size, at the least informative phase."""
     base = len(ahead.now.shared)
     rest = total.own(range(base, ahead.now.count), range(base))
     shown = {}
@@ -206,28 +206,28 @@ class Prospect:
     """Predicted outcome of a proposal."""
 
     proposal: Proposal
-    value: float  # The figure of merit after it
-    wrong: float | None = None  # Probability that the wrong name wins, of a separation
-    resolved: float | None = None  # Probability that one name is left, of a separation
+    value: float  # Figure of merit after it
+    wrong: float | None = None  # Probability that the wrong name wins, for a separation
+    resolved: float | None = None  # Probability that the names are distinguished, for a separation
 
 
 @dataclasses.dataclass(frozen=True)
 class Outlook:
     """An aim, its figure of merit, and the predicted outcomes of all proposals."""
 
-    # ``separation``: the least ``s G`` of names that are not told apart; ``interval``: half the
-    # widest interval of 95 % over its value; ``limits``: the median over effects of the smallest
-    # visible size over the present one.
+    # ``separation``: the least ``s G`` of indistinguishable names; ``interval``: half the widest
+    # 95 % interval over its value; ``limits``: the median over effects of the smallest detectable
+    # size over the present one.
     aim: Aim
     about: tuple[str, ...]  # Names of a class, the parameter, or effects whose limits fall most
     now: float  # Figure of merit without a new record
-    wanted: float  # Figure of merit that is aimed at
+    wanted: float  # Target of the figure of merit
     prospects: tuple[Prospect, ...]  # In the order of the proposals
-    equals: tuple[tuple[str, str], ...] = ()  # Names that no proposal tells apart
+    equals: tuple[tuple[str, str], ...] = ()  # Names that no proposal distinguishes
 
     @property
     def best(self) -> Prospect | None:
-        """The proposal that reaches the aim in the least time, else the one that comes nearest."""
+        """Prospect that reaches the aim with the least effort, else the one nearest to it."""
         if not self.prospects:
             return None
         enough = [p for p in self.prospects if self.reaches(p)]
@@ -236,12 +236,12 @@ class Outlook:
         return min(self.prospects, key=lambda p: (self._rank(p), *_effort(p)))
 
     def reaches(self, prospect: Prospect) -> bool:
-        """Whether a proposal reaches the aim."""
+        """Return whether a proposal reaches the aim."""
         return self._rank(prospect) <= (-self.wanted if self.aim == "separation" else self.wanted)
 
     @property
     def by_start(self) -> tuple[Prospect, ...]:
-        """The best of each kind of run: those that reach the aim first, by effort."""
+        """Best prospect of each kind of run: those that reach the aim first, by effort."""
         kinds: dict[object, list[Prospect]] = {}
         for prospect in self.prospects:
             kinds.setdefault(prospect.proposal.starts, []).append(prospect)

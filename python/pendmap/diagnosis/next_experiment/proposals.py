@@ -1,8 +1,8 @@
-"""Experiments that the rig of some records could do next.
+"""Proposals of further experiments on the rig of some records.
 
 The records give the natural frequency, the length of a run, the rate and noise of readings, the end
-of the last run, and the drive. :mod:`pendmap.diagnosis.next_experiment.power` predicts what each
-experiment would decide.
+of the last run, and the drive. :mod:`pendmap.diagnosis.next_experiment.power` predicts the outcome
+of each experiment.
 """
 
 from __future__ import annotations
@@ -21,55 +21,55 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import DataSplit
 
-RELEASES: Final = (0.5, 1.2, 2.0, 2.8)  # Angles of release, rad, within the limits of the rig
+RELEASES: Final = (0.5, 1.2, 2.0, 2.8)  # Release angles, rad, reduced to the limits of the rig
 
-FLINGS: Final = (2.5, 3.5)  # Velocities at the bottom over ``w0``; above 2 the pendulum rotates
+FLINGS: Final = (2.5, 3.5)  # Initial velocities at the bottom over ``w0``; above 2 it rotates
 
-WAITS: Final = (600.0, 3600.0)  # Pauses in the laboratory, s, after which slow changes show
+WAITS: Final = (600.0, 3600.0)  # Pauses before a run, s, after which slow changes are detectable
 
-LATER: Final = (1.2, 2.8)  # Angles of release after such a pause, rad
+LATER: Final = (1.2, 2.8)  # Release angles after such a pause, rad
 
-LENGTHS: Final = (0.5, 1.0, 2.0)  # Lengths of a run over those of the records
+LENGTHS: Final = (0.5, 1.0, 2.0)  # Lengths of a proposed run over those of the records
 
 LONGEST_S: Final = 240.0  # Longest proposed run, s, unless the records are longer
 
-SHORTEST: Final = 5.0  # Shortest proposed run, swings
+SHORTEST: Final = 5.0  # Shortest proposed run, in periods of small swings
 
 REPEATS: Final = (2, 4)  # Numbers of repetitions of a run
 
-PAUSE_S: Final = 60.0  # Time from the end of one run to the next, s
+PAUSE_S: Final = 60.0  # Pause between two runs, s
 
 DRIVEN: Final = (1.0, 1.5, 2.0)
-"""Drive frequencies over ``w0``: second resonance, between, first resonance."""
+"""Drive frequencies over ``w0``: second resonance, intermediate, first resonance."""
 
 BEYOND: Final = 1.25  # Limits of the rig over the greatest values in its records
 
-FASTEST: Final = 0.98  # Quantile of the speeds between readings that noise does not exceed
+FASTEST: Final = 0.98  # Quantile of measured speeds taken as the greatest; higher ones are noise
 
-SWINGING: Final = 1.0  # Angle at which a driven swing begins, rad
+SWINGING: Final = 1.0  # Initial angle of a forced swing, rad
 
 
 @dataclasses.dataclass(frozen=True)
 class Start:
     """Initial state and drive of a run."""
 
-    what: str  # In words
+    what: str  # Description in words
     theta: float  # Angle at the first sample, rad
     velocity: float  # Velocity at the first sample, rad/s
-    wait_s: float  # Pause in the laboratory before it, s, beyond the usual one
-    lab_time_s: float  # Start in the laboratory, s
+    wait_s: float  # Pause before the run, s, in addition to the usual one
+    lab_time_s: float  # Lab time at the start, s
     # As in FitRun; None for a free decay.
     drive: Mapping[str, float | None] | None = dataclasses.field(default=None, hash=False)
 
     @property
     def noun(self) -> str:
-        """Kind of the run in words."""
+        """Name of the kind of run."""
         return "free decay" if self.drive is None else "forced run"
 
 
 @dataclasses.dataclass(frozen=True)
 class Proposal:
-    """An experiment to be recorded beside the present records."""
+    """An experiment to be recorded in addition to the present records."""
 
     runs: tuple[Start, ...]  # One or more, repetitions included
     length_s: float  # Of each run, s
@@ -81,7 +81,7 @@ class Proposal:
 
     @property
     def wait_s(self) -> float:
-        """The pause before it, s."""
+        """Longest pause before a run, s."""
         return max(start.wait_s for start in self.runs)
 
     @property
@@ -91,7 +91,7 @@ class Proposal:
 
     @property
     def what(self) -> str:
-        """In words."""
+        """Description in words."""
         each = f"{self.length_s:g} s"
         first, *others = self.starts
         if others:
@@ -103,11 +103,11 @@ class Proposal:
 
 
 def list_proposals(data: DataSplit, w0: float) -> tuple[Proposal, ...]:
-    """Return the experiments that the rig could do next.
+    """Return proposals of further experiments within the limits of the rig.
 
-    Free decays from several angles and flung round, in both directions, of several lengths,
-    repeated and after pauses. With a harmonic drive in the records forced runs at several
-    frequencies, at full and half strength, swinging and turning. All are within ``max_angle``,
+    Free decays with several release angles and rotations, in both directions, of several lengths,
+    repeated and after pauses. With a harmonic drive in the records also forced runs at several
+    frequencies, at full and half amplitude, swinging and rotating. All are within ``max_angle``,
     ``max_velocity`` and ``max_frequency`` of ``[rig]``, or 1.25 times the range of the records.
     """
     free = [run for run in data.fitted if not run.forced] or list(data.fitted)
@@ -129,7 +129,7 @@ def list_proposals(data: DataSplit, w0: float) -> tuple[Proposal, ...]:
     found = [Proposal((start,), x) for start in singles for x in lengths]
     for x in lengths:
         found += [Proposal(pair, x) for pair in pairs]
-        # The repetitions begin later, which changes little.
+        # The later lab time of repetitions is neglected.
         found += [
             Proposal((start,) * count, x)
             for start, count in itertools.product(singles, REPEATS)
@@ -141,7 +141,7 @@ def list_proposals(data: DataSplit, w0: float) -> tuple[Proposal, ...]:
 def _limits(data: DataSplit) -> tuple[float, float, float]:
     """Return the greatest angle (rad), velocity and drive frequency (rad/s) of the rig.
 
-    As in ``[rig]``, else a little more than the range of the records.
+    They are taken from ``[rig]``, else a little more than the range of the records.
     """
     known, runs = data.experiment.known, data.fitted
     angle = max(float(np.nanmax(np.abs(run.theta))) for run in runs)
@@ -191,13 +191,13 @@ def _pause(seconds: float) -> str:
 
 
 def _forced(data: DataSplit, w0: float, ended: float) -> Iterator[Start]:
-    """Yield forced runs at the greatest drive amplitude of the records and at half of it."""
+    """Yield forced runs at the largest drive amplitude of the records and at half of it."""
     drives = [run.drive for run in data.fitted if run.drive is not None]
     strengths = [strength for drive in drives if (strength := drive.get("p"))]
     if not strengths:
         return
     strongest = max(strengths)
-    # The phase is known if it is in all records.
+    # The phase is known if all records have it.
     phi = None if any(drive.get("phi") is None for drive in drives) else 0.0
     for p, factor in [*((strongest, f) for f in DRIVEN), (strongest / 2, DRIVEN[-1])]:
         omega, size = _round(factor * w0), _round(p)

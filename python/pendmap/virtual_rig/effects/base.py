@@ -4,8 +4,8 @@ The equation of the virtual rig, in SI and per unit of inertia:
 
 ``M th'' = -(c/m) th' - w0**2 (1 + a(t)) sin th + torques - sign(th') F``
 
-with ``M = 1`` plus what effects add to the inertia and ``F = Tr`` plus what they add to the dry
-friction. The pendulum sticks while ``th' = 0`` and the sum of all others is at most ``F``.
+with ``M = 1`` plus the effects' inertia and ``F = Tr`` plus their dry friction. The pendulum
+sticks while ``th' = 0`` and the sum of all other terms is at most ``F``.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST: Final = 1e4
-"""Largest value of a parameter over the largest that is drawn: bounds the integrator's time."""
+"""Largest allowed value of a parameter over the largest drawn: bounds the integration time."""
 
 
 class Motion:
-    """The state of L lanes at K times each; a lane is one run that is being integrated."""
+    """State of L lanes at K times each; a lane is one run under integration."""
 
     run: NDArray[np.intp]  # the lane's run, shape (L, 1)
     time: Floats  # since the run began, s, shape (L, K) as all below
     lab: Floats  # since the first run began, s
     theta: Floats  # rad
     velocity: Floats  # rad/s
-    direction: Floats  # sign of the velocity, held through a step; 0 sticks; shape (L, 1)
+    direction: Floats  # sign of the velocity, held through a step; 0: sticking; shape (L, 1)
     side: Floats  # sign of the load on the bearing, held through a step; shape (L, 1)
     speed: Floats  # direction * velocity: the smooth continuation of abs(velocity)
     vertical: Floats | float  # acceleration of the pivot over g, upward
@@ -57,7 +57,7 @@ class Motion:
 
 
 def size(low: float, high: float, unit: str, most: float | None = None) -> Any:  # noqa: ANN401 (of a field)
-    """Describe the size of an effect, drawn log-uniformly, in absolute value at most ``most``."""
+    """Describe the size of an effect, drawn log-uniformly, of absolute value at most ``most``."""
     most = MOST * high if most is None else most
     return dataclasses.field(
         metadata={"low": low, "high": high, "unit": unit, "size": True, "most": most}
@@ -73,7 +73,7 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     least: float | None = None,
     most: float | None = None,
 ) -> Any:  # noqa: ANN401 (of a field)
-    """Describe a parameter of an effect's form, drawn uniformly; it is from least to most."""
+    """Describe a shape parameter, drawn uniformly in [low, high] and allowed in [least, most]."""
     most = MOST * max(abs(low), abs(high)) if most is None else most
     least = -most if least is None else least
     metadata = {"low": low, "high": high, "unit": unit, "whole": whole}
@@ -81,7 +81,7 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
 
 
 class Reading(NamedTuple):
-    """A sensor's reading of a path at N times, in order."""
+    """A sensor's reading of a path at N increasing times."""
 
     time: Floats  # since the run began, s, shape (N,)
     angle: Floats  # the reading, rad, shape (N,)
@@ -91,11 +91,11 @@ class Reading(NamedTuple):
 @dataclass_transform(frozen_default=True)
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """One term that the paper's equation leaves out.
+    """One term that is missing in the paper's equation.
 
-    A subclass names it, gives its formula in SI, lists its parameters as fields made by
-    :func:`size` and :func:`shape`, and overrides what it changes; it becomes a frozen dataclass.
-    Where it changes one thing by a formula, :func:`effect` makes it of a function.
+    A subclass sets the name and the formula in SI, lists its parameters as fields made by
+    :func:`size` and :func:`shape`, and overrides the methods that it changes; it becomes a frozen
+    dataclass. An effect that overrides one method is made from a function by :func:`effect`.
     """
 
     name: ClassVar[str]
@@ -107,13 +107,13 @@ class Effect:
     states: ClassVar[int] = 0
     """Number of variables that the effect integrates."""
     drawn: ClassVar[bool] = True
-    """Whether a draw may choose it."""
+    """Whether a random draw may choose the effect."""
     needs: ClassVar[str] = ""
-    """The kind of run that shows it, ``free`` or ``forced``; empty if any does."""
+    """Kind of run in which the effect is observable, ``free`` or ``forced``; empty for any."""
     lowers: ClassVar[str] = ""
-    """The number of the rig, ``Tr`` or ``c/m``, that it lowers by up to its size, if any."""
+    """Rig parameter, ``Tr`` or ``c/m``, that the effect lowers by at most its size, or empty."""
     order: ClassVar[int] = 0
-    """Place of an effect of the reading in the chain: the lowest acts first."""
+    """Position of a reading effect in the chain: the lowest acts first."""
 
     def __init_subclass__(cls) -> None:
         dataclasses.dataclass(frozen=True)(cls)
@@ -133,18 +133,18 @@ class Effect:
 
     @classmethod
     def full_name(cls) -> str:
-        """Name and variant, as typed: ``magnet`` or ``magnet:dipole``."""
+        """Return name and variant as a user types them: ``magnet`` or ``magnet:dipole``."""
         return f"{cls.name}:{cls.variant}" if cls.variant else cls.name
 
     @classmethod
     def draw(cls, rng: Generator, scale: float, given: dict[str, float]) -> Effect:
-        """Draw the parameters; the size is multiplied by ``scale``, those ``given`` are taken."""
+        """Draw the parameters, the size times ``scale``; values in ``given`` replace drawn ones."""
         known = {field.name: field.metadata for field in dataclasses.fields(cls)}
         for name in given:
             if name not in known:
                 has = ", ".join(known) or "none"
                 raise InputError(f"effect {cls.full_name()} has no parameter {name!r}: {has}")
-        # All are drawn, given or not, so that the other draws do not change.
+        # All are drawn, given or not, so that given values do not change later draws.
         values = {name: cls._draw_one(rng, about, scale) for name, about in known.items()}
         return cls(**(values | given))
 
@@ -160,48 +160,48 @@ class Effect:
 
     @property
     def strength(self) -> float:
-        """The absolute value of the size, which is the first parameter."""
+        """Absolute value of the size, which is the first parameter."""
         size: float = next(iter(vars(self).values()))
         return abs(size)
 
     def acceleration(self, motion: Motion) -> Floats | float:
-        """Return the acceleration by the effect, rad/s^2, shape (L, K)."""
+        """Return the acceleration of the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
     def friction(self, motion: Motion) -> Floats | float:
-        """Return the dry friction by the effect, rad/s^2, shape (L, K)."""
+        """Return the dry friction of the effect, rad/s^2, shape (L, K)."""
         return 0.0
 
     def inertia(self, motion: Motion) -> Floats | float:
-        """Return the inertia by the effect, as a share of the rig's, shape (L, K)."""
+        """Return the inertia of the effect as a share of the rig's, shape (L, K)."""
         return 0.0
 
     def begin(self, motion: Motion) -> Floats:
-        """Return the variables of the effect where a motion begins, shape (L, K, states)."""
+        """Return the initial values of the effect's state variables, shape (L, K, states)."""
         return np.zeros((*motion.theta.shape, self.states))
 
     def reaction(self, motion: Motion, own: Floats) -> Floats:
-        """Return the acceleration, rad/s^2, by an effect with variables, in place of the other."""
+        """Return the acceleration, rad/s^2, of an effect with state variables."""
         raise NotImplementedError
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        """Return the time derivatives of the variables, shape (L, K, states)."""
+        """Return the time derivatives of the state variables, shape (L, K, states)."""
         raise NotImplementedError
 
     def alter(self, drive: Drive) -> Drive:
-        """Return the drive that acts, given the one that was meant."""
+        """Return the actual drive, given the nominal one."""
         return drive
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
-        """Return the lab times, s, and sizes, rad/s, of jumps of the velocity between two times."""
+        """Return lab times, s, and sizes, rad/s, of velocity jumps between two lab times."""
         return []
 
     def clock(self, time: Floats) -> Floats:
-        """Return the true times, s, of what the record says was read at ``time``."""
+        """Return the true times, s, of samples recorded at ``time``."""
         return time
 
     def distort(self, seen: Reading) -> Floats:
-        """Return what is read, rad, of what the sensor sees, shape (N,)."""
+        """Return the distorted reading, rad, of the angle that the sensor measures, shape (N,)."""
         return seen.angle
 
 
@@ -211,9 +211,9 @@ def effect(
     formula: str,
     **said: Any,  # noqa: ANN401 (parameters and class variables)
 ) -> Callable[[Callable[..., Any]], type[Effect]]:
-    """Make an effect of the function that is its one ``method``, under the function's name.
+    """Return an Effect class, named after the function that implements its one ``method``.
 
-    The function takes what the method takes, then the effect's parameters. ``said`` holds these,
+    The function takes the method's arguments, then the effect's parameters. ``said`` holds these,
     made by :func:`size` and :func:`shape`, and class variables.
     """
     parameters = [name for name, value in said.items() if isinstance(value, dataclasses.Field)]
@@ -260,7 +260,7 @@ class Drive:
 
     @classmethod
     def harmonic(cls, p: Floats, frequency: Floats, phase: Floats) -> Drive:
-        """Return the drive that is meant: ``p cos(Omega t + phi)`` upward."""
+        """Return the nominal drive: ``p cos(Omega t + phi)`` upward."""
         none = np.zeros_like(p)
         return cls(p, frequency, phase, none, none, none, none, none)
 

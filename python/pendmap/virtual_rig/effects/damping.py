@@ -1,4 +1,4 @@
-"""Effects that brake: damping and dry friction, constant or with the time in the laboratory."""
+"""Effects of damping and dry friction, constant or dependent on lab time."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from pendmap.virtual_rig.effects.base import (
 
 @acceleration("damping", "-gamma v", drawn=False, gamma=size(0.0025, 0.01, "1/s"))
 def viscous_damping(m: Motion, gamma: float) -> Floats:
-    """Viscous damping beside that of the rig."""
+    """Viscous damping in addition to that of the rig."""
     return -gamma * m.velocity
 
 
 @friction("friction", "-theta_r sign v", drawn=False, theta_r=size(0.013, 0.053, "rad/s^2"))
 def coulomb_friction(_: Motion, theta_r: float) -> float:
-    """Coulomb friction beside that of the rig."""
+    """Coulomb friction in addition to that of the rig."""
     return theta_r
 
 
 @acceleration("damping", "-q v abs(v)", q=size(0.0002, 0.0008, "1/rad"))
 def quadratic_drag(m: Motion, q: float) -> Floats:
-    """Drag of the air at high Reynolds numbers."""
+    """Air drag at high Reynolds numbers."""
     return -q * m.velocity * m.speed
 
 
 @acceleration("damping", "-k3 v^3", k3=size(2e-05, 8e-05, "s/rad^2"))
 def cubic_damping(m: Motion, k3: float) -> Floats:
-    """Damping by the next odd power of the velocity."""
+    """Damping proportional to the third power of the velocity."""
     return -k3 * m.velocity**3
 
 
@@ -46,8 +46,8 @@ def cubic_damping(m: Motion, k3: float) -> Floats:
     n=shape(1.3, 1.7, "", least=0.0, most=5.0),
 )
 def power_law_drag(m: Motion, q: float, n: float) -> Floats:
-    """Drag between laminar and turbulent flow."""
-    # The side beyond a turn is only looked at to find the turn.
+    """Drag between laminar and turbulent flow, with exponent n."""
+    # Values beyond a turning point are evaluated only to locate it.
     return -q * m.direction * np.maximum(m.speed, 0.0) ** n
 
 
@@ -58,9 +58,9 @@ def power_law_drag(m: Motion, q: float, n: float) -> Floats:
     vc=shape(2.0, 8.0, "rad/s", least=1e-3),
 )
 def eddy_brake(m: Motion, b: float, vc: float) -> Floats:
-    """Eddy currents in a plate that passes a magnet: strongest at one velocity.
+    """Eddy currents in a plate that passes a magnet: largest torque at velocity vc.
 
-    Smythe (1942), Trans. AIEE 61, 681: ``2/(x + 1/x)`` of the greatest torque at ``x = v/vc``.
+    Smythe (1942), Trans. AIEE 61, 681: ``2/(x + 1/x)`` of the largest torque at ``x = v/vc``.
     """
     return -b * vc**2 * m.velocity / (vc**2 + m.velocity**2)
 
@@ -72,8 +72,8 @@ def eddy_brake(m: Motion, b: float, vc: float) -> Floats:
     vs=shape(0.1, 0.6, "rad/s", least=1e-3),
 )
 def stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
-    """Dry friction that is larger when the motion is slow."""
-    # The smooth continuation beyond a turn must not grow without bound.
+    """Dry friction that increases at low velocity."""
+    # The smooth continuation beyond a turning point must remain bounded.
     slow = np.maximum(m.speed / vs, -1.0)
     return np.asarray(a * np.exp(-(slow**2.0)))
 
@@ -98,7 +98,7 @@ def sharp_stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
     k=size(0.003, 0.012, "rad/s^2"),
 )
 def load_dependent_friction(m: Motion, k: float) -> Floats:
-    """Dry friction in proportion to the load on the bearing; at rest it is what Tr says."""
+    """Dry friction proportional to the load on the bearing; at rest it equals Tr."""
     return k * (m.side * m.load - 1)
 
 
@@ -144,13 +144,13 @@ class DahlFriction(Effect):
     w=shape(0.1, 0.4, "rad", least=1e-3),
 )
 def rough_spot(m: Motion, f: float, th0: float, w: float) -> Floats:
-    """Dry friction at one angle: dirt in the bearing."""
+    """Additional dry friction near one angle, from dirt in the bearing."""
     return np.asarray(f * np.exp((np.cos(m.theta - th0) - 1) / w**2))
 
 
 @friction("friction", "-r t sign v, t lab time", r=size(2.5e-05, 0.0001, "rad/s^3"))
 def coulomb_drift(m: Motion, r: float) -> Floats:
-    """Wear: dry friction grows with lab time."""
+    """Wear: dry friction increases with lab time."""
     return r * m.lab
 
 
@@ -162,7 +162,7 @@ def coulomb_drift(m: Motion, r: float) -> Floats:
     tau=shape(60.0, 240.0, "s", least=1e-3),
 )
 def coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
-    """A bearing that warms up: dry friction falls to a new level."""
+    """A bearing that warms up: dry friction decays exponentially to a new level."""
     return np.asarray(f * np.expm1(-m.lab / tau))
 
 
@@ -176,13 +176,13 @@ def coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
     tau=shape(60.0, 240.0, "s", least=1e-3),
 )
 def slow_coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
-    """Friction that falls along a hyperbola: the last part takes far longer."""
+    """A bearing that warms up: dry friction decays hyperbolically, with a longer tail."""
     return -f * m.lab / (m.lab + tau)
 
 
 @acceleration("damping", "-r t v, t lab time", r=size(5e-06, 2e-05, "1/s^2"))
 def viscous_drift(m: Motion, r: float) -> Floats:
-    """Grease that thickens: viscous damping grows with lab time."""
+    """Grease that thickens: viscous damping increases with lab time."""
     return -r * m.lab * m.velocity
 
 
@@ -194,7 +194,7 @@ def viscous_drift(m: Motion, r: float) -> Floats:
     tau=shape(60.0, 240.0, "s", least=1e-3),
 )
 def viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
-    """Grease that warms up: viscous damping falls to a new level."""
+    """Grease that warms up: viscous damping decays exponentially to a new level."""
     return np.asarray(-b * np.expm1(-m.lab / tau) * m.velocity)
 
 
@@ -208,7 +208,7 @@ def viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
     tau=shape(60.0, 240.0, "s", least=1e-3),
 )
 def slow_viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
-    """Damping that falls along a hyperbola: the last part takes far longer."""
+    """Grease that warms up: viscous damping decays hyperbolically, with a longer tail."""
     return b * m.lab / (m.lab + tau) * m.velocity
 
 

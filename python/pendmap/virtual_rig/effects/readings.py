@@ -1,4 +1,4 @@
-"""Effects of the sensor: what is read instead of the angle, and when."""
+"""Effects of the sensor: errors of the angle read and of the sampling times."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 _reading: Final = functools.partial(effect, "distort", "reading")
 
-_FINE: Final = 1e-3  # Step of the lag's exact response to a cubic between two points, s
+_FINE: Final = 1e-3  # Step of the cubic interpolation in the exact response of the lag, s
 
 
 def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
-    """Return what a sensor without noise reads of a path at true, increasing times, rad."""
-    # Turning points between the samples matter to backlash.
+    """Return the noise-free reading of a path at true, increasing times, rad."""
+    # Backlash depends on turning points between the samples.
     turns = np.array([event.time for event in path.events if event.what == "turn"])
     turns = turns[(turns > time[0]) & (turns < time[-1])]
     everything = np.concatenate([time, turns])
@@ -37,19 +37,19 @@ def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
 
 
 def fading(values: Floats, factor: float) -> Floats:
-    """Return ``y[k] = factor y[k - 1] + values[k]``, the filter of first order, shape (N,)."""
+    """Return ``y[k] = factor y[k - 1] + values[k]``, a first-order filter, shape (N,)."""
     return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
 
 @_reading("reading th + d", signed=True, order=4, d=size(0.0004, 0.0015, "rad"))
 def encoder_offset(seen: Reading, d: float) -> Floats:
-    """The zero of the sensor is not at the lowest point."""
+    """The zero of the sensor is offset from the lowest point."""
     return seen.angle + d
 
 
 @_reading("reading th + r t, t lab time", signed=True, order=4, r=size(4e-06, 1.5e-05, "rad/s"))
 def encoder_drift(seen: Reading, r: float) -> Floats:
-    """The zero of the sensor wanders off, by as much in every second."""
+    """The zero of the sensor drifts at a constant rate."""
     return seen.angle + r * (seen.path.lab + seen.time)
 
 
@@ -71,7 +71,7 @@ def encoder_eccentricity(seen: Reading, e: float, psi: float) -> Floats:
 
 
 class EncoderBacklash(Effect):
-    """Play between shaft and sensor, centred at the start: the reading lags on either side."""
+    """Play between shaft and sensor, centred at the start: the reading lags in both directions."""
 
     name = "encoder_backlash"
     group = "reading"
@@ -91,7 +91,7 @@ class EncoderBacklash(Effect):
 
 
 class SensorLag(Effect):
-    """A filter of first order in the sensor, settled when the run begins."""
+    """A first-order filter in the sensor, in steady state when the run begins."""
 
     name = "sensor_lag"
     group = "reading"
@@ -112,7 +112,7 @@ class SensorLag(Effect):
         d = (velocity[:-1] + velocity[1:] - 2 * rise) / step**2
 
         def settled(k: NDArray[np.intp], t: Floats) -> Floats:
-            """Return the settled reading of a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
+            """Return the steady-state response to a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
             p = theta[k] + t * (velocity[k] + t * (c[k] + t * d[k]))
             first = velocity[k] + t * (2 * c[k] + 3 * t * d[k])
             second = 2 * c[k] + 6 * t * d[k]
@@ -122,7 +122,7 @@ class SensorLag(Effect):
         fade = math.exp(-step / self.tau)
         begin = settled(every, np.zeros(step_count))
         end = settled(every, np.full(step_count, step))
-        # Departure from the settled reading at the start of each interval.
+        # Difference from the steady-state response at the start of each interval.
         jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
         departure = fading(jumps, fade)
         k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)

@@ -1,4 +1,4 @@
-"""Effects of what the pivot stands on, and of the drive."""
+"""Effects of the support of the pivot, and of the drive."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Fl
 
 
 class PivotCompliance(Effect):
-    """A pivot that gives way sideways, with its own mode, driven by the pendulum's pull."""
+    """A pivot that yields laterally, with an oscillation mode driven by the pendulum's force."""
 
     name = "pivot_compliance"
     group = "stand"
@@ -46,7 +46,7 @@ class PivotCompliance(Effect):
         return [(self.mu, self.wx, self.z)]
 
     def begin(self, motion: Motion) -> Floats:
-        # Pulled aside by the rod, and at rest.
+        # Deflected by the force of the rod, and at rest.
         pull = motion.sin * (motion.w0**2 * (1 + motion.vertical) * motion.cos + motion.velocity**2)
         own = np.zeros((*motion.theta.shape, self.states))
         for k, (mu, wx, _) in enumerate(self._modes()):
@@ -95,7 +95,7 @@ class TwoModePivot(PivotCompliance):
     psi=shape(-np.pi, np.pi, "rad"),
 )
 def base_sway(m: Motion, amplitude: float, ws: float, psi: float) -> Floats:
-    """The floor sways sideways, steadily, whatever the pendulum does."""
+    """A steady lateral oscillation of the floor, independent of the pendulum."""
     sway = amplitude * np.cos(ws * m.lab + psi)
     return np.asarray(-(m.w0**2) * sway * m.cos)
 
@@ -115,7 +115,7 @@ class Impulses(Effect):
 
 
 class ImpulseTrain(Effect):
-    """Knocks about every ``every`` seconds of lab time, in either sense."""
+    """Knocks at a mean interval of ``every`` seconds of lab time, of either sign."""
 
     name = "impulses"
     variant = "train"
@@ -127,7 +127,7 @@ class ImpulseTrain(Effect):
     pattern: float = shape(0, 999_999, "", whole=True, least=0)
 
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
-        # The pattern has its own stream, the same for every part of a run.
+        # The pattern has its own random stream, so that all parts of a run share it.
         rng = np.random.default_rng(int(self.pattern))
         found, time = [], 0.0
         while time < end:
@@ -140,25 +140,25 @@ class ImpulseTrain(Effect):
 
 @_drive("p (1 + e)", signed=True, e=size(0.0015, 0.006, "", most=0.9))
 def drive_amplitude(drive: Drive, e: float) -> Drive:
-    """The drive's amplitude is not what the experiment says."""
+    """The drive's amplitude differs from the value in the experiment file."""
     return dataclasses.replace(drive, p=drive.p * (1 + e))
 
 
 @_drive("phi + d", signed=True, d=size(0.001, 0.004, "rad"))
 def drive_phase(drive: Drive, d: float) -> Drive:
-    """The drive is late or early, by the same phase in all runs."""
+    """The drive has a phase offset, equal in all runs."""
     return dataclasses.replace(drive, phase=drive.phase + d)
 
 
 @_drive("Omega (1 + e)", signed=True, e=size(1e-05, 4e-05, "", most=0.9))
 def drive_frequency(drive: Drive, e: float) -> Drive:
-    """The drive's frequency is not what the experiment says."""
+    """The drive's frequency differs from the value in the experiment file."""
     return dataclasses.replace(drive, frequency=drive.frequency * (1 + e))
 
 
 @_drive("phase Omega t + r t^2/2 + phi", signed=True, r=size(1.5e-05, 6e-05, "rad/s^2"))
 def drive_chirp(drive: Drive, r: float) -> Drive:
-    """The drive's frequency creeps during a run."""
+    """The drive's frequency changes linearly during a run."""
     return dataclasses.replace(drive, chirp=np.full_like(drive.p, r))
 
 
@@ -168,7 +168,7 @@ def drive_chirp(drive: Drive, r: float) -> Drive:
     phase=shape(-math.pi, math.pi, "rad"),
 )
 def drive_second_harmonic(drive: Drive, e: float, phase: float) -> Drive:
-    """A shaker that distorts: twice the frequency as well."""
+    """A shaker with harmonic distortion: a second harmonic of the drive."""
     phi = np.full_like(drive.p, phase)
     return dataclasses.replace(drive, p_second=e * drive.p, phi_second=phi)
 
@@ -179,6 +179,6 @@ def drive_second_harmonic(drive: Drive, e: float, phase: float) -> Drive:
     phase=shape(-math.pi, math.pi, "rad"),
 )
 def lateral_drive(drive: Drive, e: float, phase: float) -> Drive:
-    """A shaker that does not move straight: sideways as well."""
+    """A shaker that does not move along a straight line: a lateral component of the drive."""
     phi = np.full_like(drive.p, phase)
     return dataclasses.replace(drive, p_lateral=e * drive.p, phi_lateral=phi)

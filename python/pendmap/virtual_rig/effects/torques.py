@@ -1,4 +1,4 @@
-"""Effects that pull, and those of inertia."""
+"""Effects of torques and of inertia."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pendmap.virtual_rig.effects.base import (
 
 @acceleration("torque", "+torque", signed=True, torque=size(0.004, 0.015, "rad/s^2"))
 def bias_torque(_: Motion, torque: float) -> float:
-    """A constant pull: a cable, a tilted fan."""
+    """A constant torque: a cable, a tilted fan."""
     return torque
 
 
@@ -29,7 +29,7 @@ def bias_torque(_: Motion, torque: float) -> float:
     psi=shape(-np.pi, np.pi, "rad"),
 )
 def bearing_harmonic(m: Motion, amplitude: float, n: float, psi: float) -> Floats:
-    """Cogging or uneven races: a torque that repeats n times a turn."""
+    """Cogging or uneven bearing races: a torque with n periods per turn."""
     return np.asarray(amplitude * np.sin(n * m.theta + psi))
 
 
@@ -41,7 +41,7 @@ def bearing_harmonic(m: Motion, amplitude: float, n: float, psi: float) -> Float
     width=shape(0.08, 0.2, "rad", least=1e-3),
 )
 def magnet(m: Motion, amplitude: float, width: float) -> Floats:
-    """A magnet under the lowest point: a narrow well."""
+    """A magnet under the lowest point: a narrow potential well."""
     x = (m.theta - 2 * np.pi * np.round(m.theta / (2 * np.pi))) / width
     return np.asarray(-amplitude * x * np.exp(-(x**2) / 2))
 
@@ -56,20 +56,20 @@ def magnet(m: Motion, amplitude: float, width: float) -> Floats:
     d=shape(0.15, 0.4, "rad", least=1e-3),
 )
 def dipole_magnet(m: Motion, amplitude: float, d: float) -> Floats:
-    """Two dipoles in line, a gap apart at the lowest point: U ~ r^-3, its tails far wider."""
+    """Two dipoles in line, separated by a gap at the lowest point: U ~ r^-3, with wide tails."""
     distance = 1 + 2 * (1 - m.cos) / d**2
     return np.asarray(-amplitude * m.sin / d * distance**-2.5)
 
 
 @acceleration("torque", "-k th, th not wrapped", k=size(0.0003, 0.0012, "1/s^2"))
 def elastic_restoring(m: Motion, k: float) -> Floats:
-    """A cable that winds up: it counts turns."""
+    """A cable that winds up: a torque proportional to the unwrapped angle."""
     return -k * m.theta
 
 
 @acceleration("torque", "-w0^2 (sin(th + d) - sin th)", signed=True, d=size(0.0004, 0.0015, "rad"))
 def rig_tilt(m: Motion, d: float) -> Floats:
-    """The rig leans: gravity does not pull along the line of the drive and of the zero."""
+    """A tilted rig: gravity is not aligned with the drive and the sensor's zero."""
     return np.asarray(-(m.w0**2) * (np.sin(m.theta + d) - m.sin))
 
 
@@ -93,9 +93,9 @@ class InertiaRipple(Effect):
 
 
 class AddedMass(Effect):
-    """The fluid that moves along: it has inertia, also against the pivot's motion, but no weight.
+    """Mass of the fluid that moves along: it adds inertia, also to the drive's term, but no weight.
 
-    It leaves no trace in free decays; under drive it cannot be told from drive_amplitude.
+    It has no effect on free decays; under drive it is indistinguishable from drive_amplitude.
     """
 
     name = "added_mass"
@@ -122,5 +122,5 @@ class AddedMass(Effect):
     t0=shape(60.0, 200.0, "s"),
 )
 def late_added_mass(m: Motion, e: float, t0: float) -> Floats:
-    """A weight at the pivot's hub (a clamp, a cable tie) from some lab time on: inertia alone."""
+    """A weight at the pivot's hub (a clamp, a cable tie), added at lab time t0: inertia alone."""
     return np.asarray(e * (m.lab - m.time > t0))
