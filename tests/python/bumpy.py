@@ -1,4 +1,4 @@
-"""An experiment whose pendulum has a bump that no effect of the library is, by scipy."""
+"""An experiment, by scipy, whose pendulum has a bump that no effect of the library describes."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ parameters = {{ k = 1.5 }}
 
 
 def torque(theta: float) -> float:
-    """The bump, rad/s^2."""
+    """Return the torque of the bump, rad/s^2."""
     off = math.remainder(theta - PLACE, math.tau)
     return BUMP["height"] * math.exp(-((off / BUMP["width"]) ** 2))
 
 
 def experiment(folder: Path, *, seed: int = 1) -> Path:
-    """Four free decays, one of them held back, read by an encoder with some noise."""
+    """Write four free decays, one of them held out, read by an encoder with noise."""
     folder.mkdir()
     rng = np.random.default_rng(seed)
     lines = ["[rig]", "encoder_counts = 4096"]

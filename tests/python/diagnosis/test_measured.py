@@ -1,6 +1,7 @@
-"""``diagnose`` on measured records, where the environment names their folder.
+"""``diagnose`` on measured records, in the folder named by the environment.
 
-The fits by hand have viscous damping, Coulomb friction, quadratic drag and the sensor's zero.
+The reference fits by hand have viscous damping, Coulomb friction, quadratic drag and the sensor's
+zero.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ HELD_BY_HAND = 0.0083
 
 
 def path_of(name: str) -> Path:
-    """Return where a record is, in the folder or below it."""
+    """Return the path of a record, in the folder or below it."""
     return next(Path(RECORDS).rglob(f"{name}.csv"))
 
 
@@ -60,7 +61,7 @@ def found(name: str) -> Discrepancy:
 
 
 def check_named(diagnosis: Discrepancy) -> None:
-    """Drag closes most of the gap, no coefficient is negative, and no warm-up is named."""
+    """Assert that drag is named first, no coefficient is negative, and no warm-up is named."""
     names = [effect.name for effect in diagnosis.effects]
     assert names[0] == "quadratic_drag"
     assert not [name for name in names if name.endswith("warm_up")]
@@ -69,7 +70,7 @@ def check_named(diagnosis: Discrepancy) -> None:
         assert name not in estimates or estimates[name].value >= 0
     fitted = diagnosis.best.fitted
     assert impose_physics(diagnosis.data, fitted) is fitted
-    # The residual is far above the noise: the named effects are not all.
+    # The residual is far above the noise: the named effects are incomplete.
     assert diagnosis.verdict == "partial"
     assert all(effect.approximate for effect in diagnosis.effects)
     assert diagnosis.assessment.closed > 0.9
