@@ -31,7 +31,7 @@ SENSORS: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "angular": ({"direction": "angular", "noise": 0.2}, 'direction = "angular"'),
 }
-"""What :func:`readings` takes of a sensor, and what [columns] says of it."""
+"""Parameters of a sensor for :func:`readings`, and its entries in [columns]."""
 
 
 def column(sensor: str) -> str:

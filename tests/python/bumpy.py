@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 W0, C_OVER_M = 6.2, 0.06
 BUMP = {"height": 0.9, "width": 0.18}
-"""In rad/s^2 and rad: 1/40 of gravity, about an angle of 0.8 rad."""
+"""Parameters of the bump, rad/s^2 and rad: 1/40 of gravity, about an angle of 0.8 rad."""
 PLACE = 0.8
 
 FILE = f"""

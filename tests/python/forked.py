@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ROOMS = ("pendmap", "pendmap.comparison", "pendmap.identification", "pendmap.diagnosis")
 PATIENCE = 60
-"""Seconds after which a child is taken to wait for ever."""
+"""Seconds after which a child is assumed to be blocked."""
 
 EXPERIMENT = """
 [[run]]

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 LIMIT = 10.0
-"""Seconds of the processor that a command may take; of the clock twelve times as many."""
+"""Limit on the processor time of a command, s; its wall time may be twelve times as long."""
 
 MEMORY = 8 * 2**30
-"""Bytes of address space that a command may take."""
+"""Limit on the address space of a command, bytes."""
 
 SEEDS = {
     "basins": ["--grid=12"],
@@ -51,7 +51,7 @@ SEEDS = {
     "lyapunov": ["--p=0.6", "--precision=0.1", "--max-periods=50"],
     "lifetime": ["--starts=100", "--max-periods=50"],
 }
-"""Commands whose results are drawn from."""
+"""Commands that make the results from which cases are drawn."""
 
 
 def make_seeds(folder: Path) -> None:

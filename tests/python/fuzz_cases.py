@@ -43,7 +43,7 @@ class Case:
 
 
 SEEDS: Final[dict[str, bytes]] = {}
-"""Results by name, which :mod:`fuzz` lets pendmap write."""
+"""Results by name, written by pendmap at the request of :mod:`fuzz`."""
 
 NUMBERS: Final = (
     *("nan", "inf", "-inf", "0", "-0", "-1", "1e-320", "1e-12", "0.1", "1", "3.7", "1e3", "1e16"),
@@ -93,7 +93,7 @@ SMALL: Final = {
     "tongues": ["--omega=1.8:2.2:4"],
     "view": ["x.rrd"],
 }
-"""Every command, and what keeps it small."""
+"""Options by command that keep its computation small."""
 
 MODEL: Final = b"""[pendulum]
 w0 = 6.2

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 KNOWN: list[Path] = []
-"""The folder of diagnoses that this run of the tests has made; conftest.py sets it."""
+"""Folder of the diagnoses made in this test run; set by conftest.py."""
 
 
 def diagnosed(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INTERVAL, W0 = 0.02, 6.0
 RUNS, SAMPLES = 4, 800
 COUNT = 1.0
-"""Counts are the unit of everything that is counted here."""
+"""Size of a count: all quantities here are in counts."""
 
 
 def swing(samples: int = SAMPLES) -> Floats:

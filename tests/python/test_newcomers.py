@@ -62,7 +62,7 @@ NAMED_ELSEWHERE = {
     "quadratic_drag": "identify tries it unasked",
     "stribeck_friction": "a summary says that it lowers the friction at rest",
 }
-"""Effects that the code names outside the library, and why; a new effect is none of them."""
+"""Effects named by code outside the library, with reasons; a new effect is not among them."""
 
 
 def named(path: Path) -> set[str]:

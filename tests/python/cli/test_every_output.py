@@ -53,7 +53,7 @@ REFUSED = {
     ("a direct drive", "tongues"): "a sideways drive or an effect moves it",
     ("a direct drive", "melnikov"): "not proportional to p",
 }
-"""Combinations without a meaning, with the reason."""
+"""Meaningless combinations, with the reason."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LIMIT = 6_000_000
-"""What `ulimit -v` is given, in kB."""
+"""Limit of `ulimit -v`, kB."""
 
 COMMANDS = [
     "basins --p 0.6 --grid 20000",

@@ -31,13 +31,13 @@ BY_HAND = {
     "cartpend_upright": 0.0086,
     "multiarm_single_free_large": 0.0028,
 }
-"""Root mean square, rad, that the fits by hand leave of the whole record."""
+"""Root mean square residual, rad, of the fits by hand to the whole record."""
 
 CARTPEND, HELD = ("upright", "40", "20"), "80"
-"""Decays of one pendulum by where they begin, and the one that is held out."""
+"""Decays of one pendulum, named by their starts, and the held-out one."""
 
 HELD_BY_HAND = 0.0083
-"""Root mean square, rad, that the hand fit of the three others leaves of it."""
+"""Root mean square residual, rad, on the held-out decay of the hand fit to the three others."""
 
 
 def path_of(name: str) -> Path:

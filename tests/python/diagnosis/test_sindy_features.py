@@ -32,7 +32,7 @@ INTERVAL = 0.002
 TIME = np.arange(0.0, 8.0, INTERVAL)
 
 FAINT = 1e-5
-"""Size of what is hidden: its square is nothing."""
+"""Size of a hidden effect, small enough for its square to be negligible."""
 
 
 @pytest.fixture(scope="module")

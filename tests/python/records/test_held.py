@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment
 
 ONCE_A_PERIOD = 1.1
-"""Seconds: what is given up of a swing before a hand takes it."""
+"""Part of a swing, s, that may be lost before a hand stops it."""
 
 
 def spans(read: Experiment) -> list[tuple[float, float]]:

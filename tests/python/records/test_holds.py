@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ANGLES = (0.3, 1.0, 1.3, 2.0, 2.8, 3.0)
 HOLDS = (0.3, 0.7, 1.5, 5.0, 20.0)
 LOST = 0.25
-"""Seconds of free swing that may be lost."""
+"""Free swing that may be lost, s."""
 
 
 def held(folder: Path, angle: float, hold: float, degrees: float, seed: int) -> tuple[Run, int]:

@@ -50,9 +50,7 @@ def test_a_comparison_fits_a_screen_without_overlapping_text(count: int) -> None
         assert box.y0 > -1
         assert box.y1 < figure.bbox.y1 + 1
     drawn = written(figure)
-    if (
-        count > comparison.ALL
-    ):  # all in one panel; the one held out and the one with the largest misfit
+    if count > comparison.ALL:  # all in one panel; the held-out run and that of largest misfit
         ratios = figure.axes[0].get_lines()
         points = sum(len(line.get_xdata()) for line in ratios[1:])  # type: ignore[arg-type]
         assert points == count
@@ -72,7 +70,7 @@ def test_a_run_without_peaks_is_marked() -> None:
 
 @pytest.mark.parametrize("seconds", [20.0, 70.0])
 def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_path: Path) -> None:
-    """One that tumbles, one that settles within 70 s; the sheet and the paper's two figures."""
+    """Figures are drawn of a run that tumbles and of one that settles within 70 s."""
     plans = (
         RunPlan("forced", 1.0, 3.0, seconds, p=1.5, frequency=11.0),
         RunPlan("forced", 0.9, 0.0, seconds, p=0.6, frequency=12.0, phase=0.4),

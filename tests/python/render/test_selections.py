@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 FEW = (Phase.explicit, Phase.generate)
-"""A figure takes half a second: what fails is not made smaller."""
+"""Settings for few examples without shrinking: a figure takes half a second."""
 
 SIDE = 9
 MAP = pendmap.basins(Pendulum(p=0.6), pendmap.Grid.square(SIDE))
@@ -42,7 +42,7 @@ parts = st.one_of(
     ),
     st.lists(st.integers(0, 6), min_size=1, max_size=5, unique=True),
 )
-"""Places along an axis: a slice, every k-th, reversed, or any."""
+"""Selections along an axis: a slice, every k-th, reversed, or any."""
 
 
 def selected(result: xr.Dataset, *, turned: bool, **places: list[int]) -> xr.Dataset:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 OFFSET = 0.05
-"""Of the sensor's zero, rad: large enough to be seen if a model's reading lacked it."""
+"""Zero of the sensor, rad: large enough to show if a model's reading lacked it."""
 
 
 def write(file: Path, time: Floats, theta: Floats, name: str = "theta_rad") -> Path:
