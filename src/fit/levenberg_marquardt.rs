@@ -9,7 +9,7 @@ use super::step_scale::StepScale;
 use super::window::Window;
 use crate::error::Error;
 
-/// The first damping that is tried after a step that failed.
+/// The first damping tried after a step that failed.
 const FIRST_DAMPING: f64 = 1e-4;
 /// Factor of the damping after a failure; after a good step it falls by the square of that.
 const GROWTH: f64 = 8.0;
@@ -54,19 +54,20 @@ impl Point {
         Ok(Self { values, windows, normal, in_vain: 0.0 })
     }
 
-    /// The samples that count, less the parameters and initial states that were adapted to them.
+    /// The number of samples with nonzero weight, less that of parameters and initial states
+    /// adapted to them.
     #[must_use]
     pub fn degrees(&self, problem: &Problem) -> usize {
         problem.samples().saturating_sub(self.values.len() + 2 * self.windows.len())
     }
 
-    /// How far each parameter may go.
+    /// The bounds of each parameter.
     fn ends(&self, problem: &Problem) -> Vec<[f64; 2]> {
         let both = self.values.iter().zip(&problem.ranges);
         both.map(|(value, [low, high])| [(low - value).min(0.0), (high - value).max(0.0)]).collect()
     }
 
-    /// The point a step further; none where it cannot be.
+    /// The point after a step; none if it cannot be computed.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
         self.gone(problem, step, |_| StepScale::Linear)
@@ -151,14 +152,14 @@ impl Point {
     }
 }
 
-/// The end of a descent.
+/// The criteria for the end of a descent.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit {
     /// Predicted gain of the next step in the sum of squares at which the descent ends.
     pub gain: f64,
     /// Part of the sum of squares that a gain must exceed for the descent to go on.
     pub part: f64,
-    /// The most steps.
+    /// Largest number of steps.
     pub steps: usize,
     /// The sum of squares to be reached: a descent that cannot come near it is given up; infinite where
     /// every descent is worth it.
@@ -168,15 +169,15 @@ pub struct Limit {
 /// How a descent ended.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Points at which the equations were set up.
+    /// Number of points at which the equations were set up.
     pub steps: usize,
-    /// Whether the limit was reached, or no step leads further down.
+    /// Whether the limit was reached, or no step decreases the sum further.
     pub converged: bool,
-    /// Whether it was given up: it leads nowhere near [`Limit::target`].
+    /// Whether it was given up, as it cannot come near [`Limit::target`].
     pub given_up: bool,
 }
 
-/// Goes down from `point`, parameters `held` kept where they are.
+/// Descends from `point`, with the parameters `held` fixed.
 ///
 /// # Errors
 /// [`Error::Interrupted`] when `cancel` is set.

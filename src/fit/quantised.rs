@@ -65,8 +65,8 @@ pub fn likelihood(apart: f64, count: f64, sharpness: f64) -> Likelihood {
     Likelihood { deviance, residual: (slope / weight).copysign(apart), weight: weight * sharpness }
 }
 
-/// The mean of `-2 log P` of a motion that passes evenly through counts, less 1: taken off, sums of
-/// deviances are those of squared residuals over standard errors, one for each reading.
+/// The mean of `-2 log P` of a motion that passes evenly through counts, less 1: with it
+/// subtracted, sums of deviances are comparable to those of squared residuals over standard errors.
 #[must_use]
 pub fn surplus(count: f64, sharpness: f64) -> f64 {
     // By the middle rule over where the model may be, in counts, on either side of a reading.
@@ -93,7 +93,7 @@ fn scaled_erfc(x: f64) -> f64 {
         }
         return square.exp() - 2.0 / PI.sqrt() * sum;
     }
-    // Laplace's continued fraction (7.1.14), from far enough in.
+    // Laplace's continued fraction (7.1.14), from a sufficient depth.
     let depth = (20.0 + 400.0 / square) as usize;
     let mut rest = x;
     for k in (1..=depth).rev() {

@@ -1,4 +1,4 @@
-//! A sensor on the rod that reads no angle: a gyroscope, or an accelerometer.
+//! A sensor on the rod that does not read the angle: a gyroscope, or an accelerometer.
 //!
 //! A gyroscope reads `th'`, wherever it sits. An accelerometer at the distance `r` from the pivot
 //! does not measure `r th''` but the specific force, acceleration less gravity. Towards positive
@@ -31,7 +31,7 @@ pub struct RodSensor {
     pub gravity: f64,
     /// Its reading at rest without gravity.
     pub bias: f64,
-    /// The interval that a reading is the mean over, in `1 / w_ref`.
+    /// The averaging interval of a reading, in `1 / w_ref`.
     pub interval: f64,
     /// The angle between its axis and the tangential direction, rad.
     pub tilt: f64,
@@ -53,7 +53,7 @@ impl RodSensor {
         own[0].aside(Reading { sensor, ode, tau, state, moving, own, into });
         reading
     }
-    /// Whether all of it are numbers, and it shows anything.
+    /// Whether all factors are numbers, and the sensor is sensitive to motion.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let all = [self.rate, self.place, self.gravity, self.bias, self.interval, self.tilt];
