@@ -1,4 +1,4 @@
-//! How far a start must be known for its end to be known.
+//! Uncertain starts: those whose attractor changes within a given distance.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -14,15 +14,15 @@ const SCALES: [i32; 2] = [-6, -26];
 /// First exponent where a short and smooth boundary leaves fewer distances than `LEAST_SCALES`.
 const WIDEST: i32 = -4;
 const LEAST_SCALES: usize = 5;
-/// Starts at every other distance that say how many each takes.
+/// Number of starts at every other distance in the pilot.
 const PILOT: usize = 512;
-/// Uncertain starts that are aimed at for each distance.
+/// Target number of uncertain starts for each distance.
 const AIM: f64 = 600.0;
-/// Starts a distance, at least and at most.
+/// Least and largest number of starts for a distance.
 const STARTS: [f64; 2] = [200.0, 16_000.0];
-/// Uncertain starts in the pilot that tell the share.
+/// Number of uncertain starts in the pilot that determine the share.
 const LEAST_TELLING: usize = 3;
-/// A distance at which fewer are expected from the most starts says too little.
+/// Least expected number of uncertain starts for a distance to be used.
 const LEAST_UNCERTAIN: f64 = 40.0;
 /// Number of labels: the least, the multiple of the cells of the map, and the most.
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
@@ -46,7 +46,7 @@ const SIDES: usize = 3;
 /// starts drawn evenly as tell the share as precisely.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Uncertainty {
-    /// Distances, in sides of the window, falling.
+    /// Distances, in sides of the window, decreasing.
     pub eps: Vec<f64>,
     /// Uncertain starts.
     pub uncertain: Vec<u64>,
@@ -61,7 +61,7 @@ pub struct Uncertainty {
 /// counted. Empty where no boundary was met.
 ///
 /// # Errors
-/// Whatever `label` meets.
+/// Errors of `label`.
 pub fn uncertainty(
     window: [&Axis; 2],
     map: &[i16],
@@ -119,7 +119,7 @@ pub fn uncertainty(
     })
 }
 
-/// Starts drawn from some cells of a map, and what became of them.
+/// Starts drawn from some cells of a map, and their results.
 #[derive(Clone, Copy, Debug)]
 struct Stratum {
     first: usize,

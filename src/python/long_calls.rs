@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use super::raise;
 
-/// How often signals and progress are looked at.
+/// Interval between checks of signals and progress.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Runs `work` on another thread and waits for it, detached from the interpreter; at every

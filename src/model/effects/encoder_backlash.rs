@@ -1,4 +1,5 @@
-//! Play between shaft and sensor: at a turn the reading stands still until the play is taken up.
+//! Backlash between shaft and sensor: after a turn the reading is constant until the play is taken
+//! up.
 //!
 //! The reading lags behind the angle by half the play. While the sense `s` of the motion is held, what
 //! it reads less `theta` is `s max(s k, -b/2)`, where `k` is what the last turn left, less the way
