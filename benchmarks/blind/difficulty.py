@@ -102,7 +102,7 @@ def _refitted(
 def _impostors(
     data: DataSplit, begin: FittedModel, own: str, without: Sequence[str]
 ) -> tuple[dict[str, float], set[str]]:
-    """Return what each other effect gains of what one alone leaves, and the one's equals."""
+    """Return the gains of all other effects on the residual of one, and the equals of that one."""
     scores = score_candidates(data, begin, list_candidates({"Tr", *without}, driven=data.forced))
     gains, equals = {}, set()
     places = scores.best()

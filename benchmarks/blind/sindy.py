@@ -22,8 +22,8 @@ is hidden, on these very experiments.
 
 As in ``diagnose`` gravity, viscous damping and Coulomb friction are in every model, and at most
 three further effects, also in SINDy. "Right" is defined by ``report.right`` for both. SINDy
-is given the classes of equals that its own features cannot tell apart, and those that pendmap
-found.
+is given the classes of equals that its own features cannot distinguish, and those found by
+pendmap.
 
 References
 ----------

@@ -161,7 +161,7 @@ def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, 
 
 
 def columns(states: States, rig: Parameters, pool: list[tuple[Candidate, Feature]]) -> Floats:
-    """Return what size 1 of each feature adds to th'' along a run, shape (n, len(pool))."""
+    """Return each feature's contribution of size 1 to th'' along a run, shape (n, len(pool))."""
     plain = _rates(states, rig, [], states.theta)
     found = np.empty((plain.size, len(pool)))
     for k, (candidate, feature) in enumerate(pool):

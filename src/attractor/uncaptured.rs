@@ -78,7 +78,7 @@ impl Catalogue {
         self.rebuild(&strobe.pendulum);
     }
 
-    /// Whether what was taken for chaos beside another attractor is no way to it.
+    /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.
     ///
     /// Such transients are long: the set is watched for [`LONG`] periods from some of its points, or until one
     /// run ends.

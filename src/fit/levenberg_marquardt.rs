@@ -13,7 +13,7 @@ use crate::error::Error;
 const FIRST_DAMPING: f64 = 1e-4;
 /// Factor of the damping after a failure; after a good step it falls by the square of that.
 const GROWTH: f64 = 8.0;
-/// Part of the predicted gain above which a step counts as good.
+/// Part of the predicted gain above which a step is good.
 const FAIR: f64 = 0.25;
 /// Part of the predicted gain above which no other scale is tried.
 const KEPT: f64 = 0.75;

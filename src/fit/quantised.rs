@@ -18,9 +18,10 @@ const TAIL: f64 = 2.0;
 /// The least weight, over `1 / s`: rows stay as they are, up to their length, where a reading says
 /// nothing.
 const FAINT: f64 = 1e-6;
-/// Standard errors beside its count from which a reading is a value, before digits are lost.
+/// Distance from its count, in standard errors, above which a reading is a value, before digits are
+/// lost.
 const FAR: f64 = 1e4;
-/// How far beside its count, in standard errors, a reading is looked for in a mean.
+/// Range of a mean over readings on either side of a count, in standard errors.
 const REACH: f64 = 9.0;
 /// Points of that mean.
 const POINTS: usize = 400;

@@ -15,7 +15,8 @@ use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 
-/// Newton's steps onto the orbit, and the gap that counts as none, in units of what rounding leaves.
+/// Newton's steps onto the orbit, and the gap at which it has converged, in units of the rounding
+/// error.
 const ITERATIONS: usize = 8;
 const RESIDUAL: f64 = 1e-12;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;

@@ -33,7 +33,7 @@ const GROWTH: f64 = 8.0;
 const ALIKE: f64 = 1e-9;
 /// Largest load on the pendulum at rest that is rounding.
 const NO_LOAD: f64 = 1e-13;
-/// Numbers of times in a period, and of amplitudes of the drive, at which the load is sampled.
+/// Number of times in a period at which the load is sampled.
 const TIMES: usize = 16;
 
 /// The two angles at which gravity has no torque.

@@ -60,7 +60,8 @@ impl Pivot<'_> {
     }
 }
 
-/// A sensor on the rod as Python passes it: its factors, and the range of angles.
+/// A sensor on the rod as Python passes it: its factors, and the approximate angles at its
+/// readings.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Sensor<'py> {

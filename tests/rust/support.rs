@@ -91,7 +91,7 @@ pub fn labelled(
     (strobe, catalogue, labels)
 }
 
-/// Chaos beside other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
+/// Chaos coexisting with other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
 pub fn chaos_among_others() -> &'static (Strobe, Catalogue, Labels) {
     static FOUND: OnceLock<(Strobe, Catalogue, Labels)> = OnceLock::new();
     FOUND.get_or_init(|| labelled(&driven(0.1, 1.52, 1.1), &plane(24), simd()))

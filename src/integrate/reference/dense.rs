@@ -204,7 +204,7 @@ impl<N: Number> DenseStep<N> {
     }
 }
 
-/// The coefficients of a curve that gains so much over a step of that length.
+/// The coefficients of an interpolant with this increase over a step of that length.
 #[inline(always)]
 fn coefficients<N: Number>(gain: N, length: f64, slopes: &[N; ALL_STAGES], all: &mut [N; 8]) {
     let (first, last) = (slopes[0].scale(length), slopes[STAGES].scale(length));

@@ -16,7 +16,7 @@ use super::turning::{self, Turning};
 use crate::integrate::tangent::Number;
 use crate::model::rest::Release;
 
-/// Largest and smallest ratio of successive step lengths.
+/// Smallest and largest ratio of successive step lengths.
 const CHANGE: [f64; 2] = [1.0 / 3.0, 6.0];
 /// The part of the step that the error would allow.
 const SAFETY: f64 = 0.9;

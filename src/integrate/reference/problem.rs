@@ -16,8 +16,8 @@ use crate::model::{Equation, Pendulum};
 /// and motions smaller than the tolerance keep seven digits, so that their turns are
 /// turns. It falls with the tolerance all along, so that tightening always tells.
 const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
-/// Part of the rate of a mode that limits the longest step: the mode moves little beside the pendulum,
-/// and the error of each step includes it.
+/// Part of the rate of a mode that limits the longest step: the mode moves little compared to the
+/// pendulum, and the error of each step includes it.
 const MODE: f64 = 0.25;
 /// Least error of a step that can be estimated despite rounding.
 pub const FINEST: f64 = 1e-15;

@@ -79,7 +79,8 @@ pub enum Action {
     Position,
     /// A torque of the angle and of how the pivot moves.
     Driven,
-    /// A torque of the angle that changes with the time in the laboratory, beside the drive.
+    /// A torque of the angle that changes with the time in the laboratory, in addition to the
+    /// drive.
     Timed,
     /// An inertia of the angle, with the torque that comes of it.
     Inertia,

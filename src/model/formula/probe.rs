@@ -82,7 +82,7 @@ pub fn repeats_every_period(term: &Tree, values: &[f64]) -> bool {
     always(term, values, |at| term.value(values, &Place { phase: at.phase + TAU, ..*at }))
 }
 
-/// Whether the mirrored motion is pushed the other way so much of the drive's phase later.
+/// Whether the term is antisymmetric under reflection and this shift of the drive's phase.
 pub fn mirrors(term: &Tree, values: &[f64], later: f64) -> bool {
     always(term, values, |at| {
         let (theta, velocity, sense) = (-at.theta, -at.velocity, -at.sense);

@@ -427,7 +427,7 @@ def test_the_legend_names_the_pendulum_if_it_is_in_view() -> None:
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])
-def test_orbits_under_a_torque_are_those_of_its_equilibria(low: float, high: float) -> None:
+def test_orbits_of_both_balances_under_a_torque_are_distinct(low: float, high: float) -> None:
     omega = np.linspace(low, high, 13)
     found = pendmap.tongues(Pendulum(gamma=0.1, torque=0.2), omega)
     for place in range(omega.size):

@@ -209,7 +209,7 @@ def test_only_files_of_a_killed_run_are_removed(tmp_path: Path, result: xr.Datas
     assert names == sorted([*foreign, "m.nc", "other.nc"])
 
 
-def test_a_folder_is_restored_if_its_replacement_fails(tmp_path: Path) -> None:
+def test_a_folder_is_restored_after_its_replacement_was_killed(tmp_path: Path) -> None:
     code = (
         "import os, signal, sys, pathlib; from pendmap.files import whole_folder\n"
         "rename = pathlib.Path.rename\n"

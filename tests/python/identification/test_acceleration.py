@@ -73,7 +73,7 @@ def test_readings_in_g_use_the_gravity_of_the_rig(tmp_path: Path) -> None:
     agrees(identified(there), TRUTH)
 
 
-def test_the_sign_of_the_axis_is_inferred_if_it_is_the_only_error(tmp_path: Path) -> None:
+def test_the_sign_of_the_axis_alone_does_not_change_the_result(tmp_path: Path) -> None:
     time, _, force = readings()
     one = identified(experiment(tmp_path / "a", TANGENTIAL % 0.1, time, force)).best
     other = identified(experiment(tmp_path / "b", TANGENTIAL % 0.1, time, -force)).best

@@ -61,7 +61,7 @@ def test_the_sum_is_the_likelihood_of_the_counts() -> None:
     rise = deviance(other) - deviance(fit)
     assert rise > 10
     assert other.chi2 - fit.chi2 == pytest.approx(rise, rel=1e-6)
-    # The mean is 1 a reading, as of squares; the slopes have the stated variance.
+    # The mean is 1 per reading, as for squares; the slopes have the stated variance.
     assert fit.chi2 / fit.degrees == pytest.approx(1, abs=0.05)
     assert np.mean(fit.white[0] ** 2) == pytest.approx(1, abs=0.15)
 

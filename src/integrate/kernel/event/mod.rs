@@ -66,7 +66,7 @@ pub struct Reached {
 /// State of a search after an integration.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// The search asks for another integration.
+    /// The search requests another integration.
     Asks,
     /// The end of the step has been reached.
     Arrived {
