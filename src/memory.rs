@@ -49,14 +49,14 @@ fn free() -> Option<f64> {
     [machine, container, own].into_iter().flatten().reduce(f64::min)
 }
 
-/// The number after a name at the beginning of a line of a file; none where it is no number.
+/// The number after a name at the beginning of a line of a file; none if it is no number.
 fn field(path: &str, name: &str) -> Option<f64> {
     let text = read_to_string(path).ok()?;
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// The number that is all of a file; none where it is no number.
+/// The number that is the whole content of a file; none if it is no number.
 fn number(path: &str) -> Option<f64> {
     read_to_string(path).ok()?.trim().parse().ok()
 }

@@ -84,9 +84,9 @@ impl Catalogue {
     /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
     /// found to close on a new one, or `bound` periods are over.
     ///
-    /// The remaining trajectories are watched for a multiple of `bound` ([`Effort::watch`]). If then still
-    /// none of a set of them has been captured and their exponent is positive, the set is a chaotic
-    /// attractor; else they stay undecided. Returns how each start ended.
+    /// The remaining trajectories are observed for a multiple of `bound` ([`Effort::watch`]). If
+    /// none of a set of them has been captured by then and their exponent is positive, the set is a
+    /// chaotic attractor; else they stay undecided. Returns how each start ended.
     pub fn endings(
         &mut self,
         strobe: &Strobe,

@@ -1,11 +1,11 @@
 //! Trapping regions: a trajectory inside one is captured by its attractor.
 //!
 //! Around a point of a periodic attractor with monodromy `M` and spectral radius `rho` the discrete
-//! Lyapunov equation `M^T S M / r^2 - S = -I`, `rho < r < 1`, gives an ellipse `x^T S x <= level` that
-//! `M` shrinks by `r` at least. A circle will not do: rotations grow threefold before they shrink.
-//! With `r = 1` the ellipse of an orbit that first grows much would shrink too little to be told from
-//! rounding. How far the ellipse reaches in the nonlinear
-//! map is sampled: the largest level such that every sample within it comes back lower.
+//! Lyapunov equation `M^T S M / r^2 - S = -I`, `rho < r < 1`, gives an ellipse `x^T S x <= level`
+//! that `M` shrinks by `r` at least. A circle is insufficient: rotations grow threefold before they
+//! shrink. With `r = 1` the ellipse of an orbit with large initial growth would shrink too little
+//! to be distinguished from rounding. The extent of the ellipse in the nonlinear map is sampled:
+//! the largest level such that every sample within it comes back lower.
 
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};

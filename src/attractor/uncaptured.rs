@@ -80,8 +80,8 @@ impl Catalogue {
 
     /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.
     ///
-    /// Such transients are long: the set is watched for [`LONG`] periods from some of its points, or until one
-    /// run ends.
+    /// Such transients are long: the set is observed for [`LONG`] periods from some of its points,
+    /// or until one run ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
         if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
             return true;

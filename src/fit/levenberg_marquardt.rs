@@ -94,8 +94,9 @@ impl Point {
         Self::new(problem, values, windows).ok()
     }
 
-    /// The point a step further if it is lower, and how many were tried: straight; where that leads
-    /// less far down than it promised in ratios too, all else following the widths.
+    /// The point after a step if it is lower, and the number of points tried: a linear step; if
+    /// that gains less than predicted, a logarithmic one too, with all other parameters following
+    /// the widths.
     fn lower(
         &mut self,
         problem: &Problem,
@@ -133,7 +134,7 @@ impl Point {
         (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
     }
 
-    /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
+    /// The point to which all but `held` follows, and the number tried, while steps gain `enough`.
     ///
     /// A step that is too long for the widths leads up only because sizes and initial states, which
     /// go with them nearly linearly, are not yet those of the new widths.

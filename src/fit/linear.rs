@@ -55,8 +55,9 @@ impl Linear {
         &self.rows[sample * self.width..(sample + 1) * self.width]
     }
 
-    /// Residuals whose noise is white and of unit variance. Of counts, what a reading says varies from
-    /// next to nothing to all: the slopes of the likelihood over the root of their mean square.
+    /// Residuals whose noise is white and of unit variance. The information of counts varies from
+    /// almost none to all: for them, the slopes of the likelihood over the root of their mean
+    /// square.
     #[must_use]
     pub fn white(&self) -> Vec<f64> {
         if !self.counted {

@@ -2,9 +2,9 @@
 //!
 //! A window's derivatives by its initial state, by the parameters, and its residuals are columns
 //! `[S J r]` that an orthogonal transformation makes triangular (Householder). The first two rows
-//! then say what the initial state is, the others what the parameters alone obey: their `J~' J~` is
-//! `R = J' J - C' D^-1 C` of the normal equations (the Schur complement, `C = S' J`, `D = S' S`),
-//! without the loss of digits that the difference has where motions are chaotic.
+//! then determine the initial state, the others are equations of the parameters alone: their `J~'
+//! J~` is `R = J' J - C' D^-1 C` of the normal equations (the Schur complement, `C = S' J`, `D = S'
+//! S`), without the cancellation in the difference if motions are chaotic.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;

@@ -82,7 +82,7 @@ pub struct Shaped {
     pub rate: f64,
 }
 
-/// The free parameters of one record: their places in [`Problem::free`], and what they are.
+/// The free parameters of one record: their indices in [`Problem::free`], and their places.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
     /// Parameters on which the motion depends.

@@ -1,11 +1,11 @@
 //! Readings rounded to counts: each is an interval, not a value.
 //!
-//! A sensor that gives whole counts says that the angle plus its own noise lay within half a count
-//! of what it reads. With Gaussian noise of standard error `s` before the rounding, the likelihood
-//! of a model `m` is `P = Phi((y + q/2 - m)/s) - Phi((y - q/2 - m)/s)`. As long as `s` exceeds a
-//! third of a count this is a Gaussian of variance `s^2 + q^2/12`; below, a reading in the middle
-//! of a count says next to nothing and one beside an edge that was passed says all. Treated as
-//! Gaussian, successive readings on one count would be taken for independent.
+//! A sensor that gives whole counts states that the angle plus its own noise was within half a
+//! count of the reading. With Gaussian noise of standard error `s` before the rounding, the
+//! likelihood of a model `m` is `P = Phi((y + q/2 - m)/s) - Phi((y - q/2 - m)/s)`. As long as `s`
+//! exceeds a third of a count this is a Gaussian of variance `s^2 + q^2/12`; below, a reading in
+//! the middle of a count has almost no information and one next to a crossed edge has all. Treated
+//! as Gaussian, successive readings on one count would be taken for independent.
 //!
 //! `log P` is concave in `m` (Burridge 1981, J. R. Statist. Soc. B 43, 41), so that its curvature
 //! serves as weight: least squares with the residual `u / sqrt(i)` and the weight `sqrt(i)`, `u`

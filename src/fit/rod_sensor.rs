@@ -38,8 +38,9 @@ pub struct RodSensor {
 }
 
 impl RodSensor {
-    /// The reading in one state; `moving` says the sense of the motion and the side of a corner, and
-    /// what was kept at the last turn, none where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
+    /// The reading in one state; `moving` gives the sense of the motion, the side of a corner, and
+    /// the values kept at the last turn; none while friction holds the pendulum. `bias` and `tilt`
+    /// are the sensor's, with derivatives.
     pub fn read<N: Number>(
         &self,
         ode: &OdeProblem<N>,

@@ -22,7 +22,7 @@ const TIGHTENING: f64 = 16.0;
 const ROUNDING: f64 = 1e-7;
 /// Larger angles are shifted by a number of whole turns.
 const FAR: f64 = 100.0;
-/// Bytes of a sample: time, state, what a tangent adds, and their copies.
+/// Memory of a sample, bytes: time, state, the tangent's quantities, and their copies.
 const EACH: usize = 120;
 /// Upper estimate of the events in a period, each as large as a sample.
 const EVENTS: usize = 4;

@@ -72,7 +72,7 @@ pub fn bifurcation(
     request: &Request,
     control: &Control,
 ) -> Result<Diagram, Error> {
-    // A plane of one row: of what varies nowhere any parameter will do.
+    // A plane of one row: any parameter serves as the constant one.
     let other = if request.axis.index == PHASE { 0 } else { PHASE };
     let value = base.parameters()[other].1;
     let axes = [request.axis.clone(), Range { index: other, values: vec![value] }];
@@ -135,10 +135,10 @@ fn leading(cell: &Cell) -> Option<State> {
     found.attractor.points.first().copied()
 }
 
-/// Runs `state` until it has arrived on an attractor of the cell, whose place comes back; else its
-/// points.
+/// Integrates `state` until it has converged to an attractor of the cell and returns its index, or
+/// else the points.
 fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Vec<State>) {
-    // Without drive a running state keeps no time with the section: its band holds it.
+    // Without drive a running state is not synchronous with the section: its band traps it.
     let runs = cell.found.iter().any(|f| f.attractor.is_running());
     let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
     let running: Vec<(i64, Band)> = states

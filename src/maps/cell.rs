@@ -103,8 +103,8 @@ impl Search {
         }
     }
 
-    /// The `hints` of attractors that `cell` does not have: a stable orbit that Newton's method finds
-    /// from there; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
+    /// Attractors from the `hints` that `cell` lacks: a stable orbit that Newton's method finds from a
+    /// hint; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
     /// that may have changed into another.
     #[must_use]
     pub fn promising(

@@ -214,8 +214,8 @@ fn beginnings(
     approach(&places, reach, displacements)
 }
 
-/// Starts beside an orbit whose displacement over `n` periods hardly changes in one direction: only
-/// there can another one lie nearer than a cell.
+/// Starts near an orbit whose displacement over `n` periods is almost constant in one direction:
+/// only there can another one be closer than a cell.
 fn beside(orbit: &PeriodicOrbit, n: usize) -> Vec<State> {
     let whole = orbit.monodromy[0].pow((n / orbit.n) as u32);
     let svd = (whole - Matrix2::identity()).svd(false, true);

@@ -242,7 +242,7 @@ impl Pendulum {
         if self.is_mirror_symmetric() {
             return Some(Symmetry::AtOnce);
         }
-        // A moving pivot is not what it was half a period before.
+        // A moving pivot differs from its motion half a period before.
         let symmetric = self.torque == 0.0 && self.motion().p == 0.0;
         (symmetric && self.effects.iter().all(later)).then_some(Symmetry::HalfPeriod)
     }

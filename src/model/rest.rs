@@ -10,9 +10,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::equation::{Equation, Forcing};
 
-/// An excess that does not pass this part of the friction counts as none: it opens a window of time
-/// so short that what moves in it, about the square of the excess, is lost in the last place of the
-/// angle.
+/// An excess below this part of the friction is neglected: it would open a window of time so short
+/// that the motion in it, about the square of the excess, is below the rounding of the angle.
 const EDGE: f64 = 1e-10;
 /// Samples of the excess in a period.
 const SAMPLES: usize = 96;
@@ -113,8 +112,8 @@ pub enum Release {
     Never,
 }
 
-/// When a pendulum that is at rest at `theta` at time `tau` moves; looked for until `until` where
-/// the equation does not repeat.
+/// The time at which a pendulum at rest at `theta` at time `tau` moves; sought up to `until` if the
+/// equation is not periodic.
 pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
     let [forth, back] = excesses(load, tau, theta);
     // The load cancels in their sum.

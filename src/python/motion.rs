@@ -126,7 +126,7 @@ impl Trajectory {
     }
 }
 
-/// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
+/// One trajectory. With `live` its samples are passed on as they are computed, `live(times, angles,
 /// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
 #[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]

@@ -11,10 +11,10 @@ use crate::model::recorded::Recorded;
 use crate::model::{Equation, Pendulum};
 
 /// The longest step is this times a power of the tolerance, over the greatest rate of small motions
-/// or of the drive. At fine tolerances that is what the error of a linear oscillator allows: a state
-/// at rest would else be crossed in steps too long for its derivatives. At coarse ones it is less,
-/// and motions smaller than the tolerance keep seven digits, so that their turns are
-/// turns. It falls with the tolerance all along, so that tightening always tells.
+/// or of the drive. At fine tolerances it is that allowed by the error of a linear oscillator:
+/// otherwise steps at rest would be too long for its derivatives. At coarse ones it is smaller, and
+/// motions smaller than the tolerance keep seven digits, so that their turns are resolved. It
+/// decreases with the tolerance everywhere, so that tightening always has an effect.
 const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
 /// Part of the rate of a mode that limits the longest step: the mode moves little compared to the
 /// pendulum, and the error of each step includes it.

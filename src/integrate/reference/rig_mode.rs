@@ -137,7 +137,7 @@ fn product<N: Number>(a: &[[N; 2]; 2], b: &[[N; 2]; 2]) -> [[N; 2]; 2] {
     [0, 1].map(|i| [0, 1].map(|j| a[i][0].mul_add(b[0][j], a[i][1] * b[1][j])))
 }
 
-/// The pendulum at rest: what an effect keeps there, and a mode that rings on from its
+/// The pendulum at rest: the memory of an effect, and a mode that oscillates freely from its
 /// displacement and momentum at a time.
 #[derive(Debug)]
 pub struct Resting<'a, N> {
@@ -181,8 +181,8 @@ impl<N: Number> Load for Resting<'_, N> {
     }
 }
 
-/// When a pendulum that came to rest at `theta` at time `tau` moves; looked for until `until` where the
-/// equation does not repeat.
+/// The time at which a pendulum that came to rest at `theta` at time `tau` moves; sought up to
+/// `until` if the equation is not periodic.
 pub fn let_go<N: Number>(
     ode: &OdeProblem<N>,
     tau: f64,

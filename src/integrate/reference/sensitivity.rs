@@ -75,7 +75,7 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
-    /// The derivatives by `N` names from `first` on; returns how many that were.
+    /// The derivatives by `N` names from `first` on; returns their number.
     fn run<const N: usize>(&self, first: usize, all: &mut Sensitivities) -> usize {
         let parameters = all.names.len() - 2;
         // A name of another pass has no direction in this one.

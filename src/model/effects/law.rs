@@ -275,8 +275,8 @@ pub trait Law {
         None
     }
 
-    /// The memory of the effect, 0 where a motion begins; none where it has none. The formulas
-    /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
+    /// The memory of the effect, 0 at the start of a motion; none if it has no memory. The formulas
+    /// take its value at the last turn from [`Point::past`]. Of a torque it is [`Point::sense`]
     /// without a motion before, and no map can have it; one effect of a model may have a memory. Of
     /// [`Action::Play`] it is the reading less the angle.
     #[inline(always)]

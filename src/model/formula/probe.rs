@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use super::tree::{Place, Tree};
 use crate::model::effects::{Parameter, Power, Role};
 
-/// A place, where none matters.
+/// An arbitrary point, for values that do not depend on it.
 pub const NOWHERE: Place = Place {
     theta: 0.0,
     velocity: 0.0,

@@ -21,7 +21,7 @@ const FLOOR: f64 = 1e-12;
 /// Treatment of absolute values and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinks<'a> {
-    /// The argument whose sign is [`Point::side`]; others are looked at where they stand.
+    /// The argument whose sign is [`Point::side`]; others are evaluated at each point.
     pub corner: Option<&'a Tree>,
     /// Whether the sign of the velocity passes steeply, not abruptly, through zero: where its jump
     /// at rest is nothing.

@@ -1,10 +1,10 @@
 //! Turns, sticks and releases of one trajectory within one step of the block that it belongs to.
 //!
-//! An [`EventSearch`] asks for integrations from where its trajectory last was on an analytic piece of the
-//! motion, each over its own length; [`super::block`] runs those of many searches in lanes. From their
-//! ends it finds the first zero of the velocity, to rounding, and what comes after it; and the first
-//! zero of the switching function of a corner, where only the formula changes. The velocity's zero is
-//! found first, and then whether a corner comes before it.
+//! An [`EventSearch`] requests integrations from the last state of its trajectory on an analytic
+//! piece of the motion, each over its own length; [`super::block`] runs those of many searches in
+//! lanes. From their ends it finds the first zero of the velocity, to rounding, and its
+//! continuation; and the first zero of the switching function of a corner, at which only the
+//! formula changes. The velocity's zero is found first, then any corner before it.
 
 use crate::model::Equation;
 use crate::model::rest::{Release, release};
@@ -17,9 +17,10 @@ use cubic::Cubic;
 
 /// Number of integrations after which a search fails, and its trajectory with it.
 const MOST_ROUNDS: u32 = 400;
-/// A zero is found when Newton's step falls below this part of the piece, at a step of a quarter; it
-/// falls with the fourth power of the step, so that its square stays below the error of the step. The
-/// change of the acceleration is taken into account, so that little more than the third power is left.
+/// A zero is found when Newton's step falls below this part of the piece, at a step of a quarter;
+/// it falls with the fourth power of the step, so that its square stays below the error of the
+/// step. The change of the acceleration is taken into account, which leaves little more than the
+/// third power.
 const CLOSE: f64 = 1e-3;
 /// The bounds of that part.
 const CLOSEST: [f64; 2] = [1e-7, 1e-3];
