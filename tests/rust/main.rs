@@ -3,13 +3,13 @@
 //!
 //! - [`exact`], [`convergence_order`]: solutions in closed form, energy, order of convergence
 //! - [`stick_slip`], [`free_decay`], [`edge_cases`]: friction, event by event, and cases sensitive
-//! to rounding
+//!   to rounding
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
 //! - [`effects`]: the library, every property of each effect
 //! - [`formulas`]: user-defined effects; [`effects_as_formulas`]: the library's as formulas
 //! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_quantised`]: parameters from records; [`replay`]: ensembles
 //! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against single
-//! trajectories
+//!   trajectories
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, periodic orbits,
 //!   their bifurcations
 //! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: attractors
