@@ -12,7 +12,7 @@ use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
-/// Name, p, omega and how many attractors there are (gamma = 0.1).
+/// Name, p, omega and the number of attractors (gamma = 0.1).
 const POINTS: [(&str, f64, f64, usize); 3] = [
     ("p 0.6 omega 2, smooth", 0.6, 2.0, 3),
     ("p 1.34 omega 2, close to doubling", 1.34, 2.0, 4),

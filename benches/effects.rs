@@ -1,11 +1,13 @@
-//! The cost of each effect: the time of a step of a trajectory with it, beside that of a step of the
-//! fast route at the same number of steps a period; and the time of a period, beside the fast route's,
-//! where either takes the steps that it needs for an error of 1e-6.
+//! The cost of each effect: the time of a step of a trajectory with it, relative to that of a step
+//! of the fast route at the same number of steps a period; and the time of a period relative to the
+//! fast route's, with the steps that each needs for an error of 1e-6.
 //!
-//! An effect that a user can write as a formula is measured as one too, beside the library's own.
+//! Effects that can be written as a formula are measured as one too, in addition to the library's
+//! own.
 //!
-//! Both are measured in turns, so that whatever else the machine does meets both; the least of many
-//! times counts. `cargo bench --bench effects -- avx512 drag` measures what these words are part of.
+//! Both are measured alternately, so that other load of the machine affects both; the least of many
+//! times is used. `cargo bench --bench effects -- avx512 drag` measures the cases whose names
+//! contain these words.
 
 use std::time::Instant;
 
@@ -45,7 +47,7 @@ fn time(strobe: &Strobe) -> f64 {
     begin.elapsed().as_secs_f64() * 1e9 / (COUNT * PERIODS) as f64
 }
 
-/// The least times of two maps, measured in turns.
+/// The least times of two maps, measured alternately.
 fn times(one: &Strobe, other: &Strobe) -> [f64; 2] {
     let mut least = [f64::INFINITY; 2];
     for _ in 0..ROUNDS {

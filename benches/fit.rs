@@ -21,7 +21,7 @@ const START: [f64; 2] = [2.0, 0.1];
 const DRAG: (Kind, &[f64]) = (Kind::QuadraticDrag, &[0.02]);
 const HARMONIC: (Kind, &[f64]) = (Kind::BearingHarmonic, &[0.03, 3.0, 0.4]);
 
-/// A case: what is simulated, and which of its parameters are free besides gravity.
+/// A case: the simulated motion, and the free parameters in addition to gravity.
 struct Case {
     name: &'static str,
     pendulum: Pendulum,

@@ -1,5 +1,4 @@
-//! The sine of both degrees on each instruction set, beside the C library's: an element is one
-//! value.
+//! The sine of both degrees on each instruction set, and the C library's: an element is one value.
 
 use std::hint::black_box;
 use std::marker::PhantomData;
@@ -9,10 +8,10 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use pendmap::lanes::sine::{Coarse, Degree, Fine};
 use pendmap::lanes::{InstructionSet, Isa, Job, Lane, Real, dispatch};
 
-/// Values in one call: whole bundles, in the first cache.
+/// Values in one call: whole bundles that fit the L1 cache.
 const COUNT: usize = 1536;
 
-/// The sine of every number, in place; `cosine` in its stead.
+/// The sine of every number, in place; for `cosine` the cosine.
 struct Sines<'a, D> {
     numbers: &'a mut [f64],
     cosine: bool,

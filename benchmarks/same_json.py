@@ -4,8 +4,8 @@ Run it once with each version, then compare: ``diff -r before after``.
 
     python benchmarks/same_json.py before
 
-The commands cover each analysis, each effect of the library, each sort of record and the
-diagnosis. Computing times are replaced by 0, so that equal versions give equal bytes.
+The commands cover each analysis, each effect of the library, each kind of record and the diagnosis.
+Computing times are replaced by 0, so that equal versions give equal bytes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SIZES = {
     "width": 0.3,
     "phase": 0.2,
 }
-"""Sizes of the parameters of effects; of all others, 0.01."""
+"""Sizes of the parameters of effects; 0.01 for all others."""
 
 TIMES = re.compile(r'(?<="seconds": )[-+.e\d]+|\b[.\d]+(?= s on \d+ thread)')
 """The computing time as a key and in a sentence."""
@@ -130,13 +130,13 @@ matrix = [[1e-4, 0.0], [0.0, 1e-4]]
 
 
 def pendmap(folder: Path, words: str) -> subprocess.CompletedProcess[str]:
-    """Run the command that stands beside this Python."""
+    """Run the command installed with this Python."""
     command = [str(Path(sys.executable).with_name("pendmap")), *shlex.split(words)]
     return subprocess.run(command, capture_output=True, check=False, text=True, cwd=folder)  # noqa: S603 (own words)
 
 
 def effect_commands(folder: Path) -> list[str]:
-    """Write one model a library effect, and return a trajectory and a map of each."""
+    """Write one model per library effect; return a trajectory and a map of each."""
     lines = []
     for effect in json.loads(pendmap(folder, "effects --json").stdout)["effects"]:
         name = effect["name"]
@@ -151,7 +151,7 @@ def effect_commands(folder: Path) -> list[str]:
 
 
 def run(folder: Path, out: Path, line: str) -> str:
-    """Run one command of the list and keep what it printed."""
+    """Run one command of the list and save its output."""
     name, _, words = line.partition(": ")
     answer = pendmap(folder, words)
     printed = TIMES.sub("0", answer.stdout)
@@ -161,7 +161,7 @@ def run(folder: Path, out: Path, line: str) -> str:
 
 
 def main() -> None:
-    """Run all commands into one folder."""
+    """Run all commands and write into one folder."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="Folder for the JSON, made if it is not there.")
     out = parser.parse_args().out

@@ -5,7 +5,7 @@
 //! Coulomb friction (their eq. 2.1) and a library of effects:
 //! `th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th') + ...`.
 //!
-//! Which module answers which question:
+//! Modules by question:
 //!
 //! | question | module |
 //! |---|---|

@@ -1,8 +1,8 @@
-//! Memory, reckoned before it is taken: an allocation that fails in the middle of a computation would
-//! end the process.
+//! Memory, estimated before its allocation: an allocation that fails in the middle of a computation
+//! would end the process.
 //!
-//! Where a user's number decides how much a computation needs, [`reckon`] stands before it; what grows
-//! by itself while it runs asks for [`room`] first.
+//! Computations whose size a user chooses call [`reckon`] first; lists that grow during a
+//! computation call [`room`].
 
 use std::fs::read_to_string;
 
@@ -11,7 +11,7 @@ use crate::error::Error;
 /// Memory reserved for everything else, in bytes: threads, modules, files.
 const SPARE: f64 = 64e6;
 
-/// Refuses `count` of `what` with `each` bytes each, where they need more memory than is free.
+/// Refuses `count` of `what` with `each` bytes each if they need more memory than is free.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -22,7 +22,7 @@ pub fn reckon(what: &str, count: usize, each: usize) -> Result<(), Error> {
     if needed + SPARE > free.unwrap_or(f64::INFINITY) {
         return Err(refused());
     }
-    // Whether the system gives as much at once, which tells limits that it does not show.
+    // Whether the system grants as much at once, which reveals limits that it does not show.
     let mut probe: Vec<u8> = Vec::new();
     probe.try_reserve_exact((needed + SPARE) as usize).map_err(|_| refused())
 }
@@ -38,8 +38,8 @@ pub fn room<T>(what: &str, list: &mut Vec<T>, more: usize) -> Result<(), Error> 
     list.try_reserve(more).map_err(refused)
 }
 
-/// Bytes that this process may still take, where Linux says it: of the machine, of its container, and
-/// of the limit of the process (`ulimit -v`).
+/// Bytes that this process may still allocate, if Linux reports it: limited by the machine, its
+/// container, and the process (`ulimit -v`).
 fn free() -> Option<f64> {
     let machine = field("/proc/meminfo", "MemAvailable:").map(|kilobytes| 1024.0 * kilobytes);
     let container = number("/sys/fs/cgroup/memory.max");
@@ -49,14 +49,14 @@ fn free() -> Option<f64> {
     [machine, container, own].into_iter().flatten().reduce(f64::min)
 }
 
-/// The number after a name at the beginning of a line of a file; none where it is no number.
+/// The number after a name at the beginning of a line of a file; none if it is no number.
 fn field(path: &str, name: &str) -> Option<f64> {
     let text = read_to_string(path).ok()?;
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// The number that is all of a file; none where it is no number.
+/// The number that is the whole content of a file; none if it is no number.
 fn number(path: &str) -> Option<f64> {
     read_to_string(path).ok()?.trim().parse().ok()
 }

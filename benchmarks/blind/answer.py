@@ -1,4 +1,4 @@
-"""One blind experiment: diagnosed, and put beside its truth."""
+"""Diagnosis of one blind experiment, and its comparison with the truth."""
 
 from __future__ import annotations
 
@@ -29,15 +29,14 @@ FAMILIES = {
     "drive": "drive",
     "reading": "reading",
 }
-"""Of effects that only the rig has, by the rig's groups; those of the library it says itself."""
+"""Families of effects that only the rig has, by the rig's groups; the library states its own."""
 
 
 STRONG = 100.0
-"""Score that a main effect beside disturbances has at least; nor is it below their own."""
+"""Least score of a main effect in an experiment with disturbances; it also exceeds theirs."""
 
 TRIES, GREATEST = 4, 20.0
-"""Times that it is made stronger until it has, and the greatest size; what does not show counts
-for nothing."""
+"""Number of increases of its size to reach that score, and the greatest size; else excluded."""
 
 
 def family(effect: str) -> str:
@@ -46,10 +45,10 @@ def family(effect: str) -> str:
 
 
 def families(effect: str) -> set[str]:
-    """Return the families that what the rig hides may be called, with or without a variant.
+    """Return the families accepted for a hidden effect, with or without a variant.
 
-    A variant may belong to another one than the library's effect of its name: a constant added mass
-    shows against the drive only, one that is put on between two runs as another frequency too.
+    A variant may belong to another family than the library's effect of its name: a constant added
+    mass shows against the drive only, one added between two runs also as another frequency.
     """
     name = effect.partition(":")[0]
     groups = {e["name"]: e["group"] for e in virtual_rig.describe()}
@@ -97,14 +96,14 @@ def run(case: Case) -> dict[str, Any]:
 
 
 def _difficulty(case: Case) -> tuple[dict[str, Any], list[str]]:
-    """Return how hard a case is; what spoils its records does not count."""
+    """Return the difficulty of a case, without the faults of its records."""
     plain = dataclasses.replace(case, **SOUND)
     base, _ = fit_baseline(split_records(record(plain).experiment))
     return difficulty(plain, base)
 
 
 def answer(found: Discrepancy) -> dict[str, Any]:
-    """Return what a diagnosis says, and what it rests on."""
+    """Return the verdict of a diagnosis and the statistics it is based on."""
     assessment, held = found.assessment, found.best.hold_out
     return {
         "verdict": found.verdict,

@@ -2,10 +2,10 @@
 
     python -m benchmarks.blind.calibration blind.jsonl [more.jsonl ...]
 
-A name is right where it is hidden, by itself or in its class.
-Logistic regression; each number is drawn towards the one that stands there by a normal prior of
-width 1, so that few experiments change little. Experiments that calibrate are not those that the
-probabilities are judged by: use another seed.
+A name is right if the effect is hidden, by itself or in its class. The method is logistic
+regression with a normal prior of width 1 about the present coefficients, so that few experiments
+change little. The experiments used for calibration must not be those that test the probabilities:
+use another seed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ WIDTH = 1.0
 
 
 def main() -> None:
-    """Fit and print."""
+    """Fit and print the coefficients."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", type=Path, nargs="+")
     lines = [

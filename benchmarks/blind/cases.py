@@ -1,4 +1,4 @@
-"""Blind experiments: drawn, and recorded by the virtual rig."""
+"""Blind experiments, drawn at random and recorded by the virtual rig."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment
 
 KINDS = {"mixed": (5, 4), "free": (5, 0), "single": (1, 0)}
-"""Free and forced runs."""
+"""Numbers of free and forced runs."""
 
 LAYOUTS = {
     "one forced run among free ones": (5, 1),
@@ -28,11 +28,11 @@ LAYOUTS = {
     "single decay": (1, 0),
     "three free runs": (3, 0),
 }
-"""Free and forced runs of laboratories that record less."""
+"""Numbers of free and forced runs of laboratories that record less."""
 
 RATES = (10.0, 25.0, 50.0, 100.0, 200.0, 500.0)
 LENGTHS = (10.0, 140.0)
-"""Readings a second, and seconds, in these."""
+"""Ranges of the sampling rate (1/s) and of the length (s) of these records."""
 
 SAMPLES = (100.0, 100.0, 100.0, 200.0, 500.0)
 COUNTS = (1024, 2048, 4096, 8192)
@@ -40,11 +40,11 @@ BASE = ("viscous_damping", "coulomb_friction")
 """Effects of the baseline, which are not hidden."""
 
 AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
-"""Effects that change from run to run."""
+"""Effects that change between runs."""
 
 FOREIGN = {"added_mass:late", "impulses:train"}
-"""Variants that are no form of the library's effect of their name, but another effect: a mass put
-on between two runs does nothing that one does which is there all along, one knock is not ten."""
+"""Variants unlike the library's effect of their name: a mass added between two runs is not one
+present from the start, one impulse is not ten."""
 
 SPOILT = {"correlation": 0.5, "dropouts": 0.02, "outliers": 0.003, "jitter": 0.0005}
 """Faults of records and their sizes; a faulty experiment has one of them."""
@@ -79,7 +79,7 @@ class Case:
 
 
 def draw(what: str, rng: np.random.Generator) -> Case:
-    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, or what is scored apart."""
+    """Draw a case: ``none``, ``one``, ``two``, ``withheld``, or a kind scored separately."""
     kind = str(rng.choice(list(KINDS), p=(0.6, 0.25, 0.15)))
     if what == "layout":
         kind = str(rng.choice(list(LAYOUTS)))
@@ -111,7 +111,7 @@ def draw(what: str, rng: np.random.Generator) -> Case:
 
 
 def _effects(what: str, kind: str, rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw what is hidden."""
+    """Draw the hidden effects."""
     free, forced = runs_of(kind)
     known = {e["name"]: e for e in virtual_rig.describe()}
     usable = [n for n in library() if n in known and n not in BASE]
@@ -138,22 +138,22 @@ def _effects(what: str, kind: str, rng: np.random.Generator) -> tuple[str, ...]:
 
 
 def runs_of(kind: str) -> tuple[int, int]:
-    """Return the free and the forced runs of a kind of experiment."""
+    """Return the numbers of free and forced runs of a kind of experiment."""
     return (KINDS | LAYOUTS)[kind]
 
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """An experiment, and what only the rig knows of it."""
+    """An experiment, and its truth, known to the rig alone."""
 
     experiment: Experiment
     sigma: float  # Standard deviation of the sensor's noise, rad
-    truth: dict[str, dict[str, float]]  # Parameters of what is hidden
+    truth: dict[str, dict[str, float]]  # Parameters of the hidden effects
 
 
 @functools.lru_cache(maxsize=4)
 def record(case: Case, *, clean: bool = False) -> Recorded:
-    """Write and read a case's experiment; the last four are remembered."""
+    """Write and read the experiment of a case; the last four are cached."""
     free, forced = runs_of(case.kind)
     request = virtual_rig.Request(
         "hidden",

@@ -1,8 +1,8 @@
-"""How hard a blind experiment is: measured, not assumed.
+"""Difficulty of a blind experiment, measured from its motion.
 
-The same motion without noise and counts is scored with the noise that the record has. ``G`` is what
-the best possible model would gain there, ``s = 1 - G_impostor / G`` how far the nearest other name
-falls short. Names with ``s G < 25`` are not told apart by these records, whoever looks.
+The same motion without noise and counts is scored with the noise of the record. ``G`` is the gain
+of the best possible model, ``s = 1 - G_impostor / G`` the relative deficit of the nearest other
+name. Names with ``s G < 25`` cannot be distinguished by these records with any method.
 """
 
 from __future__ import annotations
@@ -29,34 +29,35 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.scores import Scores
 
 CLEAR = 25.0
-"""Separation times score from which names are told apart nearly always."""
+"""Separation times score above which names are almost always distinguished."""
 
 REFITTED, WORTH = 3, 0.5
-"""Largest number of impostors that are fitted, and their least gain as a share of chi-square."""
+"""Largest number of fitted impostors, and their least gain as a share of chi-square."""
 
 CONTAINED = 1e-3
-"""A special case leaves no more than this of what is to be explained: rounding and steps."""
+"""Largest unexplained share of a special case, due to rounding and steps."""
 
 
 def difficulty(
     case: Case, base: FittedModel, without: Sequence[str] = ()
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return ``G``, ``s`` and equals of a case on noise-free records, and who is not told apart.
+    """Return ``G``, ``s``, equals and indistinguishable names of a case on noise-free records.
 
-    Of a pair ``G`` of each alone. No impostors are names in ``without``, exact equals (a cosine of
-    1 between what both do to the readings) and effects of more parameters that have the true one as
-    a special case: whoever looks cannot tell them apart, at whatever noise. Where an effect is
-    withheld neither are those that reach its ``G`` but for 25: they are withheld with it.
+    Of a pair ``G`` is that of each effect alone. Excluded as impostors are names in ``without``,
+    exact equals (a cosine of 1 between their changes of the readings) and effects with more
+    parameters that have the true one as a special case: no method can distinguish them, at any
+    noise. If an effect is withheld, those that reach its ``G`` to within 25 are excluded too: they
+    are withheld with it.
     """
     gains, separation, alike, equals, left = [], 1.0, set(), set(), 0.0
     for effect in case.effects:
         alone = dataclasses.replace(case, effects=(effect,))
         recorded = record(alone, clean=True)
         data = _with_noise(split_records(recorded.experiment), recorded.sigma)
-        # From the noisy fit: what is measured is the effect, not how well a start is found.
+        # From the noisy fit: the effect is to be measured, not the quality of starting values.
         windows = _windows_at(data, base)
         begin = fit_model(data, base.fit.model, base.free, start=base.start, windows=windows)
-        # What disturbances or the other effect of a pair did to the windows may lead astray.
+        # The windows may be misplaced by disturbances or the other effect of a pair.
         begin = min((begin, fit_baseline(data)[0]), key=lambda fitted: fitted.chi2)
         gains.append(begin.chi2)
         own = effect.split(":")[0]
@@ -76,14 +77,14 @@ def difficulty(
 
 
 def disturbance(case: Case) -> float:
-    """Return what a perfect model of a case's disturbances alone would gain."""
+    """Return the gain of a perfect model of a case's disturbances alone."""
     recorded = record(dataclasses.replace(case, effects=("none",), size=1.0))
     base, _ = fit_baseline(_with_noise(split_records(recorded.experiment), recorded.sigma))
     return base.chi2 - base.fit.degrees
 
 
 def _left(data: DataSplit, begin: FittedModel, own: str) -> float:
-    """Return what the library's effect of a name leaves of a form that differs from its own."""
+    """Return the part of a differing form that the library's effect of its name cannot explain."""
     scores = score_candidates(
         data, begin, [c for c in list_candidates({"Tr"}, driven=True) if c[0].name == own]
     )
@@ -94,14 +95,14 @@ def _left(data: DataSplit, begin: FittedModel, own: str) -> float:
 def _refitted(
     data: DataSplit, begin: FittedModel, scores: Scores, place: int
 ) -> FittedModel | None:
-    """Return a model with a candidate; a reading here counts as one, since its noise is known."""
+    """Return a model with a candidate; each reading has weight 1, since its noise is known."""
     return refit_with(data, Thresholds(), begin, scores, [place], 1.0)
 
 
 def _impostors(
     data: DataSplit, begin: FittedModel, own: str, without: Sequence[str]
 ) -> tuple[dict[str, float], set[str]]:
-    """Return what each other effect gains of what one alone leaves, and the one's equals."""
+    """Return the gains of all other effects on the residual of one, and the equals of that one."""
     scores = score_candidates(data, begin, list_candidates({"Tr", *without}, driven=data.forced))
     gains, equals = {}, set()
     places = scores.best()
@@ -117,7 +118,7 @@ def _impostors(
         more = at is not None and score.candidate.count > scores.scores[at].candidate.count
         near = begin.chi2 - gain < CLEAR and not more
         if len(gains) < REFITTED and gain > WORTH * begin.chi2 and not near:
-            # To first order an effect gains less than it may: its shape was only scanned.
+            # To first order the gain is a lower bound: the shape was only scanned.
             found = _refitted(data, begin, scores, k)
             gain = max(gain, begin.chi2 - found.chi2) if found else gain
             if more and begin.chi2 - gain < max(CONTAINED * begin.chi2, 1.0):
@@ -128,9 +129,9 @@ def _impostors(
 
 
 def _windows_at(data: DataSplit, base: FittedModel) -> Windows:
-    """Return a fit's windows for runs of the same motion with other instants.
+    """Return the windows of a fit for runs of the same motion with other instants.
 
-    Readings without noise and counts may be put together where those with them are not.
+    Readings without noise and counts may be averaged even if the original ones are not.
     """
     moved = []
     for run, first, last, theta, velocity in base.fit.windows:

@@ -1,12 +1,12 @@
-"""Decisions by the next experiment, against the predictions of ``pendmap diagnose``.
+"""Distinguishing power of the next experiment, against the predictions of ``pendmap diagnose``.
 
     python -m benchmarks.blind.next_experiment --cases 60 --seed 1 --out next.jsonl
 
-Small effects are hidden in free decays of the virtual rig until a diagnosis cannot tell names
-apart. Then the rig records what ``next_experiment`` recommends (``recommended``), and besides, as
-a recommendation is meant to leave no doubt, a proposal of the same table drawn from those that
-leave some (``weaker``); old and new records are diagnosed together. The table compares how often
-one name was left, and the wrong one, with what was predicted, and twice the difference of
+Small effects are hidden in free decays of the virtual rig until a diagnosis cannot distinguish
+names. Then the rig records the recommendation of ``next_experiment`` (``recommended``) and also, as
+a recommendation is meant to leave no doubt, a random proposal of the same table that leaves some
+(``weaker``); old and new records are diagnosed together. The table compares the frequencies of a
+single remaining name, and of a wrong one, with the prediction, and twice the difference of
 log-likelihoods with the predicted ``s G``. Results are appended; ``--report`` only prints.
 """
 
@@ -23,7 +23,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-# One thread a process, before numpy is imported: the processes share the processor.
+# One thread per process, set before numpy is imported: the processes share the processors.
 os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 )
@@ -59,7 +59,7 @@ DOUBTFUL = (6.0, 40.0)
 
 
 def record(request: virtual_rig.Request) -> Experiment:
-    """Let the rig record and read what it wrote; the truth stays unread."""
+    """Let the rig record and read its files; the truth is not read."""
     with tempfile.TemporaryDirectory() as folder:
         where = virtual_rig.places(Path(folder) / "records", replace=True)
         virtual_rig.write(virtual_rig.make(request), where)
@@ -69,7 +69,7 @@ def record(request: virtual_rig.Request) -> Experiment:
 def add_effects(
     request: virtual_rig.Request, old: Experiment, proposal: Proposal, *, pause: float = 20.0
 ) -> Experiment:
-    """Return old records with those of a proposal, made by the same rig; no new one is held out."""
+    """Return old records with those of a proposal by the same rig; no new one is held out."""
     begun = [run.plan for run in virtual_rig.make(request).runs]
     plans, late = [], 0.0
     for start in proposal.runs:
@@ -85,7 +85,7 @@ def add_effects(
 
 
 def outcome(found: Discrepancy, truth: str, others: set[str]) -> dict[str, Any]:
-    """Return which name was left, and how far the nearest of the others fell behind the truth."""
+    """Return the remaining name, and the deficit of the nearest other one relative to the truth."""
     for each in found.assessment.identified:
         name = each.candidate.name
         behind = {r.candidate.name: r.behind for r in each.alternatives}
@@ -149,14 +149,14 @@ def case(seed: int) -> list[dict[str, Any]]:
 
 
 def report(rows: list[dict[str, Any]]) -> str:
-    """Return the table of what was predicted and what came of it."""
+    """Return the table of predictions and outcomes."""
     lines = []
     for choice in ("recommended", "weaker"):
         own = [row for row in rows if row["choice"] == choice]
         told = [row for row in own if row["left"] != "neither"]
         measured = [row for row in told if row["power"] is not None]
         ratio = [row["power"] / row["predicted"] for row in measured]
-        # Twice the difference of log-likelihoods scatters by 2 sqrt(s G).
+        # Twice the difference of log-likelihoods has the standard deviation 2 sqrt(s G).
         z = [(r["power"] - r["predicted"]) / (2 * math.sqrt(r["predicted"])) for r in measured]
         lines.append(
             [

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     Row = dict[str, Any]
 
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 1.0)
-"""Edges between which probabilities are compared with what came true."""
+"""Edges of the bins in which probabilities are compared with frequencies."""
 
 ENLARGED = 0.84
-"""From which probability on the picture is drawn larger: most names have one near 1."""
+"""Probability from which the reliability diagram is magnified: most names are near 1."""
 
 SEEN = 60.0
-"""Score from which figures count, beside ``STRONG``."""
+"""Score from which cases are included in the figures, together with ``STRONG``."""
 
 
 def share_of(hits: int, of: int) -> tuple[float, float, float]:
@@ -41,7 +41,7 @@ def share_of(hits: int, of: int) -> tuple[float, float, float]:
 
 
 def wilson(hits: int, of: int) -> str:
-    """Return a share with its interval, in words."""
+    """Return a share with its interval as text."""
     if of == 0:
         return "no cases"
     share, low, high = (100 * x for x in share_of(hits, of))
@@ -49,30 +49,30 @@ def wilson(hits: int, of: int) -> str:
 
 
 def true_names(row: Row) -> list[str]:
-    """Return the names of what is hidden, without their variants."""
+    """Return the names of the hidden effects, without their variants."""
     return [effect.split(":")[0] for effect in row["effects"] if effect != "none"]
 
 
 def classes(row: Row) -> list[set[str]]:
-    """Return for each effect that is claimed all names that the verdict holds possible."""
+    """Return for each claimed effect all names that the verdict holds possible."""
     return [{name, *next((c for c in row["classes"] if name in c), ())} for name in row["named"]]
 
 
 def named_alone(row: Row) -> bool:
-    """Whether what is claimed is right, and no other name is possible but an exact equal."""
+    """Return whether the claim is right, and its only alternatives are exact equals."""
     return right(row) and all(size == 1 for size in sizes(row))
 
 
 def sizes(row: Row) -> list[int]:
-    """Return the sizes of the classes that are claimed, exact equals counted once."""
+    """Return the sizes of the claimed classes, with exact equals as one."""
     equals = {*row["equals"], *true_names(row)}
     return [len(own - equals) + bool(own & equals) for own in classes(row)]
 
 
 def right(row: Row) -> bool:
-    """Whether as many effects are claimed as are hidden, each by name or in its class.
+    """Return whether the claimed effects equal the hidden ones, by name or by class.
 
-    Two that are each other's exact equals are one effect to these records: one class with both.
+    Two exact equals are one effect for these records: one class with both.
     """
     hidden = true_names(row)
     if len(hidden) > 1 and set(hidden) <= set(row["equals"]):
@@ -81,7 +81,7 @@ def right(row: Row) -> bool:
 
 
 def sound(row: Row) -> bool:
-    """Whether each effect that is claimed is hidden, by its name or in its class."""
+    """Return whether each claimed effect is hidden, by its name or in its class."""
     hidden = true_names(row)
     for own in classes(row):
         name = next((name for name in hidden if name in own), None)
@@ -92,17 +92,17 @@ def sound(row: Row) -> bool:
 
 
 def strength(row: Row) -> float:
-    """Return the least score of what is hidden."""
+    """Return the least score of the hidden effects."""
     return min(row["G"], default=0.0)
 
 
 def confidently_wrong(row: Row) -> bool:
-    """Whether names are claimed without reserve, and none of them can be right."""
+    """Return whether names are claimed without reserve, and none of them can be right."""
     return row["verdict"] in {"named", "ambiguous"} and not all(row["approximate"])
 
 
 def careful(row: Row) -> bool:
-    """Whether a withheld effect got no name, or a reserved one of its family."""
+    """Return whether a withheld effect got no name, or a reserved one of its family."""
     if not row["named"]:
         return True
     with_reserve = row["verdict"] == "partial" or all(row["approximate"])
@@ -209,7 +209,7 @@ def figures(rows: list[Row]) -> list[list[str]]:
 
 
 def layouts(rows: Iterable[Row]) -> list[list[str]]:
-    """Return by layout: false alarms, names that are right, and names that cannot be."""
+    """Return false alarms, right names and impossible names by layout."""
     own = [row for row in rows if row["what"] == "layout"]
     lines = []
     for layout in dict.fromkeys(row["kind"] for row in own):
@@ -228,31 +228,31 @@ def layouts(rows: Iterable[Row]) -> list[list[str]]:
 
 
 def first(row: Row) -> bool:
-    """Whether the first effect that is claimed is the main one, by its name or in its class."""
+    """Return whether the first claimed effect is the main one, by its name or in its class."""
     return bool(row["named"]) and bool(classes(row)[0] & {*row["equals"], *true_names(row)})
 
 
 def another(row: Row) -> bool:
-    """Whether a name is given without reserve that the main effect cannot have."""
+    """Return whether a name is claimed without reserve that the main effect cannot have."""
     hidden = {*row["equals"], *true_names(row)}
     pairs = zip(classes(row), row["approximate"], strict=True)
     return any(not nearly and not own & hidden for own, nearly in pairs)
 
 
 def unreserved(row: Row) -> bool:
-    """Whether any name is given without reserve."""
+    """Return whether any name is claimed without reserve."""
     return not all(row["approximate"])
 
 
 def reserved(row: Row) -> bool:
-    """Whether no name is given, or none without reserve."""
+    """Return whether no name is claimed, or none without reserve."""
     return row["verdict"] in {"unknown", "partial"} or all(row["approximate"])
 
 
 def of_family(row: Row) -> bool:
-    """Whether the strongest effect that is claimed may be of the family of what is hidden.
+    """Return whether the strongest claimed effect may be of the family of the hidden one.
 
-    What is hidden has the families of its exact equals too: no record tells which it is.
+    The hidden effect also has the families of its exact equals, which no record distinguishes.
     """
     if not row["named"]:
         return False
@@ -279,7 +279,7 @@ def _parameters(rows: Iterable[Row]) -> tuple[list[bool], list[float]]:
 
 
 def believed(rows: Iterable[Row]) -> tuple[list[float], list[bool]]:
-    """Return all probabilities that were given, and whether their names were right."""
+    """Return all stated probabilities, and whether their names were right."""
     chances, true = [], []
     for row in rows:
         for name, chance in zip(row["named"], row["probability"], strict=True):
@@ -289,7 +289,7 @@ def believed(rows: Iterable[Row]) -> tuple[list[float], list[bool]]:
 
 
 def reliability(rows: Iterable[Row]) -> list[list[str]]:
-    """Return by bins of probability: how many names, the mean, the share that was right."""
+    """Return, by bins of probability, the number of names, the mean, and the share right."""
     chances, true = (np.array(x) for x in believed(rows))
     lines = []
     for low, high in itertools.pairwise(BINS):
@@ -303,7 +303,7 @@ def reliability(rows: Iterable[Row]) -> list[list[str]]:
 
 
 def confusion(rows: Iterable[Row]) -> list[list[str]]:
-    """Return what was said of each effect that was hidden alone: the matrix without its zeros."""
+    """Return the nonzero entries of the confusion matrix for single hidden effects."""
     counts: Counter[tuple[str, str]] = Counter()
     for row in rows:
         if row["what"] in {"one", "withheld", "form"} and strength(row) >= SEEN:
@@ -321,7 +321,7 @@ def confusion(rows: Iterable[Row]) -> list[list[str]]:
 
 
 def draw_reliability(rows: Iterable[Row], path: Path) -> None:
-    """Draw the share of names that were right against the probability they were given."""
+    """Plot the share of right names against their stated probability."""
     import matplotlib.pyplot as plt  # noqa: PLC0415 (for a picture only)
 
     chances, true = (np.array(x) for x in believed(rows))
@@ -340,7 +340,7 @@ def draw_reliability(rows: Iterable[Row], path: Path) -> None:
             one.plot([mean, mean], [least, most], color="C0", linewidth=1.5)
             one.plot(mean, share, "o", color="C0", markersize=5)
         shown = inner if mean > ENLARGED else axes
-        # The last but one would stand in the last one's way.
+        # The label of the last but one would overlap that of the last.
         beside = (-5, -11) if (low, high) == BINS[-3:-1] else (5, -11)
         side = "right" if beside[0] < 0 else "left"
         shown.annotate(

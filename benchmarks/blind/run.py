@@ -1,17 +1,17 @@
-"""The blind benchmark of ``pendmap diagnose``: the truth stands in files that no diagnosis opens.
+"""The blind benchmark of ``pendmap diagnose``: the truth is in files that no diagnosis opens.
 
     python -m benchmarks.blind.run --experiments 1000 --workers 2 --out blind.jsonl
 
-Of the experiments two in five hide nothing; of the others half hide one effect, a quarter two, and
-in a quarter the true effect is withheld from the search, with all that these records do not tell
-from it. ``--forms`` and ``--nuisances`` add experiments whose form differs from the library's, and
-spoilt ones, which are scored apart. ``--mess`` adds experiments with disturbances that no effect
-has, half to ten times as strong as the noise, three in four of them with one main effect that does
-to the readings what they do or more. ``--layouts`` adds experiments of laboratories
-that record less: one forced run, a single decay, 10 to 500 readings a second, 10 to 140 s. The seed
-is drawn and recorded; results are appended, and a run that was ended goes on where it stood.
-``--report`` only prints what a file holds, and ``--plot`` draws how far probabilities can be
-believed.
+Two in five of the experiments hide nothing; of the others half hide one effect, a quarter two, and
+in a quarter the true effect is withheld from the search, with all that these records cannot
+distinguish from it. ``--forms`` and ``--nuisances`` add experiments whose form differs from the
+library's, and damaged ones, which are scored separately. ``--mess`` adds experiments with
+disturbances that no effect describes, half to ten times as strong as the noise; three in four of
+them have one main effect that changes the readings at least as much. ``--layouts`` adds experiments
+of laboratories that record less: one forced run, a single decay, 10 to 500 readings a second, 10 to
+140 s. The seed is drawn and recorded; results are appended, and an interrupted run is resumed.
+``--report`` only prints the tables of a file, and ``--plot`` draws the reliability of
+probabilities.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-# One thread a process, before numpy is imported: the processes share the processor.
+# One thread per process, set before numpy is imported: the processes share the processors.
 os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 )
@@ -38,17 +38,17 @@ from benchmarks.peers.report import machine, note, say, table
 
 KINDS = ["none", "one", "none", "one", "two", "none", "one", "withheld", "none", "two"]
 KINDS += ["none", "one", "none", "one", "withheld", "none", "one", "none", "two", "withheld"]
-"""In turn, so that any part of a run has all of them."""
+"""Kinds in turn, so that any part of a run contains all of them."""
 
 
 FURTHER = ("form", "nuisance", "mess", "layout")
-"""Experiments that are scored apart, in the order of their streams of random numbers."""
+"""Experiments that are scored separately, in the order of their random streams."""
 
 
 def drawn(count: int, seed: int, **further: int) -> list[Case]:
-    """Draw the cases, among them the given number of each kind in ``FURTHER``.
+    """Draw the cases, with the given number of each kind in ``FURTHER``.
 
-    Each has its own seed: a further case changes no other.
+    Each has its own seed: an additional case changes no other.
     """
     kinds = [KINDS[k % len(KINDS)] for k in range(count)]
     cases = []
@@ -61,7 +61,7 @@ def drawn(count: int, seed: int, **further: int) -> list[Case]:
 
 
 def rows_of(path: Path) -> list[dict[str, Any]]:
-    """Return the results that a file holds."""
+    """Return the results in a file."""
     if not path.exists():
         return []
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
@@ -72,7 +72,7 @@ def _key(row: dict[str, Any]) -> tuple[str, int]:
 
 
 def main() -> None:
-    """Draw, diagnose, print the tables."""
+    """Draw cases, diagnose them, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--experiments", type=int, default=1000)
     parser.add_argument("--forms", type=int, default=0)

@@ -1,4 +1,4 @@
-"""``pendmap diagnose`` beside SINDy on the same experiments, by bins of G.
+"""``pendmap diagnose`` and SINDy on the same experiments, by bins of G.
 
     python -m benchmarks.blind.run --experiments 1000 --out blind.jsonl
     python -m benchmarks.blind.sindy blind.jsonl --workers 2 --out sindy.jsonl
@@ -6,7 +6,7 @@
 Each experiment that ``run.py`` wrote down with one effect hidden, two or none is recorded again
 from its seed. SINDy regresses ``th''`` sparsely on the candidates of ``diagnose`` in the
 same shapes (``sindy_features``); torques have the very form that the rig hides. Angle and
-velocity come from a filter of Savitzky and Golay whose width goes by the noise.
+velocity come from a filter of Savitzky and Golay whose width depends on the noise.
 
 - Strong form (Brunton, Proctor & Kutz 2016): the second derivative of the smoothed angle, its
   features through the same smoothing.
@@ -21,9 +21,9 @@ column for each form has the least penalty with which it claims no more than pen
 is hidden, on these very experiments.
 
 As in ``diagnose`` gravity, viscous damping and Coulomb friction are in every model, and at most
-three effects besides; SINDy is told so. "Right" is what ``report.right`` says for both. SINDy
-is given the classes of equals that its own features cannot tell apart, and those that pendmap
-found.
+three further effects, also in SINDy. "Right" is defined by ``report.right`` for both. SINDy
+is given the classes of equals that its own features cannot distinguish, and those found by
+pendmap.
 
 References
 ----------
@@ -45,7 +45,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-# One thread a process, before numpy is imported: the processes share the processor.
+# One thread per process, set before numpy is imported: the processes share the processors.
 os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 )
@@ -68,23 +68,23 @@ SETTINGS = {
 """Settings with the largest share right on seed 901."""
 
 PENALTIES = (*np.arange(1.0, 12.01, 0.5).tolist(), *np.geomspace(14.0, 200.0, 16).tolist())
-"""Factors of BIC's penalty for which answers are kept: up to where both forms say nothing at all,
-so that a column with no more false alarms than pendmap's is always found."""
+"""Factors of BIC's penalty at which answers are computed: up to no claims from either form, so that
+a column with at most pendmap's false alarms exists."""
 
 EDGES = (0.0, 12.0, 30.0, 100.0, 300.0, 1000.0, np.inf)
-"""Of the bins of G, of a pair the lesser one's."""
+"""Edges of the bins of G; a pair is in the bin of the lesser one."""
 
 KINDS = ("one", "two", "none")
 
 
 def case_of(row: dict[str, Any]) -> Case:
-    """Return the case of a row, from which the same experiment can be made."""
+    """Return the case of a row, from which the same experiment is made."""
     names = [field.name for field in dataclasses.fields(Case)]
     return Case(**{n: row[n] for n in names} | {"effects": tuple(row["effects"])})
 
 
 def run(row: dict[str, Any]) -> dict[str, Any]:
-    """Make a row's experiment again and let SINDy answer."""
+    """Make the experiment of a row again and run SINDy on it."""
     result: dict[str, Any] = {"what": row["what"], "seed": row["seed"]}
     records = split_records(record(case_of(row)).experiment)
     runs = [as_fit_run(*pair) for pair in zip(records.runs, records.readings, strict=True)]
@@ -101,9 +101,10 @@ def run(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def judged(row: dict[str, Any], answer: dict[str, Any] | None) -> bool:
-    """Whether an answer is right: pendmap's own, or SINDy's by the same rule.
+    """Return whether an answer of pendmap or SINDy is right, by one rule for both.
 
-    Each effect that SINDy chose stands for all that its features, or pendmap, do not tell from it.
+    Each effect that SINDy chose represents all that its features, or pendmap, cannot distinguish
+    from it.
     """
     if answer is None:
         names, said = row["named"], row
@@ -141,7 +142,7 @@ def lines(
     answers: dict[int, dict[str, Any]],
     which: dict[str, tuple[str, int] | None],
 ) -> list[list[str]]:
-    """Return by kind and bin of G the share that is right, in each column."""
+    """Return the share of right answers in each column, by kind and bin of G."""
     found = []
     for what in KINDS:
         edges = list(itertools.pairwise(EDGES)) if what != "none" else [(0.0, np.inf)]
@@ -164,7 +165,7 @@ def lines(
 
 
 def main() -> None:
-    """Let SINDy answer what is not answered yet, print the table."""
+    """Run SINDy on the rows without an answer, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("blind", type=Path, help="what benchmarks.blind.run wrote")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
@@ -204,7 +205,7 @@ def main() -> None:
 
 
 def _read(path: Path) -> list[dict[str, Any]]:
-    """Return a file's rows, but for a last one that is still being written."""
+    """Return the rows of a file, except a last one that is incomplete."""
     if not path.exists():
         return []
     whole = path.read_text(encoding="utf-8").splitlines(keepends=True)

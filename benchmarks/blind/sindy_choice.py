@@ -1,4 +1,4 @@
-"""Which sparse model SINDy chooses: the optimizers of pysindy, and BIC over their paths."""
+"""Choice of SINDy's sparse model: the optimizers of pysindy, and BIC over their paths."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST = 3
-"""Effects that a model may have, as many as pendmap looks for."""
+"""Largest number of effects in a model, as in pendmap."""
 
 ALIKE = 0.9999
-"""Squared cosine from which two features, with the base projected out, are one."""
+"""Squared cosine above which two features, with the base projected out, are identical."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """Effects that were chosen, each with those whose features are the same."""
+    """The chosen effects, each with those of identical features."""
 
     names: list[str]
     classes: list[list[str]]
@@ -53,7 +53,7 @@ def _model(data: Regression, support: tuple[int, ...]) -> Model:
     classes: list[list[str]] = []
     for name in dict.fromkeys(data.features[i].effect for i in support):
         if any(name in same for same in classes):
-            continue  # the same feature once more, for what is not linear in it
+            continue  # a duplicate of a feature, for effects that are not linear in it
         names.append(name)
         classes.append(_same(data, [i for i in support if data.features[i].effect == name]))
     return Model(names, classes)
@@ -64,8 +64,8 @@ def models(
 ) -> list[tuple[tuple[int, ...], float, float]]:
     """Return the models on an optimizer's path: support, gain in -2 ln L, BIC's penalty.
 
-    The first has no effect. Coefficients are fitted anew, without the optimizer's shrinkage; a
-    shape that was chosen counts as a coefficient.
+    The first has no effect. Coefficients are refitted without the optimizer's shrinkage; a chosen
+    shape is penalised as a coefficient.
     """
     columns = _best_shapes(data) if best else np.arange(len(data.features))
     y, samples = data.target, data.freedom
@@ -92,7 +92,7 @@ def _groups(data: Regression) -> dict[tuple[str, tuple[tuple[str, float], ...]],
 
 
 def _best_shapes(data: Regression) -> NDArray[np.intp]:
-    """Return the columns of each effect in the shape that explains most alone."""
+    """Return the columns of each effect in the shape that alone explains most."""
     best: dict[str, tuple[float, list[int]]] = {}
     for (name, _), own in _groups(data).items():
         q = np.linalg.qr(data.columns[:, own])[0]
@@ -103,7 +103,7 @@ def _best_shapes(data: Regression) -> NDArray[np.intp]:
 
 
 def _same(data: Regression, chosen: list[int]) -> list[str]:
-    """Return the effects whose features span what those of a chosen effect span."""
+    """Return the effects whose features span those of a chosen effect."""
     q = np.linalg.qr(data.columns[:, chosen])[0]
     found = {data.features[chosen[0]].effect}
     for (name, _), own in _groups(data).items():
@@ -116,8 +116,8 @@ def _same(data: Regression, chosen: list[int]) -> list[str]:
 
 
 def _path(x: Floats, y: Floats, optimizer: str) -> Iterator[tuple[int, ...]]:
-    """Yield the supports that an optimizer of pysindy finds, from sparse to dense."""
-    # In a rotated frame nothing changes but the number of rows.
+    """Yield the supports on the path of an optimizer of pysindy, from sparse to dense."""
+    # A rotation of the rows changes only their number.
     q, x = np.linalg.qr(x)
     y = (q.T @ y)[:, None]
     scale = float(np.linalg.norm(y))
@@ -140,12 +140,12 @@ def _path(x: Floats, y: Floats, optimizer: str) -> Iterator[tuple[int, ...]]:
 
 
 def _forward(x: Floats, y: Floats) -> Iterator[tuple[int, ...]]:
-    """Yield supports of forward regression, fewer where other columns depend on the chosen ones."""
+    """Yield supports of forward regression; fewer if other columns depend on the chosen ones."""
     for count in range(2 * MOST, 0, -1):
         found = pysindy.FROLS(max_iter=count, alpha=1e-6)
         try:
             found.fit(x, y)
-        except ValueError:  # a column that is nothing once the chosen ones are taken off
+        except ValueError:  # a column that is zero after projection on the chosen ones
             continue
         yield from (_support(c) for c in found.history_)
         return

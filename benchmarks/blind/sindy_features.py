@@ -1,14 +1,14 @@
-"""Features for SINDy: the states of a record, and what each effect of the library adds to th''.
+"""Features for SINDy: the states of a record, and each library effect's contribution to th''.
 
-No formula of an effect is written here. A torque is the virtual rig's own acceleration with the
-effect less that without it, so that SINDy is offered the very form that was hidden; names and
-shapes are the candidates of ``pendmap diagnose``. What a sensor or a clock does is linearised: a
-reading ``y = th + e g(th)`` obeys, to first order in e,
+No formula of an effect is written here. A torque is the virtual rig's acceleration with the effect
+minus that without it, so that SINDy is offered the exact hidden form; names and shapes are the
+candidates of ``pendmap diagnose``. Effects of a sensor or a clock are linearised: a reading ``y =
+th + e g(th)`` obeys, to first order in e,
 
 ``y'' = F + e (g'' - F_th g - F_v g')``,   ``g' = g_th v + g_t``,   ``g'' = g_thth v^2 + g_th F``,
 
-where ``F(th, v, t)`` is the acceleration without effects; a clock that is wrong, or a sensor that
-is late, reads the drive at another time.
+where ``F(th, v, t)`` is the acceleration without effects; with a wrong clock, or a delayed sensor,
+the phase of the drive is shifted.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 ORDER = 5
-"""Of the polynomials of Savitzky and Golay."""
+"""Order of the Savitzky-Golay polynomials."""
 
 FIRST_WIDTH = 0.15
-"""Half the window, s, with which w0 is estimated before anything is known."""
+"""Half the window, s, of the first estimate of w0."""
 
 FAINT = 1e-6
-"""Size at which a torque is evaluated, SI: all are proportional to it, or nearly so."""
+"""Size at which a torque is evaluated, SI: torques are (nearly) proportional to it."""
 
 STEP = 1e-3
-"""Of differences by the angle, rad."""
+"""Step of finite differences in the angle, rad."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +75,7 @@ class States:
 
     @property
     def good(self) -> NDArray[np.bool_]:
-        """Which samples count."""
+        """Mask of the samples that are used."""
         trusted = self.run.trusted
         return np.ones(self.theta.shape, bool) if trusted is None else trusted
 
@@ -87,13 +87,13 @@ class States:
 
     @property
     def vertical(self) -> Floats:
-        """Acceleration of the pivot over gravity, as the experiment states it."""
+        """Acceleration of the pivot over gravity, as stated in the experiment."""
         upward, _ = _drive(self.run).at(np.zeros(1, np.intp), self.run.time)
         return np.broadcast_to(np.asarray(upward, np.float64), self.theta.shape)
 
     @property
     def base(self) -> Floats:
-        """The columns of w0^2, c/m and Tr, shape (n, 3): in every model, never thresholded."""
+        """Columns of w0^2, c/m and Tr, shape (n, 3): in every model, never thresholded."""
         pull = -(1 + self.vertical) * np.sin(self.theta)
         return np.stack([pull, -self.velocity, -np.sign(self.velocity)], axis=1)
 
@@ -145,13 +145,13 @@ def smoothed(runs: Sequence[FitRun], width: float) -> tuple[list[States], Parame
 
 
 def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, Feature]]:
-    """Return the features that these records may show."""
+    """Return the features applicable to these records."""
     forced = any(s.run.drive is not None for s in every)
     pool = list_candidates({"viscous_damping", "coulomb_friction"}, driven=forced)
     found = []
     for candidate in (c for shapes in pool for c in shapes):
         kind = EFFECTS[candidate.name]
-        if (kind.needs == "forced" and not forced) or kind.states:  # a memory is no feature
+        if (kind.needs == "forced" and not forced) or kind.states:  # no feature has a memory
             continue
         shape = tuple(candidate.effect(Rig(rig.w0).units).parameters.items())
         kept = tuple((n, v) for n, v in shape if n in candidate.shape)
@@ -161,7 +161,7 @@ def features(every: Iterable[States], rig: Parameters) -> list[tuple[Candidate, 
 
 
 def columns(states: States, rig: Parameters, pool: list[tuple[Candidate, Feature]]) -> Floats:
-    """Return what size 1 of each feature adds to th'' along a run, shape (n, len(pool))."""
+    """Return each feature's contribution of size 1 to th'' along a run, shape (n, len(pool))."""
     plain = _rates(states, rig, [], states.theta)
     found = np.empty((plain.size, len(pool)))
     for k, (candidate, feature) in enumerate(pool):
@@ -211,7 +211,7 @@ def _rates(
 
 def _reading(states: States, rig: Parameters, plain: Floats, feature: Feature) -> Floats:
     time, theta, v = states.run.time, states.theta, states.velocity
-    if feature.effect == "sensor_lag":  # a short one reads what was a little earlier
+    if feature.effect == "sensor_lag":  # a short one reads a slightly earlier angle
         return (_rates(states, rig, [], theta, time - FAINT) - plain) / FAINT
     effect = _made(feature, FAINT)
     clock = effect.clock(time)

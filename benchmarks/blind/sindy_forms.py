@@ -1,8 +1,8 @@
 """The two regressions of SINDy, strong and weak.
 
-Both regress ``th''`` on the columns of ``sindy_features``. What every model has (``sin th``,
-``v``, ``sign v``) is projected out of target and features first, which is the same as never
-thresholding it. Columns then have unit length, so that one threshold suits them all.
+Both regress ``th''`` on the columns of ``sindy_features``. The base of every model (``sin th``,
+``v``, ``sign v``) is projected out of target and features first, which is equivalent to never
+thresholding it. Columns then have unit length, so that one threshold suits all.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 POWER = 6
-"""Of the test functions ``(1 - s^2)^power`` of the weak form."""
+"""Exponent of the test functions ``(1 - s^2)^power`` of the weak form."""
 
 REACH = 3.0
-"""Standard deviations from which the strong form's Gaussian filter is cut off."""
+"""Cutoff of the strong form's Gaussian filter, in standard deviations."""
 
 SEEN = 0.003
-"""Part of a feature that the base must leave: less is smoothing, not physics."""
+"""Least share of a feature after projection of the base: below it is smoothing error."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Setting:
-    """How a form is set up and its model chosen.
+    """Configuration of a form and of its model selection.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Regression:
 
 
 def prepared(runs: Sequence[FitRun], width: float) -> Prepared:
-    """Return what both forms regress on.
+    """Return the states, parameters and features that both forms use.
 
     Parameters
     ----------
@@ -121,10 +121,10 @@ def regression(data: Prepared, setting: Setting) -> Regression:
 def _strong(
     states: States, rig: Parameters, extra: Floats, setting: Setting
 ) -> tuple[Floats, Floats, Floats]:
-    """Return rows of ``th'' = ...``, a standard deviation of the smoothing apart.
+    """Return rows of ``th'' = ...``, one standard deviation of the smoothing apart.
 
-    The derivative is of the smoothed angle, by differences. What smoothing takes from it, it takes
-    from the features too, since they pass through the same filter.
+    The derivative is of the smoothed angle, by differences. The features pass through the same
+    filter, and have the same smoothing error.
     """
     spread = setting.support / rig.w0 / states.interval / REACH
     reach = math.ceil(setting.support / rig.w0 / states.interval) + 4
@@ -146,11 +146,11 @@ def _strong(
 def _weak(
     states: States, rig: Parameters, extra: Floats, setting: Setting
 ) -> tuple[Floats, Floats, Floats]:
-    """Return rows of ``int phi'' th = int phi (...)``, whitened by the noise they share.
+    """Return rows of ``int phi'' th = int phi (...)``, whitened by their common noise.
 
-    The angle of target and of ``sin th`` is the reading itself: its noise enters both, by
-    ``phi'' + phi w0^2 (1 + a) cos th`` to first order; the velocity's integral is by parts too.
-    Where noise of the velocity moves a turn, dry friction has the wrong sign for that long.
+    The angle of target and of ``sin th`` is the reading itself: its noise enters both, by ``phi'' +
+    phi w0^2 (1 + a) cos th`` to first order; the velocity's integral is by parts too. Noise of the
+    velocity moves a turning point, and gives dry friction the wrong sign meanwhile.
     """
     theta, dt = states.run.theta, states.interval
     half = max(round(setting.support / rig.w0 / dt), 8)

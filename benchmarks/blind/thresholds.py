@@ -1,12 +1,11 @@
-"""How much verdicts depend on the thresholds: each is halved and doubled.
+"""Sensitivity of verdicts to the thresholds: each is halved and doubled.
 
     python -m benchmarks.blind.thresholds --experiments 200 --seed 1 --workers 2
 
-The experiments are those of run.py. Each is diagnosed with the thresholds as they are, and with
-one of them halved, then doubled. A verdict has changed where its word, its names or their reserve
-have. Most searches take the same way: a fit that was made before is remembered. A quarter of the
-experiments have disturbances that no effect describes. Results are appended to ``--out``, and a run
-that was ended goes on where it stood.
+The experiments are those of run.py. Each is diagnosed with the default thresholds, and with one of
+them halved, then doubled. A verdict has changed if its word, its names or their reserve have. Most
+searches share their fits, which are cached. A quarter of the experiments have disturbances that no
+effect describes. Results are appended to ``--out``, and an interrupted run is resumed.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-# One thread a process, before numpy is imported: the processes share the processor.
+# One thread per process, set before numpy is imported: the processes share the processors.
 os.environ.update(
     dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 )
@@ -49,18 +48,18 @@ if TYPE_CHECKING:
 FIELDS = [field.name for field in dataclasses.fields(Thresholds)]
 FACTORS = (0.5, 2.0)
 RATE = 100.0
-"""Readings a second."""
+"""Sampling rate, 1/s."""
 
 
 def changed(name: str, factor: float) -> Thresholds:
-    """Return the thresholds with one of them multiplied; whole numbers stay whole."""
+    """Return the thresholds with one of them multiplied; integers remain integers."""
     value = getattr(Thresholds(), name)
     new = max(round(factor * value), 1) if isinstance(value, int) else factor * value
     return dataclasses.replace(Thresholds(), **{name: new})
 
 
 KNOWN_BY_ITSELF = (Experiment, FitRun, HoldOut, ResidualNoise, TrajectoryFit, FittedModel)
-"""Arguments that are the same ones from search to search where all before them were."""
+"""Arguments that are identical between searches if all before them are."""
 
 REMEMBERED = {
     "split_records": comparison.data,
@@ -74,11 +73,11 @@ REMEMBERED = {
     "residual_torque": torque,
     "parameters_by_run": by_run,
 }
-"""Functions whose results are remembered, and their modules."""
+"""Functions whose results are cached, and their modules."""
 
 
 def remembered(compute: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that computes what it is asked for once."""
+    """Return a function that computes each result once."""
     known: dict[str, Any] = {}
     kept: list[object] = []
 
@@ -110,7 +109,7 @@ def remembered(compute: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextlib.contextmanager
 def memory() -> Iterator[None]:
-    """Remember fits, scores and what else a search computes."""
+    """Cache the fits, scores and other results of a search."""
     modules = [m for name, m in sys.modules.items() if name.startswith("pendmap.")]
     places = []
     for name, home in REMEMBERED.items():
@@ -128,7 +127,7 @@ def memory() -> Iterator[None]:
 
 
 def run(case: Case) -> dict[str, Any]:
-    """Return the verdicts on an experiment, with the usual thresholds and with each one changed."""
+    """Return the verdicts on an experiment with the default thresholds and each changed one."""
     own = [effect.split(":")[0] for effect in case.effects] if case.what == "withheld" else []
     without = [name for name in own if name in library()]
     experiment = record(case).experiment
@@ -148,7 +147,7 @@ def run(case: Case) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Draw, diagnose, print the table."""
+    """Draw cases, diagnose them, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--experiments", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

@@ -7,5 +7,5 @@ from __future__ import annotations
 
 import sys
 
-# numba looks for the package coverage, and would find the benchmark of that name.
+# numba imports the package coverage if it exists, and would find the benchmark of that name.
 sys.modules.setdefault("coverage", None)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Equal error: the starts, the reference and the search for each method's loosest setting.
+"""Comparison at equal error: starts, reference, and the loosest sufficient setting of a method.
 
 The equation is th'' = -gamma th' - (1 + p cos(omega t)) sin th, nondimensional, angles in rad.
 """
@@ -43,7 +43,7 @@ class Case:
         return 2.0 * math.pi / self.omega
 
     def __str__(self) -> str:
-        """Return the parameters as the tables show them."""
+        """Return the parameters as shown in the tables."""
         return f"gamma {self.gamma:g}, p {self.p:g}, omega {self.omega:g}"
 
 
@@ -55,11 +55,11 @@ class Method(Protocol):
 
     @property
     def label(self) -> str:
-        """Whose it is."""
+        """Package or author of the method."""
 
     @property
     def setting(self) -> str:
-        """The setting, in words."""
+        """The setting as text."""
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return angle (any branch) and velocity, shape (N,), after whole forcing periods."""
@@ -182,7 +182,7 @@ def side_for(method: Method, periods: int, seconds: float) -> int:
 def alternate(
     methods: Mapping[str, Method], sides: Mapping[str, int], periods: int, rounds: int
 ) -> dict[str, list[float]]:
-    """Time every method once a round, one after another; return ns of each round by name."""
+    """Time every method once per round, alternating; return the ns of each round by name."""
     times: dict[str, list[float]] = {name: [] for name in methods}
     for _ in range(rounds):
         for name, method in methods.items():

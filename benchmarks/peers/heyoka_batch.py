@@ -43,7 +43,7 @@ class Setting:
     propagate: Literal["until", "grid"] = "until"
 
     def __str__(self) -> str:
-        """Return the setting in words: what differs from heyoka's defaults."""
+        """Return the setting as text: the differences from heyoka's defaults."""
         flags = ("force_avx512", "fast_math", "compact_mode", "high_accuracy", "slp_vectorize")
         words = [f"batch {self.batch}", self.drive, *(f for f in flags if getattr(self, f))]
         if self.opt_level != Setting.opt_level:
@@ -59,7 +59,7 @@ class HeyokaBatch:
     label = "heyoka"
 
     def __init__(self, case: Case, how: Setting, tol: float, torque: float = 0.0) -> None:
-        """Build and compile the integrator; the equation's numbers are constants in it."""
+        """Build and compile the integrator; the equation's parameters are constants in it."""
         self.case, self.how, self.tol = case, how, tol
         system, extra = _equations(case, how, torque)
         self._extra = np.array(extra, dtype=np.float64)[:, None]
@@ -77,7 +77,7 @@ class HeyokaBatch:
 
     @property
     def setting(self) -> str:
-        """The setting and the tolerance, in words."""
+        """The setting and the tolerance as text."""
         return f"{self.how}, tol {self.tol:.1e} (order {self._integrator.order})"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
@@ -130,7 +130,7 @@ def _equations(
 
 
 def plain_settings() -> list[Setting]:
-    """Return heyoka's recommended batch size, and where there is AVX-512 batch 8 on it."""
+    """Return heyoka's recommended batch size, and also batch 8 if there is AVX-512."""
     settings = [Setting(hy.recommended_simd_size())]
     if has_avx512():
         settings.append(Setting(8, force_avx512=True))
@@ -138,7 +138,7 @@ def plain_settings() -> list[Setting]:
 
 
 def candidates() -> list[Setting]:
-    """Return the settings that are compared first: batch, drive and fast_math."""
+    """Return the settings compared first: batch, drive and fast_math."""
     settings = plain_settings()
     settings.append(replace(settings[-1], batch=2 * settings[-1].batch))
     return [
@@ -150,7 +150,7 @@ def candidates() -> list[Setting]:
 
 
 def variations(best: Setting) -> list[Setting]:
-    """Return the best of the candidates with one more option turned, each in its turn."""
+    """Return the best candidate with one further option changed, for each option."""
     return [
         replace(best, compact_mode=True),
         replace(best, high_accuracy=True),

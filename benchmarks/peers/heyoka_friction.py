@@ -40,7 +40,7 @@ class HeyokaFriction:
 
     @property
     def setting(self) -> str:
-        """The tolerance, in words."""
+        """The tolerance as text."""
         return f"terminal events, tol {self.tol:.0e}"
 
     def _load(self, time: float, angle: float) -> float:
@@ -55,7 +55,7 @@ class HeyokaFriction:
         return True
 
     def _release(self, time: float, angle: float) -> tuple[float, float]:
-        """When the load begins to exceed the friction, and its sense."""
+        """Return when the load begins to exceed the friction, and its sign."""
         case, sine = self.case, math.sin(angle)
         found = (math.inf, 1.0)
         for sense in (1.0, -1.0):
@@ -78,8 +78,8 @@ class HeyokaFriction:
             until, sense = self._release(ta.time, ta.state[0])
             if until >= end:
                 break
-            # There velocity and acceleration are 0, which would count as an event at once: a short
-            # way by the Taylor series, whose next term is of the fourth power.
+            # There velocity and acceleration are 0, which would trigger an event at once: start a
+            # short step later by the Taylor series, whose next term is of the fourth power.
             jerk = self.case.p * self.case.omega * math.sin(self.case.omega * until)
             jerk *= math.sin(ta.state[0])
             ta.reset_cooldowns()

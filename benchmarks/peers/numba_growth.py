@@ -1,8 +1,8 @@
-"""Growth of a tangent beside each start, by the numba RK4 in blocks, on all threads of numba.
+"""Growth of a tangent with each start, by the numba RK4 in blocks, on all threads of numba.
 
-The state is that of `numba_rk4` in blocks of 32 starts with a table of cosines; the tangent goes
-through the same stages and is scaled back to length 1 once a period. Each start has a drive of its
-own strength; the last stroboscopic points are kept where there is room for them.
+The state is that of `numba_rk4` in blocks of 32 starts with a table of cosines; the tangent uses
+the same stages and is scaled back to length 1 once a period. Each start has its own drive strength;
+the last stroboscopic points are kept if there is room for them.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class NumbaGrowth:
 
     @property
     def setting(self) -> str:
-        """The loop and the steps, in words."""
+        """The loop and the steps as text."""
         return f"prange over blocks, {self.steps} steps a period"
 
     def _run(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats, Floats]:

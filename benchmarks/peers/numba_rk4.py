@@ -1,8 +1,8 @@
 """A hand-written Runge-Kutta method of order 4, fixed step, compiled by numba, on one thread.
 
-Two loops are offered. "starts" is the one most people write: one start after another, two cosines
-and four sines a step. "blocks" takes the cosine from a table of one period and runs 32 starts side
-by side through each step, so that their sines overlap.
+Two loops are available. "starts" is the usual one: one start after another, two cosines and four
+sines a step. "blocks" takes the cosine from a table of one period and advances 32 starts together
+through each step, so that their sines overlap.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class NumbaRk4:
 
     @property
     def setting(self) -> str:
-        """The loop and the steps, in words."""
+        """The loop and the steps as text."""
         return f"loop over {self.loop}, {self.steps} steps a period"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""pendmap itself, as one more method: the kernel alone, and the labels."""
+"""pendmap as one of the compared methods: the kernel alone, and the labels."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Pendmap:
 
     @property
     def setting(self) -> str:
-        """The steps and the instruction set, in words."""
+        """The steps and the instruction set as text."""
         return f"{simd()}, {self.steps} steps a period"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
@@ -69,7 +69,7 @@ def at_error(case: Case, sample: Regular, target: float, *, torque: float = 0.0)
 
 
 def command() -> str:
-    """Return the command `pendmap` that belongs to this Python.
+    """Return the command `pendmap` installed with this Python.
 
     Raises
     ------

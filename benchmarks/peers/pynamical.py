@@ -1,8 +1,8 @@
 """pynamicalsys: its largest exponent of a flow, one start after another, on all threads of numba.
 
 Its manual calls `ContinuousDynamicalSystem.lyapunov` in a loop of Python, which runs on one thread;
-here the compiled function behind it is called from a parallel loop, which is quicker by more than
-the threads. It scales the tangent after every step; its tangent begins in another direction.
+here the compiled function behind it is called from a parallel loop, a gain beyond the number of
+threads. It rescales the tangent after every step; its initial tangent differs.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def exponents_of_cells(
 def diagram(
     case: Case, p: Floats, start: tuple[float, float], steps: int, periods: tuple[int, int]
 ) -> Floats:
-    """Return stroboscopic points, shape (N, kept, 2): its class in a loop over p, as it has it."""
+    """Return stroboscopic points, shape (N, kept, 2), by its class in a loop over p."""
     system = ContinuousDynamicalSystem(
         equations_of_motion=_slope, system_dimension=2, parameters=[case.gamma, case.p, case.omega]
     )
@@ -133,7 +133,7 @@ class Pynamical:
 
     @property
     def setting(self) -> str:
-        """The integrator and the steps, in words."""
+        """The integrator and the steps as text."""
         return f"rk4, {self.steps} steps a period"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
@@ -150,13 +150,13 @@ class Pynamical:
 
 
 class PynamicalLoop(Pynamical):
-    """A loop of Python over its class, as its manual has it."""
+    """A Python loop over its class, as in its manual."""
 
     label = "pynamicalsys"
 
     @property
     def setting(self) -> str:
-        """The integrator, the steps and the loop, in words."""
+        """The integrator, the steps and the loop as text."""
         return f"rk4, {self.steps} steps a period, its class in a loop, one thread"
 
     def exponents(self, theta: Floats, velocity: Floats, periods: int) -> Floats:

@@ -1,4 +1,4 @@
-"""The machine, the versions and the plain table that every benchmark prints."""
+"""Output of every benchmark: machine, versions and a plain table."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _cpuinfo(key: str) -> str:
 
 
 def has_avx512() -> bool:
-    """Tell whether the processor has AVX-512."""
+    """Return whether the processor has AVX-512."""
     return "avx512f" in _cpuinfo("flags").split()
 
 
@@ -74,12 +74,12 @@ def _is_number(cell: str) -> bool:
 
 
 def say(text: str) -> None:
-    """Write to stdout at once."""
+    """Write to stdout immediately."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
 def note(text: str) -> None:
-    """Write a remark to stderr, so that stdout holds the table alone."""
+    """Write a remark to stderr, so that stdout contains the table alone."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()

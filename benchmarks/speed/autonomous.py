@@ -1,9 +1,9 @@
-"""th'' = -0.1 th' + 0.5 - sin th: 100,000 random starts to t = 1000, alone and with labels.
+"""th'' = -0.1 th' + 0.5 - sin th: 100,000 random starts to t = 1000, with and without labels.
 
 The error is max(abs(d theta), abs(d velocity)) at t = 16 pi against scipy's DOP853 at rtol = atol =
 1e-13; a method's error is the 95th percentile over the first 200 starts. "As of rtol 1e-8" is the
-error that DOP853 itself has, measured alike, at rtol = atol = 1e-8. Whole "periods" of 2 pi are
-integrated, 160 of them, so the end is t = 1005.3.
+error of DOP853 itself at rtol = atol = 1e-8. The integration covers 160 whole "periods" of 2 pi, so
+the end is t = 1005.3.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 CASE, TORQUE = Case(0.1, 0.0, 1.0), 0.5  # omega 1: a "period" is 2 pi
 COUNT, PERIODS = 100_000, 160
 CHECKED, CHECK_PERIODS, PERCENTILE = 200, 8, 95.0
-SLOW = 1.0  # velocity below which a start has come to the fixed point; running states keep near 5
+SLOW = 1.0  # velocity below which a start has reached the fixed point; running states remain near 5
 STRICT = 1e-8
 HEADERS = ("what", "setting", "threads", "error", "seconds", "fixed point", "running")
 PUBLISHED = (
@@ -67,13 +67,13 @@ def scipy_ends(theta: Floats, velocity: Floats, tol: float) -> tuple[Floats, Flo
 
 
 class Scipy:
-    """DOP853 at rtol = atol = 1e-8: what sets the error to be met."""
+    """DOP853 at rtol = atol = 1e-8, which sets the target error."""
 
     label, setting = "scipy DOP853", "rtol 1e-8"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
         """Return angle and velocity; `periods` is that of the check."""
-        assert periods == CHECK_PERIODS  # noqa: S101 (it serves the check alone)
+        assert periods == CHECK_PERIODS  # noqa: S101 (used for the check alone)
         return scipy_ends(theta, velocity, 1e-8)
 
 
@@ -110,7 +110,7 @@ def labelled(theta: Floats, velocity: Floats, tol: float) -> tuple[float, float]
 
 
 def result(seconds: float, parts: tuple[float, float]) -> tuple[str, ...]:
-    """Format the columns that are measured: seconds and the two shares."""
+    """Format the measured columns: seconds and the two shares."""
     return f"{seconds:.2f}", f"{parts[0]:.4f}", f"{parts[1]:.4f}"
 
 
@@ -137,7 +137,7 @@ def our_rows(
 def heyoka_row(
     sample: Regular, target: float, theta: Floats, velocity: Floats, share: int
 ) -> tuple[str, ...]:
-    """Return heyoka's row: one thread, on a part of the starts, the time scaled to all."""
+    """Return heyoka's row: one thread, on a part of the starts, with the time scaled to all."""
     how = heyoka_batch.Setting(16, force_avx512=has_avx512(), fast_math=True)
     method = heyoka_batch.at_error(CASE, how, sample, target, torque=TORQUE)
     part = theta.size // share

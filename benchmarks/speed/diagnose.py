@@ -1,9 +1,8 @@
-"""Speed of a diagnosis: its CPU and wall time against the time recorded and the samples.
+"""Speed of a diagnosis: its CPU and wall time against the recorded time and the samples.
 
-Nine runs, five free and four forced, made by the virtual rig with nothing hidden, one effect, a
-pair, and one withheld, at the rate at which they have 2,500 samples each on average. Each is
-diagnosed in its own process, once on one thread, whose CPU time says what the work is, and
-once on all.
+Nine runs, five free and four forced, are made by the virtual rig with nothing hidden, one effect, a
+pair, and one withheld, at a rate of 2,500 samples each on average. Each is diagnosed in its own
+process, once on one thread, whose CPU time measures the work, and once on all.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ RUNS, RATE = (5, 4), 124.0
 
 @dataclasses.dataclass(frozen=True)
 class Timed:
-    """A diagnosis: seconds, what was recorded, and what was said."""
+    """A diagnosis: seconds, size of the record, and verdict."""
 
     cpu: float
     wall: float
@@ -74,7 +73,7 @@ def one(case: str, seed: int) -> Timed:
 
 
 def apart(case: str, seed: int, threads: int) -> Timed:
-    """Do the same in a process with this number of threads."""
+    """Run the diagnosis in a process with this number of threads."""
     own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": str(threads)}
     command = [
         sys.executable,

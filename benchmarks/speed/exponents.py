@@ -50,7 +50,7 @@ class Growing(Protocol):
 
 
 class Pendmap(ours.Pendmap):
-    """The lane kernel with a tangent beside each state."""
+    """The lane kernel with a tangent for each state."""
 
     def exponents(self, theta: Floats, velocity: Floats, periods: int) -> Floats:
         """Return the finite-time exponents, shape (N,)."""

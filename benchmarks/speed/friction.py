@@ -35,7 +35,7 @@ def naive(
     velocity: Floats,
     counts: tuple[int, int],
 ) -> None:
-    """Runge-Kutta of order 4 with sign(v) on the right: what people write first."""
+    """Advance by a Runge-Kutta method of order 4 with sign(v) on the right, without events."""
     gamma, p, omega, theta_r = case
     steps, periods = counts
     h = 2.0 * math.pi / omega / steps
@@ -69,7 +69,7 @@ class Naive:
 
     @property
     def setting(self) -> str:
-        """The steps, in words."""
+        """The steps as text."""
         return f"{self.steps} steps a period"
 
     def advance(self, theta: Floats, velocity: Floats, periods: int) -> tuple[Floats, Floats]:
@@ -101,7 +101,7 @@ def draw(count: int) -> tuple[Floats, Floats]:
 
 
 def main() -> None:
-    """Print one table: equal error first, then the naive method, whose error does not fall."""
+    """Print one table: equal error first, then the naive method, whose error does not decrease."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--error", type=float, default=1e-9, help="95th percentile of all")
     parser.add_argument("--rounds", type=int, default=3, help="rounds, methods alternating")

@@ -1,4 +1,4 @@
-"""Basin maps of 1000 x 1000 cells from the command line: seconds, mean periods, what they tell."""
+"""Basin maps of 1000 x 1000 cells from the command line: seconds, mean periods, results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from benchmarks.peers.report import machine, note, say, table
 
 @dataclass(frozen=True)
 class Map:
-    """Options of `pendmap basins`, and what is wanted of it."""
+    """Options of `pendmap basins`, and the target of a map."""
 
     options: tuple[str, ...]
     wanted: str
@@ -47,7 +47,7 @@ HEADERS = (
 def run(options: list[str], folder: str) -> tuple[str, float]:
     """Run the command in `folder`; return its stdout and the wall-clock seconds."""
     begin = time.perf_counter()
-    done = subprocess.run(  # noqa: S603 (our own command)
+    done = subprocess.run(  # noqa: S603 (our command)
         [ours.command(), "basins", *options, "--quiet"],
         stdout=subprocess.PIPE,
         text=True,
@@ -63,7 +63,7 @@ def show(value: float | None, form: str) -> str:
 
 
 def measure(wanted: Map, shared: list[str], rounds: int) -> tuple[str, ...]:
-    """Run one map some times and format its row; seconds are medians."""
+    """Run one map several times and format its row; seconds are medians."""
     options = [*wanted.options, *shared]
     alone, whole, files = [], [], []
     answer: dict[str, Any] = {}

@@ -26,7 +26,7 @@ CASE = Case(0.1, 1.7, 2.0)
 START = (1.0, 0.3)
 DIAGRAM = (500, 100)
 MAP = (200, 300)
-"""Periods dropped and kept: the peers know no better when a motion has settled."""
+"""Periods dropped and kept: the peers do not detect when a motion has settled."""
 NEAR = 1e-3
 HEADERS = ("method", "work", "seconds", "spread", "times ours", "as ours")
 
@@ -53,7 +53,7 @@ def numba_map(p: Floats, omega: Floats, steps: int) -> Floats:
         none, growth = np.empty((p.size, 0, 2)), np.zeros(p.size)
         for periods in MAP:
             growth[:] = 0.0
-            here = math.ceil(steps * CASE.omega / one)  # as long as at the drive of CASE
+            here = math.ceil(steps * CASE.omega / one)  # steps as long as for the drive of CASE
             numba_growth.grow(CASE.gamma, one, p, theta, velocity, growth, none, here, periods)
         rows.append(growth / (MAP[1] * 2 * np.pi / one))
     return np.array(rows)
@@ -77,9 +77,9 @@ def ours_map(p: Floats, omega: Floats, starts: int) -> object:
 
 
 def agrees_with_points(found: object, p: Floats, points: Floats) -> float:
-    """Return the share of values where a peer's points lie on an attractor of ours.
+    """Return the share of values for which a peer's points lie on an attractor of ours.
 
-    Where they are on chaos of ours, that is one if no cycle closes there either.
+    On a chaotic attractor of ours the peer must find no closed cycle either.
     """
     entry = found["point_entry"].values
     plane = np.stack([found["point_theta"].values, found["point_velocity"].values], axis=1)
@@ -98,9 +98,9 @@ def agrees_with_points(found: object, p: Floats, points: Floats) -> float:
 
 
 def agrees_with_exponents(found: object, exponents: Floats) -> float:
-    """Return the share of cells where a peer's exponent is that of an attractor of ours.
+    """Return the share of cells in which a peer's exponent equals that of an attractor of ours.
 
-    Within 0.02 of it, or positive where ours is chaos.
+    Equal means within 0.02, or positive if ours is chaotic.
     """
     cell, own = found["entry_cell"].values, found["entry_exponent"].values
     flat = exponents.ravel()[cell]
@@ -121,7 +121,7 @@ def timed(work: dict[str, Callable[[], object]], rounds: int) -> tuple[dict, dic
 
 
 def told(times: dict, scale: dict[str, float], said: dict[str, str], agreed: dict) -> None:
-    """Print a table; what did part of the work is scaled to all of it."""
+    """Print a table; partial times are scaled to the whole."""
     first = next(iter(times))
     rows = []
     for name, took in times.items():

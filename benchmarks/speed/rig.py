@@ -1,7 +1,7 @@
 """The virtual rig: processor seconds of one thread for each experiment of nine runs.
 
 Experiments of `pendmap rig hidden` with seeds 0, 1, ... are made and written, once without a hidden
-effect and once with the one that the seed draws. Wanted are 400 experiments in 10 minutes.
+effect and once with the one that the seed draws. The target is 400 experiments in 10 minutes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-# One thread, before numpy is imported.
+# One thread, set before numpy is imported.
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
 
 from benchmarks.peers.report import machine, note, say, table
@@ -23,7 +23,7 @@ HEADERS = ("effects", "experiments", "median s", "most s", "400 in min", "wanted
 
 
 def seconds(seed: int, effect: str, folder: Path) -> float:
-    """Make and write one experiment; return the processor time it took, s."""
+    """Make and write one experiment; return its processor time, s."""
     start = time.process_time()
     write(
         make(Request("hidden", seed, (effect,))), places(folder / f"{effect}{seed}", replace=True)
@@ -40,7 +40,7 @@ def main() -> None:
     say(machine(("pendmap", "numpy", "scipy")))
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        seconds(0, "none", Path(folder))  # what is imported or compiled once
+        seconds(0, "none", Path(folder))  # first run, with its imports and compilation
         for effect in ("none", "any"):
             note(effect)
             taken = [seconds(seed, effect, Path(folder)) for seed in range(count)]

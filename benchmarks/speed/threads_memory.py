@@ -1,8 +1,8 @@
-"""Two threads against two one-thread processes run at once; peak memory of a large map.
+"""Two threads against two simultaneous one-thread processes; peak memory of a large map.
 
-The first ratio is (time of two one-thread processes that each do the job at the same moment) /
-(twice the time of one process that does it on two threads): 1 is perfect, 0.93 is wanted. Memory is
-the peak resident size of the whole command with its figure and files.
+The first ratio is (time of two simultaneous one-thread processes that each do the job) / (twice the
+time of one process that does it on two threads): 1 is ideal, the target is 0.93. Memory is the peak
+resident size of the whole command with its figure and files.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GIB = 2.0**30
 
 
 def work(threads: int) -> None:
-    """Say ready, wait for a line, integrate a grid of starts, print the seconds taken."""
+    """Print ready, wait for a line, integrate a grid of starts, print the seconds taken."""
     method = ours.Pendmap(CASES[0], STEPS, threads=threads)
     theta, velocity = grid(SIDE)
     method.advance(theta, velocity, 1)
@@ -39,7 +39,7 @@ def work(threads: int) -> None:
 
 
 def kernel_seconds(processes: int, threads: int) -> float:
-    """Return the longest time among workers that begin together."""
+    """Return the longest time of simultaneous workers."""
     call = [sys.executable, "-m", "benchmarks.speed.threads_memory", "--worker", str(threads)]
     workers = [
         subprocess.Popen(call, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)  # noqa: S603 (this file)
@@ -56,11 +56,11 @@ def kernel_seconds(processes: int, threads: int) -> float:
 
 
 def map_seconds(processes: int, threads: int, side: int) -> float:
-    """Return the longest time among maps, as each reports it, that begin together."""
+    """Return the longest time reported by simultaneous maps."""
     call = [ours.command(), "basins", "--p", "1", "--grid", str(side), "--json"]
     call += ["--threads", str(threads), "--quiet"]
     running = [
-        subprocess.Popen(call, stdout=subprocess.PIPE, text=True)  # noqa: S603 (our own command)
+        subprocess.Popen(call, stdout=subprocess.PIPE, text=True)  # noqa: S603 (our command)
         for _ in range(processes)
     ]
     return max(float(json.loads(run.communicate()[0])["seconds"]) for run in running)

@@ -1,9 +1,9 @@
-"""Intervals of the trajectory method: how often they cover the truth; its errors and the bound.
+"""Intervals of the trajectory method: their coverage; errors against the Cramer-Rao bound.
 
 Synthetic free decays over w0 5 to 7 rad/s, damping ratio .002 to .01, Coulomb friction .02 to .3
 rad/s^2 and noise .05 to .5 degrees, 30 s at 100 Hz, released at rest between 2.9 and 3.05 rad.
-Truth and the Cramer-Rao bound, which no unbiased estimate undercuts, are computed here, apart from
-what is fitted: half swings from turn to turn, derivatives by finite differences.
+Decays and the Cramer-Rao bound, the least variance of an unbiased estimate, are computed here,
+independently of the fit: half swings from turn to turn, derivatives by finite differences.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ def drawn(seed: int, index: int) -> Case:
 
 
 def decays(truths: Array) -> Array:
-    """Return the readings without noise, a row for each row of truths.
+    """Return the readings without noise, a row for each row of parameters.
 
-    The classic Runge-Kutta method in steps of 2.5 ms, each row at its own time: it is set to
-    the turn wherever its velocity passes zero, and stays where friction holds it. Errors are about
-    1e-9.
+    The method is classic Runge-Kutta in steps of 2.5 ms, each row at its own time: a step ends at
+    the turn wherever the velocity passes zero, and the state is constant once friction holds it.
+    Errors are about 1e-9.
     """
     w0, c_over_m, friction, offset, theta, velocity = (column.copy() for column in truths.T)
     now = np.zeros(len(truths))
@@ -104,7 +104,7 @@ def decays(truths: Array) -> Array:
 
 
 def hermite(x: Array, a: Array, b: Array, slope_a: Array, slope_b: Array) -> Array:
-    """Return the cubic between two points; slopes are a step's."""
+    """Return the cubic Hermite interpolant between two points; slopes are those of a step."""
     return (
         a * (1 + 2 * x) * (1 - x) ** 2
         + slope_a * x * (1 - x) ** 2
@@ -114,8 +114,8 @@ def hermite(x: Array, a: Array, b: Array, slope_a: Array, slope_b: Array) -> Arr
 
 
 def first_zero(a: float, b: float, slope_a: float, slope_b: float) -> float:
-    """Return where the cubic of the velocity passes zero."""
-    # A start at a turn is a zero itself.
+    """Return the first zero of the cubic of the velocity."""
+    # A start at a turn is itself a zero.
     least = 1e-9 if a == 0 else 0.0
     return float(brentq(hermite, least, 1.0, args=(a, b, slope_a, slope_b), xtol=1e-13))
 
@@ -124,7 +124,7 @@ def prepared(request: tuple[int, int, int]) -> list[tuple[Case, Array, Array]]:
     """Return decays ``first`` to ``last`` of a seed, their readings and their bounds."""
     seed, first, last = request
     cases = [drawn(seed, index) for index in range(first, last)]
-    # From rest the motion goes one way only: there both steps are taken that way.
+    # From rest the motion has one direction only: there both differences are taken to that side.
     steps = [np.diag([0.0] * 6), np.diag([1, 1, 1, 1, 1, -1]), np.diag([-1, -1, -1, -1, -1, -2])]
     variants = [case.truth + CHANGE * row for case in cases for rows in steps for row in rows]
     curves = decays(np.array(variants)).reshape(len(cases), 3, 6, len(TIMES))

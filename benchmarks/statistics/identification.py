@@ -2,7 +2,7 @@
 
 The rig is like the paper's: w0 6.2 rad/s, zeta 0.004, Tr 0.08 rad/s^2, release at 3.0 rad, 100 Hz,
 4096 counts, noise 0.1 degrees, encoder zero off by 0.05 degrees. Its record is made by the virtual
-rig, which shares no code with what is fitted to it.
+rig, which shares no code with the fitted model.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-# One thread, before numpy is imported.
+# One thread, set before numpy is imported.
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
 
 import numpy as np
@@ -50,7 +50,7 @@ TRUTHS = Path(__file__).resolve().parents[2] / "tests" / "truths.json"
 
 
 def recursion_error() -> tuple[float, float]:
-    """Largest relative error of delta by 2.7 and of theta_r by 2.10 on peaks made by 2.4 to 2.6."""
+    """Return the largest relative errors of delta (2.7) and theta_r (2.10), peaks by 2.4 to 2.6."""
     worst = [0.0, 0.0]
     rng = np.random.default_rng(0)
     for _ in range(2000):
@@ -64,7 +64,7 @@ def recursion_error() -> tuple[float, float]:
 
 
 def recipe_errors() -> dict[str, float]:
-    """Difference from the decrement recipe on the exact peaks."""
+    """Return the difference from the decrement recipe on the exact peaks."""
     truths = json.loads(TRUTHS.read_text(encoding="utf-8"))
     exact, wanted = truths["free_decay"]["nonlinear"][0], truths["decrement_recipe"][0]
     peaks = Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
@@ -75,7 +75,7 @@ def recipe_errors() -> dict[str, float]:
 
 
 def motion() -> Motion:
-    """The rig's motion from its release until it rests."""
+    """Return the rig's motion from its release until rest."""
     none = np.zeros(1)
     starts = Starts(np.zeros(1, int), none, np.array([LASTS]), np.array([RELEASE]), none)
     equation = Equation(TRUE, Drive.harmonic(none, np.ones(1), none), none, [])
@@ -92,7 +92,7 @@ def record(
 
 
 def true_peaks(path: Motion) -> Peaks:
-    """The peaks without noise, the last stop left out."""
+    """Return the peaks without noise and without the last stop."""
     times = np.array([0.0, *(event.time for event in path.events if event.what == "turn")])
     peaks = Peaks.of(times, path.angle(times))
     return dataclasses.replace(peaks, kind=("release", *peaks.kind[1:]))
@@ -109,7 +109,7 @@ def with_period(found: Identification, period: float, name: str) -> Identificati
 
 
 def choices(peaks: Peaks) -> dict[str, Identification]:
-    """Every reading of the three methods of table 1."""
+    """Return every reading of the three methods of table 1."""
     made: dict[str, Identification] = {}
     for floor in (0.0, 3.0):
         some = peaks.turned
@@ -131,19 +131,19 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
 
 
 def row(found: Identification, peaks: Peaks, start: State) -> tuple[float, ...]:
-    """Errors of table 1 for one model: shortest period, 1.54 s, 1.2 rad, 2.53 rad, percent."""
+    """Return errors of table 1 for a model: shortest period, 1.54 s, 1.2 rad, 2.53 rad, percent."""
     errors = peak_errors(found, peaks, start)
-    # The shortest cycle that is well measured: amplitudes around 12 degrees.
+    # The shortest well measured cycle: amplitudes around 12 degrees.
     at = [int(np.argmin(np.abs(errors.peak[: errors.period.size] - math.radians(12))))]
     at.append(int(np.argmin(np.abs(errors.period - PERIOD))))
     result = [abs(float(errors.period_error[k])) for k in at]
     result += [abs(float(errors.peak_error[np.argmin(np.abs(errors.peak - p))])) for p in PEAKS]
-    # A simulation that rests by then is farther off than any number.
+    # A simulation that rests before has an infinite error.
     return tuple(math.inf if math.isnan(x) else x for x in result)
 
 
 def scan(path: Motion, seed: int) -> None:
-    """Print which choices give which column of table 1."""
+    """Print the choices that give each column of table 1."""
     times, angles = record(path, seed, OFFSET)
     peaks = find_peaks(times, angles)
     start = State(0.0, float(peaks.amplitude[0]), 0.0)
@@ -166,7 +166,7 @@ def scan(path: Motion, seed: int) -> None:
 
 
 def orderings(columns: dict[str, dict[str, tuple[float, ...]]]) -> None:
-    """Print how many triples of choices give the ordering of table 1, and the nearest to it."""
+    """Print the number of triples of choices with table 1's ordering, and the nearest to it."""
     for k, what in enumerate(("1.0 s", "1.54 s", "1.2 rad", "2.53 rad")):
         near = []
         for method, printed in PAPER.items():
@@ -205,10 +205,10 @@ def orderings(columns: dict[str, dict[str, tuple[float, ...]]]) -> None:
 
 
 def misses(found: Identification, truth: Peaks, start: State) -> tuple[float, float]:
-    """Root mean square error of all peaks (rad) and periods (s) against the truth.
+    """Return root mean square errors of all peaks (rad) and periods (s) against the truth.
 
-    A peak that a simulation does not have, because it rests by then, counts as 0 rad; such a period
-    is left out.
+    A peak that a simulation lacks, because it has come to rest, is taken as 0 rad; its period is
+    left out.
     """
     errors = peak_errors(found, truth, start, offset=0.0)
     peak = np.where(np.isnan(errors.peak_error), -100.0, errors.peak_error) / 100 * errors.peak
@@ -262,7 +262,7 @@ def against_truth(path: Motion, count: int) -> None:
 
 
 def spoilers(path: Motion, count: int) -> None:
-    """Print what spoils the printed method and its repair: noise, the zero error, both."""
+    """Print the errors of the printed method and its correction by noise, zero error, and both."""
     truth = true_peaks(path)
     rows = []
     for label, noise, offset in (

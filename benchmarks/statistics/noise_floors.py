@@ -66,7 +66,7 @@ def free_decay() -> Callable[[Array], Array]:
 
 
 def rotation() -> Callable[[Array], Array]:
-    """Return a rotation that a steady torque keeps up, about 15 rad/s."""
+    """Return a rotation sustained by a steady torque, about 15 rad/s."""
 
     def rate(_: float, y: Array) -> list[float]:
         return [y[1], 1.5 - 0.1 * y[1] - W0**2 * math.sin(y[0])]
@@ -112,7 +112,7 @@ def main() -> None:
 def measured(
     time: Array, theta: Array, counts: int, noise: float, seeds: int
 ) -> tuple[list[str], float]:
-    """Return the columns of a row, and how far the median is off; noise in degrees."""
+    """Return the columns of a row, and the deviation of the median; noise in degrees."""
     count = math.tau / counts
     ratios, errors, said = [], [], ""
     for seed in range(seeds):

@@ -11,21 +11,21 @@ use crate::integrate::{State, Strobe};
 use crate::lanes::{Isa, Job, Lane, dispatch};
 use crate::model::Angle;
 
-/// All regions that capture.
+/// All trapping regions.
 #[derive(Clone, Debug, Default)]
 pub struct Traps {
     /// Around the points of periodic attractors.
     pub ellipses: Vec<Ellipse>,
     /// Around running states.
     pub bands: Vec<Band>,
-    /// Under friction, all that sticks for ever.
+    /// With friction, the states of permanent sticking.
     pub rests: Rests,
 }
 
-/// The sets of states that friction holds for ever: one around each half turn at the most.
+/// The sets of states that friction holds for ever: at most one around each half turn.
 #[derive(Clone, Debug, Default)]
 pub struct Rests {
-    /// Where the angle lives.
+    /// Topology of the angle: circle or line.
     pub angle: Angle,
     /// The index of each set's attractor, by [`Angle::half_turn`].
     pub sets: BTreeMap<i64, usize>,
@@ -39,17 +39,17 @@ impl Rests {
     }
 }
 
-/// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: held
-/// in two periods running, nearer in the second, and within this part of the friction of being
-/// held for ever, it counts as at rest. Held states form a line, on which their map is monotone.
+/// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: if
+/// it is held in two successive periods, nearer in the second, and within this part of the friction
+/// of permanent sticking, it is at rest. Held states form a line, on which their map is monotone.
 const CREEPING: f64 = 0.05;
 
 /// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fate {
-    /// Inside the traps of this attractor for two periods running.
+    /// Inside the traps of this attractor for two successive periods.
     Captured(usize),
-    /// The bound came first.
+    /// The bound was reached first.
     Open,
     /// Left the range of numbers.
     Failed,
@@ -64,7 +64,7 @@ pub struct Outcome {
     pub periods: u32,
     /// Net turns over these periods.
     pub turns: i64,
-    /// The state then, angle in [-pi, pi].
+    /// The state at the end, angle in [-pi, pi].
     pub state: State,
     /// Periods integrated.
     pub work: u32,
@@ -78,9 +78,9 @@ impl Outcome {
     }
 }
 
-/// Where starts come from: an index and a state, until there are none left.
+/// A source of starts: indices and states.
 pub trait Source {
-    /// Number of starts, about.
+    /// Approximate number of starts.
     fn count(&self) -> usize;
     /// The next start.
     fn next(&mut self) -> Option<(usize, State)>;
@@ -151,7 +151,7 @@ struct Tenant {
     first_theta: f64,
     born: u64,
     hit: Option<Hit>,
-    /// When friction held it last, and by how much the load exceeds the friction at its greatest.
+    /// When friction last held it, and by how much the maximum load exceeds the friction.
     held: Option<(u64, f64)>,
 }
 
@@ -259,8 +259,8 @@ impl<'a> Watch<'a> {
         self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0, 1))
     }
 
-    /// Whether `lane` has hit the same attractor, one point on, two periods running; if so its
-    /// outcome has been handed over.
+    /// Whether `lane` has hit the same attractor, one point on, in two successive periods; if so
+    /// its outcome has been delivered.
     #[inline(never)]
     fn captured(&mut self, lane: usize) -> bool {
         let (Some(mut tenant), Some((attractor, point, cycle))) =
@@ -288,8 +288,8 @@ impl<'a> Watch<'a> {
         false
     }
 
-    /// Whether friction holds `lane` for ever, or it creeps to where it will; if so its outcome has
-    /// been handed over.
+    /// Whether friction holds `lane` for ever, or it creeps to such a state; if so its outcome has
+    /// been delivered.
     #[inline(never)]
     fn at_rest(&mut self, lane: usize) -> bool {
         let theta = self.block.held_at[lane] * PI;
@@ -334,7 +334,7 @@ impl<'a> Watch<'a> {
         self.job.source.done(tenant.index, outcome);
     }
 
-    /// Ends the lanes whose bound has come; the number of lanes that stay empty.
+    /// Ends the lanes that have reached their bound; returns the number of lanes that stay empty.
     #[inline(never)]
     fn expire(&mut self, width: usize) -> usize {
         let bound = u64::from(self.job.bound);
@@ -357,7 +357,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Takes off whole turns; the lowest height above the traps' centres.
+/// Removes whole turns; returns the lowest height above the traps' centres.
 struct Heights<'a> {
     angle: Angle,
     block: &'a mut Block,

@@ -14,7 +14,7 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::rotation::Rotation;
 use crate::orbit::symmetry::Mirror;
 
-/// Angles this near to 0 or pi are that.
+/// Angles this near to 0 or pi are set to it.
 const EXACT: f64 = 1e-9;
 
 /// An attractor.
@@ -22,7 +22,7 @@ const EXACT: f64 = 1e-9;
 pub struct Attractor {
     /// Its kind.
     pub kind: Kind,
-    /// Period in forcing periods; `None` where it has no meaning.
+    /// Period in forcing periods; `None` if meaningless.
     pub n: Option<usize>,
     /// Net turns over that period.
     pub w: Option<i64>,
@@ -38,18 +38,18 @@ pub struct Attractor {
     pub period: Option<f64>,
     /// Sense of rotation of a set that has no `w`: 1, -1 or 0.
     pub sense: i64,
-    /// Where its trajectories stay, if no trap tells that.
+    /// The region of its trajectories, if no trap determines membership.
     pub region: Option<Region>,
-    /// A name that stays.
+    /// A reproducible name.
     pub name: String,
-    /// Where its angle lives.
+    /// Topology of its angle.
     pub angle: Angle,
-    /// Its mirror image in the catalogue: itself where it is symmetric.
+    /// Index of its mirror image in the catalogue: its own if symmetric.
     pub twin: Option<usize>,
 }
 
 impl Attractor {
-    /// The attractor of a closed orbit; one that does not attract is described alike.
+    /// The attractor of a periodic orbit; also used to describe one that does not attract.
     #[must_use]
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
@@ -75,7 +75,7 @@ impl Attractor {
         }
     }
 
-    /// All that friction holds for ever around the state `theta`, hanging or upside down.
+    /// The set of states that friction holds for ever around `theta`, hanging or inverted.
     #[must_use]
     pub fn resting(angle: Angle, theta: f64) -> Self {
         Self {
@@ -95,15 +95,15 @@ impl Attractor {
         }
     }
 
-    /// Whether all multipliers lie inside the unit circle; without damping, where none can, whether
-    /// they lie on it as a pair.
+    /// Whether all multipliers lie inside the unit circle; without damping, when this is
+    /// impossible, whether they lie on it as a pair.
     #[must_use]
     pub fn is_stable(&self, pendulum: &Pendulum) -> bool {
         if pendulum.is_dissipative() {
             return self.multipliers.iter().all(|m| m.norm() < 1.0);
         }
         if pendulum.is_autonomous() && self.kind == Kind::Rest {
-            // The bottom of a potential, whose period may be the one that is looked at.
+            // The bottom of a potential, whose period may be the requested one.
             return true;
         }
         self.multipliers.iter().all(|m| m.im != 0.0)
@@ -115,7 +115,7 @@ impl Attractor {
         self.exponent.is_nan()
     }
 
-    /// Whether it is a running state without drive: its period is its own.
+    /// Whether it is a running state without drive, with its own period.
     #[must_use]
     pub fn is_running(&self) -> bool {
         self.kind == Kind::Rotation && self.multipliers.len() == 1
@@ -161,7 +161,7 @@ impl Attractor {
         }
     }
 
-    /// Whether it is a set in whose region these points lie, most of them, and which turns so.
+    /// Whether most of these points lie in its region, and it has this kind of turns.
     #[must_use]
     pub fn keeps(&self, points: &[State], senses: Senses) -> bool {
         let (kind, sense) = senses.kind();
@@ -175,7 +175,7 @@ impl Attractor {
         self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
     }
 
-    /// A key that stays when a catalogue is sorted again: the bits of the first point.
+    /// A key independent of the order of the catalogue: the bits of the first point.
     #[must_use]
     pub fn mark(&self) -> [u64; 2] {
         self.points.first().map_or([0; 2], |p| p.map(f64::to_bits))
@@ -205,7 +205,8 @@ fn mean_angle(states: &[State]) -> f64 {
     states.iter().map(|p| p[0]).sum::<f64>() / states.len().max(1) as f64
 }
 
-/// The angle of a rest: Newton's method leaves hanging and inverted rest at 1e-170, and they are known exactly.
+/// The angle of a rest: Newton's method leaves hanging and inverted rest at 1e-170; they are known
+/// exactly.
 fn balanced(theta: f64) -> f64 {
     match theta {
         hanging if hanging.abs() < EXACT => 0.0,
@@ -214,7 +215,7 @@ fn balanced(theta: f64) -> f64 {
     }
 }
 
-/// The kind of a closed orbit.
+/// The kind of a periodic orbit.
 fn classify(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Kind {
     let [theta, velocity] = orbit.points[0];
     let still = orbit.n == 1 && orbit.w == 0 && velocity.abs() < 1e-9;
@@ -279,7 +280,7 @@ pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attracto
     (sorted, place)
 }
 
-/// The name of attractor `i`, with what tells it from those that share its plain name.
+/// The name of attractor `i`, with a suffix if others share its plain name.
 fn unique(sorted: &[Attractor], plain: &[String], i: usize) -> String {
     let alike: Vec<usize> = (0..plain.len()).filter(|k| plain[*k] == plain[i]).collect();
     if alike.len() == 1 {

@@ -1,8 +1,8 @@
-//! Sets that keep their trajectories without closing: chaotic attractors and quasi-periodic
-//! rotation, told apart from transients that have not ended yet.
+//! Invariant sets that are not periodic: chaotic attractors and quasi-periodic rotation,
+//! distinguished from transients that have not ended yet.
 //!
-//! Each long run is cut into windows, and these form groups; see `groups.rs`. Groups that trajectories
-//! leave for one another only are one set.
+//! Each long run is cut into windows, and these form groups; see `groups.rs`. Groups between which
+//! trajectories move, without leaving them, are one set.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,29 +17,29 @@ use crate::integrate::Strobe;
 use crate::integrate::kernel::stroboscopic::State;
 use crate::model::Angle;
 
-/// Stroboscopic points that are kept as a picture of the set.
+/// Number of stroboscopic points stored as a sample of the set.
 const KEPT: usize = 2000;
-/// Windows of a run.
+/// Number of windows of a run.
 const WINDOWS: usize = 4;
-/// How often runs may go on, or further ones be added, before what is not settled is left out.
+/// How often runs may be extended, or further ones added, before undecided ones are left out.
 const ROUNDS: usize = 16;
-/// Windows that draw the curve of a quasi-periodic set.
+/// Number of windows that trace the curve of a quasi-periodic set.
 const CURVES: usize = 128;
 /// An exponent is positive if it is at least this many standard errors above zero.
 const SIGNIFICANCE: f64 = 4.0;
-/// Least exponent, per period, that counts as positive.
+/// Least exponent, per period, that is accepted as positive.
 const LEAST_EXPONENT: f64 = 1e-3;
-/// Points this near are the same.
+/// Distance within which points are identical.
 const SAME: f64 = 1e-6;
 /// Exponents (per period) within this of zero may belong to quasi-periodic motion.
 const NEUTRAL: f64 = 2e-3;
-/// Such motion turns this often per period at least.
+/// Least number of turns of such motion, per period.
 const LEAST_TURNS: f64 = 0.02;
 
-/// A set of trajectories that share a region and stay there.
+/// A set of trajectories that share a region and never leave it.
 #[derive(Clone, Debug)]
 pub struct ChaoticSet {
-    /// Which chaos, or quasi-periodic rotation.
+    /// Kind of chaos, or quasi-periodic rotation.
     pub kind: Kind,
     /// Sense of its turns: 1, -1, or 0 for both or none.
     pub sense: i64,
@@ -49,9 +49,9 @@ pub struct ChaoticSet {
     pub exponent: f64,
     /// Its standard error over the sampled trajectories.
     pub exponent_stderr: f64,
-    /// Where it lives.
+    /// Topology of its angle.
     pub region: Region,
-    /// For quasi-periodic motion: the band that captures.
+    /// For quasi-periodic motion: the trapping band.
     pub band: Option<Band>,
 }
 
@@ -69,11 +69,11 @@ impl ChaoticSet {
     }
 }
 
-/// Sorts trajectories into the sets that none of them leaves: they are watched from `states` on for
-/// `periods` more.
+/// Sorts trajectories into the sets that none of them leaves: they are observed from `states` on
+/// for `periods` more.
 ///
-/// `captured` says after how many of these periods one of the `traps` took each, if one did. No set is returned
-/// if `cancel` was set.
+/// `captured` gives the number of these periods after which one of the `traps` captured each, if
+/// any did. Returns no set if `cancel` was set.
 #[must_use]
 pub fn sets(
     strobe: &Strobe,
@@ -90,7 +90,7 @@ pub fn sets(
     runs.sets(states, captured).unwrap_or_default()
 }
 
-/// Trajectories that are watched window by window.
+/// Trajectories observed window by window.
 struct Runs<'a> {
     strobe: &'a Strobe,
     traps: &'a Traps,
@@ -98,14 +98,14 @@ struct Runs<'a> {
     length: u32,
     effort: &'a Effort,
     cancel: &'a AtomicBool,
-    /// The windows of each before a trap took it.
+    /// The windows of each before its capture.
     windows: Vec<Vec<Window>>,
-    /// Whether a trap took it.
+    /// Whether a trap captured it.
     captured: Vec<bool>,
 }
 
 impl Runs<'_> {
-    /// The sets of the runs from `states` and of as many further ones as it takes to tell.
+    /// The sets of the runs from `states` and of as many further ones as a decision requires.
     ///
     /// A run whose last group no window follows goes on for a window. A set of fewer than
     /// [`Effort::proved`] runs gets that many more from its own points. Sets that this does not settle within
@@ -152,7 +152,7 @@ impl Runs<'_> {
         Some(())
     }
 
-    /// Watches these runs for another window.
+    /// Observes these runs for another window.
     fn go_on(&mut self, runs: &[usize]) -> Option<()> {
         let last = |run: &usize| self.windows[*run].last()?.points.last().copied();
         let ends: Vec<State> = runs.iter().filter_map(last).collect();
@@ -199,7 +199,7 @@ fn closes(angle: Angle, windows: &[Window], longest: usize) -> bool {
     })
 }
 
-/// The attractor of a set of windows; `None` where it is neither chaotic nor quasi-periodic.
+/// The attractor of a set of windows; `None` if it is neither chaotic nor quasi-periodic.
 fn describe(
     strobe: &Strobe,
     windows: &[&Window],
@@ -230,7 +230,7 @@ fn describe(
         band,
     };
     if mean.abs() < NEUTRAL && windows.iter().all(turning) {
-        // Near a resonance one trajectory takes long to fill the curve; several fill it sooner.
+        // Near a resonance one trajectory fills the curve slowly; several fill it sooner.
         let curve: Vec<State> =
             windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
         let band = Band::around(strobe, &curve, 0)?;
@@ -245,7 +245,7 @@ fn describe(
     Some(found(kind, sense, mean, None))
 }
 
-/// `most` of the points at equal distances in their list, or all.
+/// At most `most` of the points, equally spaced in their list.
 pub(crate) fn spread(points: &[State], most: usize) -> Vec<State> {
     let count = most.min(points.len());
     (0..count).map(|k| points[k * points.len() / count]).collect()
@@ -286,7 +286,7 @@ fn exponents(
     Some(growth.iter().map(|g| g / periods.max(1) as f64).collect())
 }
 
-/// Mean and standard error of values that do not depend on one another.
+/// Mean and standard error of independent values.
 pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;

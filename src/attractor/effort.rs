@@ -4,39 +4,41 @@
 /// thousand pendulums.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Whether orbits are polished on the precise map, to rounding of the exact motion. Else they are
-    /// orbits of the steps that the trajectories take, as far from the exact ones as those err.
+    /// Whether orbits are refined on the precise map, to rounding of the exact motion. Otherwise
+    /// they are orbits of the integration steps, with the error of these.
     pub precise: bool,
-    /// Longest cycle that is looked for, in forcing periods.
+    /// Longest cycle that is sought, in forcing periods.
     pub longest_cycle: usize,
-    /// Periods before the first cycle test; each later round is twice as long as the one before.
+    /// Periods before the first cycle test; each later round is twice as long as the preceding one.
     pub first_round: u32,
-    /// Failures of Newton's method after which a round gives up.
+    /// Failures of Newton's method after which a round ends.
     pub tries: usize,
-    /// Number of uncaptured trajectories that are watched.
+    /// Number of uncaptured trajectories that are observed.
     pub watched: usize,
-    /// Trajectories that nothing has captured are watched for this many times the first bound more.
+    /// Uncaptured trajectories are observed for this multiple of the first bound.
     pub watch: u32,
-    /// Runs that a chaotic set needs; where fewer have come to it, more runs from its points must stay.
+    /// Runs that a chaotic set requires; if fewer have reached it, more runs from its points must
+    /// stay.
     pub proved: usize,
-    /// Cells around the circle of the region of a set: few enough for its points to fill what it visits.
+    /// Cells around the circle of a set's region: few enough for its points to fill the visited
+    /// part.
     pub cells: usize,
-    /// How far traps reach.
+    /// Extent of traps.
     pub trap: Sampling,
 }
 
-/// How the reach of an ellipse is sampled.
+/// Sampling of the extent of an ellipse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Points of a cycle that get an ellipse: a trajectory passes there once a cycle.
+    /// Points of a cycle that get an ellipse: a trajectory passes each once a cycle.
     pub points: usize,
     /// Directions.
     pub rays: usize,
-    /// Levels, each `ratio` of the one before in radius.
+    /// Levels, each `ratio` of the preceding one in radius.
     pub levels: usize,
     /// Ratio of the radii of successive levels.
     pub ratio: f64,
-    /// Number of further sets of as many levels, where all levels before were too wide.
+    /// Number of further sets of as many levels if all preceding levels were too wide.
     pub rounds: usize,
     /// Number of returns within which a sample must become lower.
     pub returns: usize,

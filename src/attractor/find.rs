@@ -16,30 +16,30 @@ use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
 use crate::orbit::symmetry::Mirror;
 
-/// Newton's method may not wander further than this from where the trajectory was.
+/// Largest distance of Newton's method from the trajectory's state.
 pub(super) const REACH: f64 = 0.3;
-/// Points nearer than this are of one orbit.
+/// Distance within which points belong to one orbit.
 pub(super) const SAME: f64 = 1e-6;
 
 /// How a start of a search ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
-    /// Nothing has captured it.
+    /// No trap has captured it.
     Open(State),
     /// On the attractor with this [`Attractor::mark`].
     Captured([u64; 2]),
-    /// Left the range of numbers, or gains speed for ever.
+    /// Left the range of numbers, or accelerates without bound.
     Failed,
 }
 
-/// The results of a search so far.
+/// The results of a search.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     /// The attractors, sorted and named.
     pub attractors: Vec<Attractor>,
-    /// The regions that capture; indices are those of `attractors`.
+    /// The trapping regions; indices are those of `attractors`.
     pub traps: Traps,
-    /// Longest time to capture that the searches saw, in periods.
+    /// Longest time to capture in the searches, in periods.
     pub longest_settle: u32,
     pub(super) effort: Effort,
     pub(super) orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
@@ -84,9 +84,9 @@ impl Catalogue {
     /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
     /// found to close on a new one, or `bound` periods are over.
     ///
-    /// The remaining trajectories are watched for a multiple of `bound` ([`Effort::watch`]). If then still
-    /// none of a set of them has been captured and their exponent is positive, the set is a chaotic
-    /// attractor; else they stay undecided. Returns how each start ended.
+    /// The remaining trajectories are observed for a multiple of `bound` ([`Effort::watch`]). If
+    /// none of a set of them has been captured by then and their exponent is positive, the set is a
+    /// chaotic attractor; else they stay undecided. Returns how each start ended.
     pub fn endings(
         &mut self,
         strobe: &Strobe,
@@ -125,8 +125,8 @@ impl Catalogue {
         endings
     }
 
-    /// Newton's method from points of orbits of a pendulum that is nearly this one, each with its period;
-    /// those from which it finds no orbit that attracts come back.
+    /// Newton's method from points of orbits of a similar pendulum, each with its period; returns
+    /// those from which no attracting orbit is found.
     pub fn take_over(
         &mut self,
         strobe: &Strobe,
@@ -149,7 +149,7 @@ impl Catalogue {
         left
     }
 
-    /// The map that orbits close under.
+    /// The map of which orbits are periodic points.
     pub(super) fn map(&self, strobe: &Strobe) -> PoincareMap {
         if self.effort.precise {
             PoincareMap::new(&strobe.pendulum)
@@ -188,7 +188,7 @@ impl Catalogue {
         }
     }
 
-    /// Looks for cycles that the trajectories close in on; whether a new one was found.
+    /// Tests the trajectories for convergence to cycles; returns whether a new one was found.
     ///
     /// The closest returns are tried first: those that have converged come before the chance
     /// returns of chaos, of which only a few are tried.
@@ -227,7 +227,7 @@ impl Catalogue {
         !found.is_empty()
     }
 
-    /// Takes an orbit and its mirror image, if they can be trapped, and returns their traps.
+    /// Accepts an orbit and its mirror image if they can be trapped, and returns their traps.
     pub(super) fn admit(
         &mut self,
         strobe: &Strobe,
@@ -236,8 +236,8 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> Vec<Ellipse> {
         let own = ellipses(strobe, &orbit, &self.effort.trap, cancel);
-        // One that no trap holds is there all the same: in a brisk search it is listed, and what comes
-        // near it is placed by Newton's method.
+        // An orbit without a trap exists all the same: a brisk search lists it, and assigns
+        // trajectories near it by Newton's method.
         if own.is_empty() && self.effort.precise {
             return own;
         }
@@ -255,7 +255,7 @@ impl Catalogue {
         traps
     }
 
-    /// Attractors and traps anew from orbits, rotations and sets.
+    /// Rebuilds attractors and traps from orbits, rotations and sets.
     pub(super) fn rebuild(&mut self, pendulum: &Pendulum) {
         let mut all: Vec<Attractor> =
             self.orbits.iter().map(|(o, _)| Attractor::periodic(pendulum, o)).collect();
@@ -282,7 +282,7 @@ impl Catalogue {
         self.traps = traps;
     }
 
-    /// Whether this orbit attracts and is none of those found.
+    /// Whether this orbit attracts and is not yet known.
     pub(super) fn attracts_anew(&self, strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
         attracts(strobe, orbit) && !self.knows(orbit)
     }
@@ -299,7 +299,7 @@ fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
     orbit.is_stable() && !(strobe.friction && orbit.points.iter().any(held))
 }
 
-/// The states that nothing has captured.
+/// The states of uncaptured trajectories.
 pub(super) fn open(endings: &[Ending]) -> Vec<State> {
     let state = |ending: &Ending| match ending {
         Ending::Open(state) => Some(*state),

@@ -1,13 +1,13 @@
-//! Groups of windows of long runs, and where runs go from them.
+//! Groups of windows of long runs, and the transitions of runs between them.
 //!
-//! Windows that turn alike and whose regions meet form a group. Groups that runs leave for one another
-//! only are a class: what a set is told by. A group that a run leaves for good, for another group or for a
-//! trap, is a transient.
+//! Windows with equal turns whose regions meet form a group. Groups between which runs move,
+//! without leaving them, are a class, which identifies a set. A group that a run leaves for good,
+//! for another group or for a trap, is a transient.
 
 use super::long_runs::{Senses, Window};
 use super::region::Region;
 
-/// Windows that turn alike in regions that meet, and where trajectories go from them.
+/// Windows with equal turns in regions that meet, and the transitions between them.
 pub(super) struct Groups {
     /// The group of every window of every run.
     of: Vec<Vec<usize>>,
@@ -59,14 +59,14 @@ impl Groups {
         Self { of, next }
     }
 
-    /// The runs that end in a group that no window follows.
+    /// The runs that end in a group without a following window.
     pub(super) fn without_next(&self) -> Vec<usize> {
         let unknown =
             |run: &usize| self.of[*run].last().is_some_and(|group| self.next[*group].is_empty());
         (0..self.of.len()).filter(unknown).collect()
     }
 
-    /// The groups that trajectories leave for one another only, and stay in.
+    /// The groups between which trajectories move without leaving them.
     pub(super) fn classes(&self) -> Vec<Vec<usize>> {
         let mut classes: Vec<Vec<usize>> = Vec::new();
         let mut used: Vec<usize> = self.of.iter().flatten().copied().collect();
@@ -82,7 +82,7 @@ impl Groups {
         classes
     }
 
-    /// The groups that trajectories come to from this one, sorted; `None` if a trap is among them.
+    /// The groups reachable from this one, sorted; `None` if a trap is among them.
     fn reached(&self, group: usize) -> Option<Vec<usize>> {
         let mut reached: Vec<usize> = Vec::new();
         let mut from = vec![group];

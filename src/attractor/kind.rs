@@ -5,24 +5,24 @@
 pub enum Kind {
     /// Hanging at rest.
     Rest,
-    /// Standing on its head.
+    /// Inverted rest.
     InvertedRest,
     /// Periodic without net turns.
     Oscillation,
     /// Periodic with net turns.
     Rotation,
-    /// Running on without closing: a closed curve of the stroboscopic map.
+    /// Quasi-periodic: a closed curve of the stroboscopic map.
     QuasiperiodicRotation,
-    /// Chaos that never goes over the top.
+    /// Chaos that never passes the top.
     LibrationChaos,
-    /// Chaos that goes over the top in one sense only.
+    /// Chaos that passes the top in one sense only.
     RotatingChaos,
     /// Chaos with turns in both senses.
     TumblingChaos,
 }
 
 impl Kind {
-    /// The word in files.
+    /// The name in files.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

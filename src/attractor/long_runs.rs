@@ -1,5 +1,4 @@
-//! Long runs of trajectories that nothing has captured, window by window: where they are and which way
-//! they turn.
+//! Long runs of uncaptured trajectories, window by window: visited regions and senses of turns.
 
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,13 +8,13 @@ use super::region::Region;
 use crate::integrate::kernel::block::Block;
 use crate::integrate::{State, Strobe};
 
-/// Passages over the top, looked for at every step.
+/// Passages over the top, detected at every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Senses {
     /// Whether it went over the top at all.
     pub passes: bool,
-    /// Whether it went over the top twice running backward, and forward: over and back at once is no
-    /// turn.
+    /// Whether it passed the top twice in succession backward, and forward: over and back at once
+    /// is no turn.
     pub turns: [bool; 2],
 }
 
@@ -30,9 +29,9 @@ impl Senses {
         }
     }
 
-    /// The kind of chaos that turns so, and its sense: 1, -1, or 0 for both or none.
+    /// The kind of chaos with these turns, and its sense: 1, -1, or 0 for both or none.
     ///
-    /// Motion that goes over the top and never twice in one sense tumbles.
+    /// Motion that passes the top and never twice in succession in one sense is tumbling.
     #[must_use]
     pub fn kind(self) -> (Kind, i64) {
         match self.turns {
@@ -47,9 +46,9 @@ impl Senses {
 /// The behaviour of a trajectory over a number of periods.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// Where its stroboscopic points lie.
+    /// The region of its stroboscopic points.
     pub region: Region,
-    /// Which way it turns.
+    /// Its passages over the top.
     pub senses: Senses,
     /// Its stroboscopic points.
     pub points: Vec<State>,
@@ -57,12 +56,12 @@ pub struct Window {
     pub turns: f64,
 }
 
-/// How a run is cut into windows.
+/// Division of a run into windows.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
-    /// Windows of a trajectory.
+    /// Windows per trajectory.
     pub windows: usize,
-    /// Periods of a window.
+    /// Periods per window.
     pub length: usize,
     /// Cells of a region around the circle.
     pub side: usize,

@@ -1,4 +1,4 @@
-//! Which attractor a trajectory belongs to that no trap has captured.
+//! Assignment of uncaptured trajectories to attractors.
 
 use std::sync::atomic::AtomicBool;
 
@@ -9,11 +9,11 @@ use super::near_returns::{nearest_return, tracks};
 use crate::integrate::{State, Strobe};
 use crate::orbit::newton;
 
-/// Stroboscopic points that tell on which set a trajectory stays.
+/// Number of stroboscopic points that determine the set of a trajectory.
 const LAST_POINTS: usize = 64;
 
 impl Catalogue {
-    /// The index of the one chaotic attractor, if there is no other attractor at all.
+    /// The index of the only chaotic attractor, if there is no other attractor.
     #[must_use]
     pub fn only_chaos(&self) -> Option<usize> {
         match self.attractors.as_slice() {
@@ -22,14 +22,14 @@ impl Catalogue {
         }
     }
 
-    /// Whether some attractor can be told only by where its trajectories stay.
+    /// Whether some attractor is identified only by the region of its trajectories.
     #[must_use]
     pub fn has_chaos(&self) -> bool {
         self.attractors.iter().any(|a| a.kind.is_chaotic())
     }
 
-    /// The attractors that open trajectories belong to, where Newton's method from a near return leads to
-    /// a known orbit, or the region of a known set holds the last points.
+    /// The attractors of open trajectories, if Newton's method from a near return leads to a known
+    /// orbit, or the region of a known set contains the last points.
     #[must_use]
     pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
         let map = self.map(strobe);
@@ -56,8 +56,8 @@ impl Catalogue {
         open.len() == endings.len() && self.homes(strobe, &open).iter().all(Option::is_some)
     }
 
-    /// The chaotic attractors that open trajectories stay on, by their next stroboscopic points and the way they
-    /// turn over these.
+    /// The chaotic attractors of open trajectories, by their next stroboscopic points and the sense
+    /// of their turns.
     #[must_use]
     pub fn homes(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
         if !self.has_chaos() {

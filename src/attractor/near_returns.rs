@@ -1,4 +1,4 @@
-//! Near returns of trajectories: where a cycle may be.
+//! Near returns of trajectories: candidates for cycles.
 
 use std::cmp::Ordering;
 
@@ -6,7 +6,7 @@ use crate::integrate::{State, Strobe};
 use crate::model::effects::Action;
 use crate::model::{Angle, Effect, Pendulum};
 
-/// Stroboscopic points that come back this near are taken to Newton's method.
+/// Distance below which the return of a stroboscopic point is tried by Newton's method.
 const NEAR: f64 = 0.03;
 /// Multiple of the rates of drive and gravity above which no resonance with either can hold a rotation.
 const ESCAPE: f64 = 10.0;
@@ -15,17 +15,17 @@ const ESCAPE: f64 = 10.0;
 /// its period, and one that stays on an orbit that repels after any number.
 const TRIED: usize = 3;
 
-/// A near return: how near, the state, after how many periods.
+/// A near return: distance, state, number of periods.
 pub(super) type Return = (f64, State, usize);
 
-/// The near returns of all trajectories, the nearest first, and of each the nearest few.
+/// The near returns of all trajectories, nearest first, and of each the nearest few.
 ///
 /// Converged trajectories come before the chance returns of chaos.
 pub(super) fn near_returns(strobe: &Strobe, alive: &[State], longest: usize) -> Vec<Return> {
     let mut returns: Vec<Return> = Vec::new();
     for track in tracks(strobe, alive, longest) {
         if strobe.friction && track.iter().all(|state| state[1] == 0.0) {
-            // Held at every period's end: no orbit, and every n would fit.
+            // Held at every period's end: no orbit, and every n would match.
             continue;
         }
         let mut own: Vec<Return> = returns_of(strobe.angle, &track, longest).collect();
@@ -50,9 +50,8 @@ fn returns_of(angle: Angle, track: &[State], longest: usize) -> impl Iterator<It
     (1..=longest).map(near).filter(|r| r.0 < NEAR)
 }
 
-/// The speed at which nothing holds a rotation back any more: where the torque is greater than all
-/// friction and nothing grows with the velocity, faster motions gain speed for ever. Infinite
-/// otherwise.
+/// The speed above which rotation is not limited: if the torque exceeds all friction and nothing
+/// grows with the velocity, faster motions accelerate for ever. Infinite otherwise.
 pub(super) fn escape_speed(pendulum: &Pendulum) -> f64 {
     let constant = |e: &Effect| {
         !e.is(&[Action::Velocity, Action::Kinked, Action::SlidingFriction, Action::LoadedFriction])
@@ -66,7 +65,7 @@ pub(super) fn escape_speed(pendulum: &Pendulum) -> f64 {
     ESCAPE * (pendulum.motion().omega + pendulum.greatest_pull().sqrt())
 }
 
-/// The next stroboscopic points of each trajectory, its own first.
+/// The next stroboscopic points of each trajectory, starting with its own.
 pub(super) fn tracks(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Vec<State>> {
     let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
     let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();

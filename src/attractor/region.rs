@@ -1,4 +1,4 @@
-//! Which part of the plane a set of stroboscopic points visits.
+//! The part of the plane visited by a set of stroboscopic points.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -9,7 +9,7 @@ use crate::model::{Angle, Pendulum};
 /// Two regions that share more than this part of the smaller one's cells meet.
 const SHARED: f64 = 0.2;
 
-/// Cells of equal size that stroboscopic points lie in.
+/// Cells of equal size that contain stroboscopic points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     cells: BTreeSet<[i32; 2]>,
@@ -38,7 +38,7 @@ impl Region {
 
     fn cell(&self, [theta, velocity]: State) -> [i32; 2] {
         let column = self.column((theta * self.scale[0] + 0.5).floor() as i32);
-        // The conversion saturates where a motion has left all bounds.
+        // The conversion saturates for a motion that diverges.
         [column, (velocity * self.scale[1] + 0.5).floor() as i32]
     }
 
@@ -46,7 +46,7 @@ impl Region {
         if self.angle == Angle::Circle { column.rem_euclid(self.side) } else { column }
     }
 
-    /// Where its angles live.
+    /// Topology of its angles.
     #[must_use]
     pub fn angle(&self) -> Angle {
         self.angle

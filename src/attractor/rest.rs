@@ -4,11 +4,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::model::{Angle, Equation, Pendulum};
 
-/// Angles at which a set is looked for where it has no closed form.
+/// Number of angles at which a set without closed form is sought.
 const ANGLES: usize = 720;
-/// On the line sets are looked for this many half turns away, at the most.
+/// Largest number of half turns from 0 at which sets on the line are sought.
 const MOST_HALF_TURNS: i32 = 1000;
-/// An angle this near to 0 or pi is that.
+/// An angle this near to 0 or pi is set to it.
 const NEAR: f64 = 1e-6;
 
 /// The angle in the middle of each set at rest, hanging and upside down: where the load at its

@@ -1,5 +1,5 @@
-//! Stable orbits of few periods that no trajectory has come to: what a basin is too small for a few
-//! starts to hit.
+//! Stable orbits of few periods not reached by any trajectory, since their basins are too small for
+//! a few starts to hit.
 
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,9 +15,9 @@ const LONGEST: usize = 4;
 const SIDE: usize = 64;
 /// Starts from which Newton's method is tried, for each period.
 const TRIED: usize = 16;
-/// Orbits that are looked for from one start.
+/// Number of orbits sought from one start.
 const BESIDE: usize = 3;
-/// The grid reaches so much further than the fastest point of what was seen.
+/// Factor by which the grid exceeds the largest velocity observed.
 const MARGIN: f64 = 1.1;
 
 impl Catalogue {
@@ -36,7 +36,7 @@ impl Catalogue {
         let fastest = MARGIN * reach(1);
         let map = self.map(strobe);
         let known = self.orbits.len();
-        // Repelled by all that was met: a stable orbit lies next to the one that it was born with.
+        // Repelled by all orbits met: a stable orbit is next to the one it was created with.
         let mut met: Vec<State> = Vec::new();
         for (starts, n) in least_gaps(strobe, [widest, fastest]).iter().zip(1..) {
             for start in starts.iter().take(TRIED) {
@@ -84,7 +84,7 @@ fn least_gaps(strobe: &Strobe, [widest, fastest]: State) -> [Vec<State>; LONGEST
             rows.flat_map(|b| [SIDE - 1, 0, 1].map(|a| b * SIDE + (i + a) % SIDE))
                 .all(|other| gap[*k] <= gap[other])
         };
-        // Of mirror images one will do.
+        // Of mirror images one is sufficient.
         let count = if symmetric { starts.len() / 2 } else { starts.len() };
         let mut least: Vec<usize> = (0..count).filter(lowest).collect();
         least.sort_by(|a, b| gap[*a].total_cmp(&gap[*b]));

@@ -1,11 +1,11 @@
-//! Regions that nothing leaves: a trajectory inside one has been captured.
+//! Trapping regions: a trajectory inside one is captured by its attractor.
 //!
 //! Around a point of a periodic attractor with monodromy `M` and spectral radius `rho` the discrete
-//! Lyapunov equation `M^T S M / r^2 - S = -I`, `rho < r < 1`, gives an ellipse `x^T S x <= level` that
-//! `M` shrinks by `r` at least. A circle will not do: rotations grow threefold before they shrink.
-//! With `r = 1` the ellipse of an orbit that first grows much would shrink too little to be told from
-//! rounding. How far the ellipse reaches in the nonlinear
-//! map is sampled: the largest level such that every sample within it comes back lower.
+//! Lyapunov equation `M^T S M / r^2 - S = -I`, `rho < r < 1`, gives an ellipse `x^T S x <= level`
+//! that `M` shrinks by `r` at least. A circle is insufficient: rotations grow threefold before they
+//! shrink. With `r = 1` the ellipse of an orbit with large initial growth would shrink too little
+//! to be distinguished from rounding. The extent of the ellipse in the nonlinear map is sampled:
+//! the largest level such that every sample within it comes back lower.
 
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -43,22 +43,22 @@ impl Ellipse {
     }
 }
 
-/// Half widths of a band that are sampled, each `RATIO` of the one before.
+/// Sampled half widths of a band, each `RATIO` of the preceding one.
 const LEVELS: usize = 54;
 const RATIO: f64 = 0.82;
-/// Part of the linear shrinking that the nonlinear map must have.
+/// Least contraction of the nonlinear map, as a part of the linear one.
 const LEFT: f64 = 0.2;
-/// Ellipses need not shrink faster than this, however strong the damping.
+/// Ellipses need not contract faster than this, however strong the damping.
 const LEAST_SHRINK: f64 = 0.3;
 /// Samples of a band must come back lower by this factor.
 const BAND_LOWER: f64 = 0.999;
 /// The part of the sampled radius that is used.
 const MARGIN: f64 = 0.9;
 
-/// The ellipses of the points of `orbit`, empty where sampling finds no level that is safe or
-/// `cancel` was set.
+/// The ellipses of the points of `orbit`; empty if sampling finds no safe level or `cancel` was
+/// set.
 ///
-/// Ellipses that cross `theta = pi` stand a second time, one turn on.
+/// Ellipses that cross `theta = pi` are included twice, one turn apart.
 #[must_use]
 pub fn ellipses(
     strobe: &Strobe,
@@ -178,7 +178,7 @@ fn safe_radius(
     best
 }
 
-/// A band around a running state: a curve `v = g(theta)` that trajectories close in on.
+/// A band around a running state: a curve `v = g(theta)` that attracts trajectories.
 #[derive(Clone, Debug)]
 pub struct Band {
     /// `g` at the centres of equal cells of [-pi, pi).
@@ -216,11 +216,11 @@ impl Band {
         Self { curve: self.curve.iter().rev().map(|v| -v).collect(), ..*self }
     }
 
-    /// The band around states `curve` of a running state, `None` where no sampled width is safe.
+    /// The band around states `curve` of a running state, `None` if no sampled width is safe.
     #[must_use]
     pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
         if strobe.angle == Angle::Line {
-            // A trajectory that turns for ever there never comes back.
+            // A trajectory that rotates for ever there never returns.
             return None;
         }
         let curve = tabulate(states)?;
@@ -262,7 +262,7 @@ impl Band {
     }
 }
 
-/// `g` from states on the curve; `None` if they do not make a single-valued curve all round.
+/// `g` from states on the curve; `None` if they do not form a single-valued closed curve.
 fn tabulate(states: &[State]) -> Option<Vec<f64>> {
     let mut sorted: Vec<State> = states.iter().map(|s| [wrapped(s[0]), s[1]]).collect();
     sorted.sort_by(|a, b| a[0].total_cmp(&b[0]));

@@ -1,4 +1,4 @@
-//! Trajectories that no trap has captured: chaotic, or not yet settled.
+//! Uncaptured trajectories: chaotic, or not yet settled.
 
 use std::sync::atomic::AtomicBool;
 
@@ -8,17 +8,17 @@ use super::find::{Catalogue, Ending};
 use super::kind::Kind;
 use crate::integrate::{State, Strobe};
 
-/// Power of e by which damping must shrink a free motion before uncaptured trajectories can count as
-/// chaotic.
+/// Power of e by which damping must shrink a free motion before uncaptured trajectories can be
+/// classified as chaotic.
 const LEAST_DECAY: f64 = 20.0;
 
-/// Periods for which chaos is watched where another attractor could end it.
+/// Periods of observation of chaos that another attractor could end.
 const LONG: u32 = 5000;
 
 impl Catalogue {
     /// Decides which uncaptured trajectories are chaotic.
     ///
-    /// Watched trajectories are left where watching ends.
+    /// Observed trajectories are set to their final states.
     pub(super) fn watch(
         &mut self,
         strobe: &Strobe,
@@ -59,7 +59,7 @@ impl Catalogue {
         }
         let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
         if self.find_short_cycles(strobe, &points, cancel) {
-            // A trajectory taken for chaotic may end there.
+            // A trajectory classified as chaotic may end there.
             return self.watch(strobe, endings, bound, cancel);
         }
         let symmetric = strobe.pendulum.is_mirror_symmetric();
@@ -78,10 +78,10 @@ impl Catalogue {
         self.rebuild(&strobe.pendulum);
     }
 
-    /// Whether what was taken for chaos beside another attractor is no way to it.
+    /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.
     ///
-    /// Such transients are long: the set is watched for [`LONG`] periods from some of its points, or until one
-    /// run ends.
+    /// Such transients are long: the set is observed for [`LONG`] periods from some of its points,
+    /// or until one run ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
         if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
             return true;

@@ -20,7 +20,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Takes what stands in the rows of a window that count; `places` are its columns' parameters.
+    /// Adds the rows of a window with nonzero weight; `places` are its columns' parameters.
     #[must_use]
     pub fn new(linear: &Linear, places: Vec<usize>) -> Self {
         let (count, width) = (places.len(), linear.width);
@@ -56,8 +56,8 @@ impl Block {
         all.qr().r()
     }
 
-    /// Whether the triangle says nothing about each direction of the initial state, as while the
-    /// pendulum is stuck.
+    /// Whether the triangle determines no direction of the initial state, as while the pendulum is
+    /// stuck.
     #[must_use]
     pub fn blind(triangle: &DMatrix<f64>) -> [bool; STATE] {
         let sizes = [0, 1].map(|k| triangle.column(k).norm());

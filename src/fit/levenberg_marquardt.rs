@@ -9,11 +9,11 @@ use super::step_scale::StepScale;
 use super::window::Window;
 use crate::error::Error;
 
-/// The first damping that is tried after a step that failed.
+/// The first damping tried after a step that failed.
 const FIRST_DAMPING: f64 = 1e-4;
 /// Factor of the damping after a failure; after a good step it falls by the square of that.
 const GROWTH: f64 = 8.0;
-/// Part of the predicted gain above which a step counts as good.
+/// Part of the predicted gain above which a step is good.
 const FAIR: f64 = 0.25;
 /// Part of the predicted gain above which no other scale is tried.
 const KEPT: f64 = 0.75;
@@ -54,19 +54,20 @@ impl Point {
         Ok(Self { values, windows, normal, in_vain: 0.0 })
     }
 
-    /// The samples that count, less the parameters and initial states that were adapted to them.
+    /// The number of samples with nonzero weight, less that of parameters and initial states
+    /// adapted to them.
     #[must_use]
     pub fn degrees(&self, problem: &Problem) -> usize {
         problem.samples().saturating_sub(self.values.len() + 2 * self.windows.len())
     }
 
-    /// How far each parameter may go.
+    /// The bounds of each parameter.
     fn ends(&self, problem: &Problem) -> Vec<[f64; 2]> {
         let both = self.values.iter().zip(&problem.ranges);
         both.map(|(value, [low, high])| [(low - value).min(0.0), (high - value).max(0.0)]).collect()
     }
 
-    /// The point a step further; none where it cannot be.
+    /// The point after a step; none if it cannot be computed.
     #[must_use]
     pub fn moved(&self, problem: &Problem, step: &Step) -> Option<Self> {
         self.gone(problem, step, |_| StepScale::Linear)
@@ -93,8 +94,9 @@ impl Point {
         Self::new(problem, values, windows).ok()
     }
 
-    /// The point a step further if it is lower, and how many were tried: straight; where that leads
-    /// less far down than it promised in ratios too, all else following the widths.
+    /// The point after a step if it is lower, and the number of points tried: a linear step; if
+    /// that gains less than predicted, a logarithmic one too, with all other parameters following
+    /// the widths.
     fn lower(
         &mut self,
         problem: &Problem,
@@ -132,7 +134,7 @@ impl Point {
         (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
     }
 
-    /// The point to which all but `held` follows, and how many were tried, while steps gain `enough`.
+    /// The point to which all but `held` follows, and the number tried, while steps gain `enough`.
     ///
     /// A step that is too long for the widths leads up only because sizes and initial states, which
     /// go with them nearly linearly, are not yet those of the new widths.
@@ -151,14 +153,14 @@ impl Point {
     }
 }
 
-/// The end of a descent.
+/// The criteria for the end of a descent.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit {
     /// Predicted gain of the next step in the sum of squares at which the descent ends.
     pub gain: f64,
     /// Part of the sum of squares that a gain must exceed for the descent to go on.
     pub part: f64,
-    /// The most steps.
+    /// Largest number of steps.
     pub steps: usize,
     /// The sum of squares to be reached: a descent that cannot come near it is given up; infinite where
     /// every descent is worth it.
@@ -168,15 +170,15 @@ pub struct Limit {
 /// How a descent ended.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Points at which the equations were set up.
+    /// Number of points at which the equations were set up.
     pub steps: usize,
-    /// Whether the limit was reached, or no step leads further down.
+    /// Whether the limit was reached, or no step decreases the sum further.
     pub converged: bool,
-    /// Whether it was given up: it leads nowhere near [`Limit::target`].
+    /// Whether it was given up, as it cannot come near [`Limit::target`].
     pub given_up: bool,
 }
 
-/// Goes down from `point`, parameters `held` kept where they are.
+/// Descends from `point`, with the parameters `held` fixed.
 ///
 /// # Errors
 /// [`Error::Interrupted`] when `cancel` is set.

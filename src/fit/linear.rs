@@ -15,13 +15,13 @@ use crate::lanes::pack::Bundle;
 use crate::lanes::{Lane, Real};
 use crate::model::{Observation, Pendulum};
 
-/// The most derivatives that one pass carries.
+/// Largest number of derivatives in one pass.
 const WIDEST: usize = 16;
 /// A trial that needs more steps than this, and than that in a unit of time, is far off: it is given
 /// up. Ten in a unit of time are common.
 const MOST_STEPS: usize = 1000;
 const MOST_STEPS_A_TIME: f64 = 50.0;
-/// The quickest rate of a mode that a motion is followed with.
+/// The largest rate of a mode that is integrated.
 const QUICKEST: f64 = 10.0;
 /// The free parameters of a reading, angle and velocity.
 const READINGS: usize = MOST_READINGS + 2;
@@ -31,9 +31,9 @@ const READINGS: usize = MOST_READINGS + 2;
 pub struct Linear {
     /// Angle, not wrapped, and velocity at each sample.
     pub states: Vec<State>,
-    /// Reading less model; 0 where a sample does not count.
+    /// Reading less model; 0 if a sample has no weight.
     pub apart: Vec<f64>,
-    /// Residuals over the standard error; of a reading rounded to counts, [`Likelihood::residual`].
+    /// Residuals over the standard error; for readings rounded to counts, [`Likelihood::residual`].
     pub residuals: Vec<f64>,
     /// One over the standard error, or [`Likelihood::weight`]; 0 where a sample does not count.
     pub weights: Vec<f64>,
@@ -55,8 +55,9 @@ impl Linear {
         &self.rows[sample * self.width..(sample + 1) * self.width]
     }
 
-    /// Residuals whose noise is white and of unit variance. Of counts, what a reading says varies from
-    /// next to nothing to all: the slopes of the likelihood over the root of their mean square.
+    /// Residuals whose noise is white and of unit variance. The information of counts varies from
+    /// almost none to all: for them, the slopes of the likelihood over the root of their mean
+    /// square.
     #[must_use]
     pub fn white(&self) -> Vec<f64> {
         if !self.counted {
@@ -69,7 +70,7 @@ impl Linear {
     }
 }
 
-/// Follows `window` with the pendulum of its record.
+/// Integrates `window` with the pendulum of its record.
 #[must_use]
 pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: &Window) -> Linear {
     let directions = columns.motion.len() + 2;
@@ -86,7 +87,7 @@ pub fn linearise(problem: &Problem, shaped: &Shaped, columns: &Columns, window: 
     let mut first = 0;
     while first < directions {
         let left = directions - first;
-        // The narrowest numbers that hold the remaining derivatives.
+        // The smallest number type that holds the remaining derivatives.
         match register {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Register::Avx512(isa) => match left {
@@ -152,7 +153,7 @@ impl Follow<'_> {
             ode = ode.driven_by(Arc::clone(recorded));
         }
         let times = &record.times[self.window.from..self.window.to];
-        // A mode of the rig needs short steps, however slow the pendulum is.
+        // A mode of the rig requires short steps, however slow the pendulum is.
         let rate = if ode.field().sways() { rate.min(QUICKEST) } else { 1.0 };
         let rate = rate.max(pendulum.motion().omega);
         let most =

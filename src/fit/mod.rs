@@ -2,7 +2,7 @@
 //!
 //! - [`record`]: a record of one motion
 //! - [`problem`]: records, and which parameters of their pendulums are free
-//! - [`rod_sensor`]: what a gyroscope or an accelerometer on the rod reads of a motion
+//! - [`rod_sensor`]: readings of a gyroscope or an accelerometer on the rod
 //! - [`window`]: a record cut into windows, each with its own initial state
 //! - [`quantised`]: the likelihood of readings rounded to counts
 //! - [`linear`]: residuals of a window and their derivatives

@@ -2,9 +2,9 @@
 //!
 //! A window's derivatives by its initial state, by the parameters, and its residuals are columns
 //! `[S J r]` that an orthogonal transformation makes triangular (Householder). The first two rows
-//! then say what the initial state is, the others what the parameters alone obey: their `J~' J~` is
-//! `R = J' J - C' D^-1 C` of the normal equations (the Schur complement, `C = S' J`, `D = S' S`),
-//! without the loss of digits that the difference has where motions are chaotic.
+//! then determine the initial state, the others are equations of the parameters alone: their `J~'
+//! J~` is `R = J' J - C' D^-1 C` of the normal equations (the Schur complement, `C = S' J`, `D = S'
+//! S`), without the cancellation in the difference if motions are chaotic.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
@@ -62,9 +62,9 @@ pub struct Normal {
     pub parts: Vec<f64>,
     /// For each window the states at its samples.
     pub states: Vec<Vec<State>>,
-    /// For each window the residuals over the standard errors.
+    /// The residuals of each window over the standard errors.
     pub residuals: Vec<Vec<f64>>,
-    /// For each window reading less model.
+    /// Reading less model for each window.
     pub apart: Vec<Vec<f64>>,
     /// For each window what [`Linear::white`] makes of the residuals.
     pub white: Vec<Vec<f64>>,
@@ -79,9 +79,9 @@ pub struct Step {
     pub values: Vec<f64>,
     /// The steps of the initial states of all windows.
     pub starts: Vec<State>,
-    /// The fall of the sum of squares by the linear model.
+    /// The predicted decrease of the sum of squares by the linear model.
     pub gain: f64,
-    /// The part of each window in that.
+    /// The contribution of each window to it.
     pub gains: Vec<f64>,
 }
 
@@ -157,7 +157,7 @@ impl Normal {
         (information, pull)
     }
 
-    /// The step that the damped equations ask for, `held` parameters kept where they are.
+    /// The step that solves the damped equations, with the parameters `held` fixed.
     #[must_use]
     pub fn step(&self, damping: f64, held: &[usize]) -> Step {
         self.step_between(damping, held, &[])
@@ -189,7 +189,7 @@ impl Normal {
         }
     }
 
-    /// The step with that of the parameters given: the initial states follow.
+    /// The step with that of the parameters given: the initial states are adapted.
     #[must_use]
     pub fn completed(&self, values: &DVector<f64>, damping: f64) -> Step {
         let mut starts = Vec::with_capacity(self.blocks.len());
@@ -198,7 +198,7 @@ impl Normal {
             let triangle = block.damped(damping);
             let blind = Block::blind(&triangle);
             let last = triangle.ncols() - 1;
-            // The whole step of this window, the initial state first.
+            // The whole step of this window, initial state first.
             let mut step = DVector::zeros(last);
             for (k, place) in block.places.iter().enumerate() {
                 step[STATE + k] = values[*place];
@@ -218,7 +218,7 @@ impl Normal {
         Step { values: values.iter().copied().collect(), starts, gain, gains }
     }
 
-    /// The covariance of the free parameters; infinite for those that nothing determines.
+    /// The covariance of the free parameters; infinite for undetermined ones.
     #[must_use]
     pub fn covariance(&self) -> DMatrix<f64> {
         let (information, _) = self.reduced(0.0);
@@ -240,7 +240,7 @@ impl Normal {
 pub fn pseudo_inverse(matrix: &DMatrix<f64>, held: &[usize]) -> DMatrix<f64> {
     let count = matrix.nrows();
     if count == 0 {
-        // Nothing is free but the states: a model is compared with a record.
+        // Only the states are free: a model is compared with a record.
         return matrix.clone();
     }
     let scale: Vec<f64> = (0..count)

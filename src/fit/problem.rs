@@ -9,10 +9,10 @@ use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 use crate::model::effects::Action;
 
-/// The most free parameters of a record's reading.
+/// Largest number of free parameters of a record's reading.
 pub const MOST_READINGS: usize = 7;
 
-/// A place for a number in a pendulum.
+/// A position for a number in a pendulum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// `(w0 / w_ref)^2`.
@@ -30,7 +30,7 @@ pub enum Slot {
 pub struct Free {
     /// Its records and its place in each; one number for all of them, at most once in each.
     pub places: Vec<(usize, Slot)>,
-    /// Where the search starts.
+    /// Its starting value.
     pub start: f64,
 }
 
@@ -59,11 +59,11 @@ pub struct Problem {
     pub records: Vec<Record>,
     /// The free parameters.
     pub free: Vec<Free>,
-    /// How each of them goes along a step.
+    /// Scale of the steps of each.
     pub scales: Vec<StepScale>,
-    /// Between which values each of them means something.
+    /// Bounds of each.
     pub ranges: Vec<[f64; 2]>,
-    /// The error allowed to a step of the integrator.
+    /// Error tolerance of a step of the integrator.
     pub tolerance: f64,
     /// The instruction set that derivatives are computed with.
     pub simd: InstructionSet,
@@ -78,11 +78,11 @@ pub struct Shaped {
     pub gravity: f64,
     /// The record's sensor on the rod.
     pub rod_sensor: Option<RodSensor>,
-    /// [`greatest_rate`] of the pendulum: all windows have it.
+    /// [`greatest_rate`] of the pendulum, equal for all windows.
     pub rate: f64,
 }
 
-/// The free parameters of one record: their places in [`Problem::free`], and what they are.
+/// The free parameters of one record: their indices in [`Problem::free`], and their places.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
     /// Parameters on which the motion depends.
@@ -206,7 +206,7 @@ impl Problem {
         shaped.is_sound().then(|| Shaped { rate: greatest_rate(&shaped.pendulum), ..shaped })
     }
 
-    /// How many samples count.
+    /// Number of samples with nonzero weight.
     #[must_use]
     pub fn samples(&self) -> usize {
         let trusted = |record: &Record| record.weights.iter().filter(|w| **w > 0.0).count();

@@ -15,9 +15,9 @@ use super::normal::pseudo_inverse;
 use super::problem::Problem;
 use crate::error::Error;
 
-/// Steps toward one end.
+/// Largest number of steps toward one end.
 const MOST_STEPS: usize = 40;
-/// How near the sum of squares comes to the level, over the level.
+/// Tolerance of the sum of squares at the level, over the level.
 const NEAR: f64 = 0.01;
 
 /// The ends of the intervals of the parameters `which`; one that was not found is not a number.
@@ -85,7 +85,7 @@ fn end(
             continue;
         };
         point = next;
-        // Along a bent ridge what was too far once soon is again.
+        // Along a curved ridge a step that was too long soon is again.
         shrink = (2.0 * shrink).min(1.0);
     }
     f64::NAN

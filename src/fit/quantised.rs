@@ -1,11 +1,11 @@
 //! Readings rounded to counts: each is an interval, not a value.
 //!
-//! A sensor that gives whole counts says that the angle plus its own noise lay within half a count
-//! of what it reads. With Gaussian noise of standard error `s` before the rounding, the likelihood
-//! of a model `m` is `P = Phi((y + q/2 - m)/s) - Phi((y - q/2 - m)/s)`. As long as `s` exceeds a
-//! third of a count this is a Gaussian of variance `s^2 + q^2/12`; below, a reading in the middle
-//! of a count says next to nothing and one beside an edge that was passed says all. Treated as
-//! Gaussian, successive readings on one count would be taken for independent.
+//! A sensor that gives whole counts states that the angle plus its own noise was within half a
+//! count of the reading. With Gaussian noise of standard error `s` before the rounding, the
+//! likelihood of a model `m` is `P = Phi((y + q/2 - m)/s) - Phi((y - q/2 - m)/s)`. As long as `s`
+//! exceeds a third of a count this is a Gaussian of variance `s^2 + q^2/12`; below, a reading in
+//! the middle of a count has almost no information and one next to a crossed edge has all. Treated
+//! as Gaussian, successive readings on one count would be taken for independent.
 //!
 //! `log P` is concave in `m` (Burridge 1981, J. R. Statist. Soc. B 43, 41), so that its curvature
 //! serves as weight: least squares with the residual `u / sqrt(i)` and the weight `sqrt(i)`, `u`
@@ -18,9 +18,10 @@ const TAIL: f64 = 2.0;
 /// The least weight, over `1 / s`: rows stay as they are, up to their length, where a reading says
 /// nothing.
 const FAINT: f64 = 1e-6;
-/// Standard errors beside its count from which a reading is a value, before digits are lost.
+/// Distance from its count, in standard errors, above which a reading is a value, before digits are
+/// lost.
 const FAR: f64 = 1e4;
-/// How far beside its count, in standard errors, a reading is looked for in a mean.
+/// Range of a mean over readings on either side of a count, in standard errors.
 const REACH: f64 = 9.0;
 /// Points of that mean.
 const POINTS: usize = 400;
@@ -65,8 +66,8 @@ pub fn likelihood(apart: f64, count: f64, sharpness: f64) -> Likelihood {
     Likelihood { deviance, residual: (slope / weight).copysign(apart), weight: weight * sharpness }
 }
 
-/// The mean of `-2 log P` of a motion that passes evenly through counts, less 1: taken off, sums of
-/// deviances are those of squared residuals over standard errors, one for each reading.
+/// The mean of `-2 log P` of a motion that passes evenly through counts, less 1: with it
+/// subtracted, sums of deviances are comparable to those of squared residuals over standard errors.
 #[must_use]
 pub fn surplus(count: f64, sharpness: f64) -> f64 {
     // By the middle rule over where the model may be, in counts, on either side of a reading.
@@ -93,7 +94,7 @@ fn scaled_erfc(x: f64) -> f64 {
         }
         return square.exp() - 2.0 / PI.sqrt() * sum;
     }
-    // Laplace's continued fraction (7.1.14), from far enough in.
+    // Laplace's continued fraction (7.1.14), from a sufficient depth.
     let depth = (20.0 + 400.0 / square) as usize;
     let mut rest = x;
     for k in (1..=depth).rev() {

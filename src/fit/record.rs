@@ -7,23 +7,23 @@ use super::rod_sensor::RodSensor;
 use crate::error::Error;
 use crate::model::{Pendulum, Recorded};
 
-/// A record of one motion, and the pendulum that it is thought to be of.
+/// A record of one motion, and the pendulum that models it.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Everything that is not free.
+    /// The pendulum with all parameters that are not free.
     pub pendulum: Pendulum,
     /// A recorded motion of the pivot.
     pub recorded: Option<Arc<Recorded>>,
     /// Times of the samples, times `w_ref`; each after the one before it.
     pub times: Vec<f64>,
-    /// Readings, rad; of a sensor on the rod in the unit of its factors.
+    /// Readings, rad; for a sensor on the rod in the unit of its factors.
     pub readings: Vec<f64>,
     /// The gyroscope or accelerometer that read, where it was no sensor of the angle; of effects on
     /// the reading only those that multiply it act.
     pub rod_sensor: Option<RodSensor>,
     /// About which angles these were, rad, where the readings are none: initial states begin there.
     pub angles: Option<Vec<f64>>,
-    /// One over the standard error of each reading; 0 for readings that are not to be trusted.
+    /// One over the standard error of each reading; 0 for untrusted readings.
     pub weights: Vec<f64>,
     /// The counts that readings were rounded to; then their standard errors are those before. None
     /// where these hold the rounding.
@@ -37,7 +37,7 @@ pub struct Record {
 pub struct Counts {
     /// The step from one to the next, in the unit of the readings.
     pub step: f64,
-    /// For each sample what its deviance has above that of a value, see [`surplus`].
+    /// For each sample the excess of its deviance over that of a value, see [`surplus`].
     pub surplus: Vec<f64>,
 }
 
@@ -104,7 +104,7 @@ impl Record {
     }
 }
 
-/// The error of a number out of its range.
+/// The error for a number out of its range.
 pub(super) fn range(name: &'static str, value: f64, allowed: &'static str) -> Error {
     Error::Range { name, value, allowed }
 }

@@ -1,4 +1,4 @@
-//! The pendulum of a record from many starts at once: what it would have read.
+//! Simulated readings of a record's pendulum from many starts at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

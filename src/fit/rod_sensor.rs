@@ -1,4 +1,4 @@
-//! A sensor on the rod that reads no angle: a gyroscope, or an accelerometer.
+//! A sensor on the rod that does not read the angle: a gyroscope, or an accelerometer.
 //!
 //! A gyroscope reads `th'`, wherever it sits. An accelerometer at the distance `r` from the pivot
 //! does not measure `r th''` but the specific force, acceleration less gravity. Towards positive
@@ -31,15 +31,16 @@ pub struct RodSensor {
     pub gravity: f64,
     /// Its reading at rest without gravity.
     pub bias: f64,
-    /// The interval that a reading is the mean over, in `1 / w_ref`.
+    /// The averaging interval of a reading, in `1 / w_ref`.
     pub interval: f64,
     /// The angle between its axis and the tangential direction, rad.
     pub tilt: f64,
 }
 
 impl RodSensor {
-    /// The reading in one state; `moving` says the sense of the motion and the side of a corner, and
-    /// what was kept at the last turn, none where friction holds the pendulum. `bias` and `tilt` are its own with derivatives.
+    /// The reading in one state; `moving` gives the sense of the motion, the side of a corner, and
+    /// the values kept at the last turn; none while friction holds the pendulum. `bias` and `tilt`
+    /// are the sensor's, with derivatives.
     pub fn read<N: Number>(
         &self,
         ode: &OdeProblem<N>,
@@ -53,7 +54,7 @@ impl RodSensor {
         own[0].aside(Reading { sensor, ode, tau, state, moving, own, into });
         reading
     }
-    /// Whether all of it are numbers, and it shows anything.
+    /// Whether all factors are numbers, and the sensor is sensitive to motion.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let all = [self.rate, self.place, self.gravity, self.bias, self.interval, self.tilt];

@@ -1,4 +1,4 @@
-//! The fit of the initial state of one window, all parameters held.
+//! The fit of the initial state of one window, with all parameters fixed.
 
 use std::sync::atomic::AtomicBool;
 
@@ -58,10 +58,10 @@ pub fn fit_alone(
     Ok(Some(SingleWindow { point, in_vain }))
 }
 
-/// Windows of `point` that rose where `step` from `before` promised a fall find initial states of
-/// their own.
-///
-/// A motion near the top, or one that friction nearly holds, goes another way after the least step
+/// Windows of `point` that rose although `step` from `before` predicted a fall get initial states
+/// fitted separately.
+/// A motion near the top, or one that friction nearly holds, may take another course after a
+/// slightly too long step, which no other window can compensate: one alone would block the descent.
 /// too far, and no other window can make that good: one alone would hold up the search.
 pub fn relax(
     problem: &Problem,
@@ -79,7 +79,7 @@ pub fn relax(
     let most = missed.iter().copied().fold(0.0, f64::max);
     let risen: Vec<usize> = (0..missed.len()).filter(|k| missed[*k] > PART_MISSED * most).collect();
     if risen.len() > FEW {
-        // Not a window or two, but the step itself goes too far.
+        // Not one or two windows: the step itself is too long.
         return;
     }
     let fitted =

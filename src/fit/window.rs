@@ -17,7 +17,7 @@ pub struct Window {
     pub record: usize,
     /// Its first sample.
     pub from: usize,
-    /// One after its last sample.
+    /// Index one after its last sample.
     pub to: usize,
     /// Angle and velocity at its first sample.
     pub start: State,
@@ -54,7 +54,7 @@ pub fn cut(
     windows
 }
 
-/// The halves of a window; none where they would be too short.
+/// The halves of a window; none if they would be too short.
 #[must_use]
 pub fn halves(problem: &Problem, window: &Window) -> Option<[Window; 2]> {
     let record = &problem.records[window.record];

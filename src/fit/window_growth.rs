@@ -1,8 +1,8 @@
 //! Fits over windows that grow from short to long.
 //!
-//! Within a window of about a swing the model is nearly linear in all that is not known, so that the
-//! search converges from far; each stage starts from the last one's curve. Long windows are precise,
-//! since small errors of the parameters add up in them.
+//! Within a window of about a swing the model is nearly linear in all unknowns, so that the search
+//! converges from far; each stage starts from the preceding one's curve. Long windows are precise,
+//! since small errors of the parameters accumulate in them.
 
 use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
@@ -18,9 +18,9 @@ use crate::integrate::State;
 
 /// Windows whose mean squared residual exceeds this multiple of the squared median are split.
 const ASTRAY: f64 = 36.0;
-/// How often they are.
+/// Number of times they are split.
 const MOST_SPLITS: usize = 3;
-/// The most steps by which a window finds its own initial state.
+/// Largest number of steps for a window's own initial state.
 const SETTLED: usize = 10;
 
 /// Choices of a fit.
@@ -30,9 +30,9 @@ pub struct Settings {
     pub shortest: f64,
     /// Factor by which windows grow from stage to stage.
     pub growth: f64,
-    /// The most steps of a stage.
+    /// Largest number of steps of a stage.
     pub steps: usize,
-    /// The gain in the sum of squares that is worth no further step.
+    /// Gain in the sum of squares below which the descent ends.
     pub gain: f64,
     /// Number of leading parameters that stay at their starts: to test a model on a record that it was
     /// not fitted to, the initial states alone are adapted.
@@ -54,7 +54,7 @@ pub struct Fit {
     pub point: Point,
     /// Steps of all stages together.
     pub steps: usize,
-    /// Stages.
+    /// Number of stages.
     pub stages: usize,
     /// Whether the last stage converged.
     pub converged: bool,
@@ -90,7 +90,7 @@ pub fn fit(
     let Settings { gain, steps, target, .. } = settings;
     let last = Limit { gain, part: 1e-9, steps, target };
     let Some(windows) = windows else {
-        // Short windows promise nothing of long ones.
+        // Short windows predict nothing about long ones.
         return widened(problem, settings, Limit { target: f64::INFINITY, ..last }, cancel);
     };
     let held = held(problem, settings);
@@ -100,7 +100,7 @@ pub fn fit(
     Ok(Fit { point, steps, stages: 1, converged, given_up })
 }
 
-/// The parameters that are not adapted.
+/// The parameters that are held fixed.
 fn held(problem: &Problem, settings: Settings) -> Vec<usize> {
     (0..settings.hold.min(problem.free.len())).collect()
 }
@@ -149,7 +149,7 @@ fn widened(
     }
 }
 
-/// The states at the samples of a point's windows; where no window is, what the readings say.
+/// The states at the samples of a point's windows; outside windows, from the readings.
 fn states<'a>(problem: &'a Problem, point: &'a Point) -> impl FnMut(usize, usize) -> State + 'a {
     |record, at| {
         let within = |w: &Window| w.record == record && (w.from..w.to).contains(&at);
@@ -160,7 +160,7 @@ fn states<'a>(problem: &'a Problem, point: &'a Point) -> impl FnMut(usize, usize
     }
 }
 
-/// The point with the windows split whose residuals stand out; none where none does.
+/// The point with windows of outlying residuals split; none if there are none.
 fn split(problem: &Problem, point: &Point, cancel: &AtomicBool) -> Result<Option<Point>, Error> {
     let mean = |all: &Vec<f64>| {
         let counted = all.iter().filter(|r| **r != 0.0).count().max(1);

@@ -1,4 +1,4 @@
-//! How many steps a period a tolerance asks for.
+//! The number of steps a period that a tolerance requires.
 
 use super::kernel::stroboscopic::{State, Strobe};
 use crate::error::Error;
@@ -15,7 +15,7 @@ const MOST_STEPS: usize = 20_000;
 
 /// The error of `strobe` on `starts`: the 95th percentile of the distance that halving the step
 /// makes after five periods.
-///
+/// Starts that leave the range of numbers on either side have an infinite error.
 /// Starts that leave the range of numbers on either side count as infinitely far.
 #[must_use]
 pub fn error_reached(strobe: &Strobe, starts: &[State]) -> f64 {

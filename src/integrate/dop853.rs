@@ -7,7 +7,7 @@
 
 #![allow(clippy::unreadable_literal, clippy::excessive_precision)] // digits as published
 
-/// Stages that carry weight.
+/// Number of stages with nonzero weight.
 pub const STAGES: usize = 12;
 /// Stages with those of the dense output.
 pub const ALL_STAGES: usize = 16;
@@ -34,7 +34,7 @@ pub const C: [f64; ALL_STAGES] = [
     0.7777777777777778,
 ];
 
-/// Row `i`: how the stages before `i` enter it; the thirteenth row has the weights of the new point.
+/// Row `i`: weights of the stages before `i`; the thirteenth row has the weights of the new point.
 #[rustfmt::skip]
 pub const A: [[f64; 15]; ALL_STAGES] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],

@@ -4,7 +4,7 @@
 //! - [`mod@reference`]: one trajectory of any model, adaptive, with exact events and derivatives
 //! - [`tangent`]: numbers with derivatives, for the variational equations
 //! - [`dop853`]: coefficients of the Runge-Kutta method that both use, and their source
-//! - [`accuracy`]: the number of steps that a tolerance needs
+//! - [`accuracy`]: the number of steps that a tolerance requires
 //! - [`trajectory`]: one trajectory, sampled in time
 
 pub mod accuracy;

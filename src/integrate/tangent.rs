@@ -1,11 +1,11 @@
-//! Numbers that carry derivatives: the variational equations without writing them a second time.
+//! Numbers with derivatives: the variational equations from the equation of motion itself.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::lanes::sine::Degree;
 use crate::lanes::{Lane, MAX_WIDTH, Real, Work, each};
 
-/// The least root that its derivative is divided by: at 0 that is steep, but a number.
+/// Least root by which a derivative is divided: at 0 it is steep, but finite.
 const LEAST_ROOT: f64 = 1e-150;
 
 /// A value and its derivatives in `N` directions.

@@ -14,17 +14,17 @@ use crate::error::Error;
 use crate::memory;
 use crate::model::Pendulum;
 
-/// The first error of a step tried, over the tolerance.
+/// The error of a step in the first attempt, over the tolerance.
 const FIRST_TRY: f64 = 0.1;
 /// Factor by which the error of a step is tightened to measure the effect on the result.
 const TIGHTENING: f64 = 16.0;
 /// Errors below this may be those of rounding, amplified by the motion.
 const ROUNDING: f64 = 1e-7;
-/// Angles beyond this are taken a number of whole turns nearer.
+/// Larger angles are shifted by a number of whole turns.
 const FAR: f64 = 100.0;
-/// Bytes of a sample: time, state, what a tangent adds, and their copies.
+/// Memory of a sample, bytes: time, state, the tangent's quantities, and their copies.
 const EACH: usize = 120;
-/// Turns, sticks and releases in a period, generously, each as large as a sample.
+/// Upper estimate of the events in a period, each as large as a sample.
 const EVENTS: usize = 4;
 /// Batches whose spread gives the standard error of an exponent.
 const BATCHES: usize = 20;
@@ -47,14 +47,14 @@ pub struct Trajectory {
     pub end_error: f64,
     /// Steps a period, on average.
     pub steps: usize,
-    /// Largest Lyapunov exponent per unit of tau and its standard error, where asked for; none where
-    /// the tangent vanishes, as it may when the pendulum sticks.
+    /// Largest Lyapunov exponent per unit of tau and its standard error, if requested; none if the
+    /// tangent vanishes, as it may when the pendulum sticks.
     pub exponent: Option<(f64, f64)>,
     /// Whether friction holds the pendulum at the end.
     pub stuck: bool,
     /// Turns, sticks and releases.
     pub events: Vec<Event>,
-    /// Whether it was stopped before its last time; nothing is known of the error at its end then.
+    /// Whether it was stopped before its last time; the error at its end is unknown then.
     pub interrupted: bool,
 }
 
@@ -69,7 +69,7 @@ pub struct Request {
     pub tol: f64,
     /// Samples a period.
     pub samples: usize,
-    /// Whether the exponent is wanted.
+    /// Whether the exponent is requested.
     pub lyapunov: bool,
 }
 
@@ -100,7 +100,8 @@ pub fn simulate_watched(
     seen: &mut dyn FnMut(f64, State),
 ) -> Result<Trajectory, Error> {
     check(request)?;
-    // Far from 0 the angle's last place would be all that steps can resolve: whole turns wait outside.
+    // Far from 0 the steps would be below the resolution of the angle: whole turns are stored
+    // separately.
     let far = request.start[0].abs() > FAR && pendulum.repeats_every_turn();
     let turns = if far { TAU * (request.start[0] / TAU).round() } else { 0.0 };
     let start = [request.start[0] - turns, request.start[1]];
@@ -198,8 +199,8 @@ fn check(request: &Request) -> Result<(), Error> {
     Ok(())
 }
 
-/// The error of a step that meets the request's tolerance after five periods, and what tightening to
-/// it changed there.
+/// The error of a step that meets the request's tolerance after five periods, and the change of the
+/// result by it.
 fn choose(
     pendulum: &Pendulum,
     request: &Request,
@@ -216,7 +217,7 @@ fn choose(
         tolerance /= TIGHTENING;
         let fine = end(tolerance)?;
         let error = distance(fine, coarse);
-        // Where tightening no longer helps, rounding is all that is left.
+        // If tightening no longer helps, the remaining error is rounding.
         let rounding = error < ROUNDING && error > 0.25 * before;
         if error <= request.tol || rounding || !error.is_finite() || tolerance <= FINEST {
             return Ok((tolerance, error));
@@ -241,7 +242,7 @@ fn distance(a: State, b: State) -> f64 {
 
 type Run = Sampled<f64>;
 
-/// Takes the states of new samples.
+/// Adds the states of new samples.
 type Show<'a> = &'a mut dyn FnMut(&mut dyn Iterator<Item = State>);
 
 impl Run {

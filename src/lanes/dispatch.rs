@@ -1,4 +1,4 @@
-//! One wheel, every processor: the instruction set is chosen when a call begins.
+//! One build for every processor: the instruction set is chosen when a call begins.
 
 use std::fmt;
 use std::str::FromStr;
@@ -23,10 +23,10 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// Quickest first.
+    /// All instruction sets, fastest first.
     pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Sse, Self::Portable];
 
-    /// The word that `PENDMAP_SIMD` takes and `pendmap info` shows.
+    /// The name accepted by `PENDMAP_SIMD` and shown by `pendmap info`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -53,7 +53,7 @@ impl InstructionSet {
         }
     }
 
-    /// The instruction set that `PENDMAP_SIMD` names, or else the quickest that this processor has.
+    /// The instruction set named by `PENDMAP_SIMD`, or else the fastest of this processor.
     ///
     /// # Errors
     /// [`Error::Simd`] if the variable names no instruction set, or one that this processor lacks.
@@ -77,12 +77,12 @@ pub enum Register {
     /// Four.
     #[cfg(target_arch = "x86_64")]
     Avx2(pulp::x86::V3),
-    /// One by one: what the compiler itself makes of a loop is as good as two.
+    /// Single numbers: the compiler's vectorisation of a loop is as good as two.
     Single,
 }
 
 impl InstructionSet {
-    /// Its register, or the single one where the processor lacks it.
+    /// Its register, or the single one if the processor lacks it.
     #[must_use]
     pub fn register(self) -> Register {
         #[cfg(target_arch = "x86_64")]
@@ -152,7 +152,7 @@ impl<J: Job, S: Isa> WithSimd for Entry<J, S> {
     }
 }
 
-// A module each: the compiler shares work among the processors by the module that a function stands in.
+// One module each: the compiler distributes work over processors by modules.
 macro_rules! entries {
     ($($(#[$condition:meta])* $module:ident: $isa:ty;)*) => {$(
         $(#[$condition])*
@@ -177,7 +177,7 @@ entries! {
     portable: pulp::Scalar;
 }
 
-/// Runs `job` on `simd`, or on the portable one where the processor lacks it.
+/// Runs `job` on `simd`, or on the portable one if the processor lacks it.
 pub fn run<J: Job>(simd: InstructionSet, job: J) -> J::Output {
     #[cfg(target_arch = "x86_64")]
     match simd {

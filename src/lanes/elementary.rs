@@ -10,13 +10,13 @@ use std::f64::consts::{LN_2, LOG2_E};
 
 use super::real::Lane;
 
-/// Adding it rounds to an integer, which then stands in the lowest bits.
+/// Adding it rounds to an integer, in the lowest bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// `ln 2` to 33 bits, so that its product with an exponent is exact.
 const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
 /// The rest of `ln 2`.
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-/// Beyond these the result is 0 or more than the largest number.
+/// Bounds beyond which the result is 0 or exceeds the largest number.
 const RANGE: [f64; 2] = [-708.0, 709.0];
 /// `(exp r - 1 - r) / r^2`, in powers of `r`.
 const EXPONENTIAL: [f64; 10] = [

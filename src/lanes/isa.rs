@@ -1,19 +1,19 @@
-//! The instruction sets, and what each adds to `pulp`'s vectors.
+//! The instruction sets, as additions to `pulp`'s vectors.
 
 use pulp::{Scalar, Simd, cast};
 
 use super::pack::Bundle;
 use super::real::{Fused, Lane};
 
-/// An instruction set that trajectories run on.
+/// An instruction set of the lane arithmetic.
 pub trait Isa: Simd {
     /// Whether a product and a sum round once.
     const FUSED: bool;
-    /// Trajectories side by side: enough registers to hide the latency of one.
+    /// Lanes of a bundle: enough registers to hide the latency of one.
     type Lanes: Lane<Token = Self>;
     /// Lanes of numbers with a derivative, which need twice the registers.
     type Narrow: Lane<Token = Self>;
-    /// For a handful of trajectories: what one waits for another's work cannot hide.
+    /// Lanes of a small bundle, for a handful of trajectories.
     type Few: Lane<Token = Self>;
     /// One trajectory with the same arithmetic, bit for bit.
     type Single: Lane<Token = ()>;

@@ -16,9 +16,10 @@ pub struct Pack<S: Isa> {
     value: S::f64s,
 }
 
-/// `N` registers side by side. One alone waits for its own results; several hide that latency.
+/// `N` registers processed together. One alone waits for its own results; several hide that
+/// latency.
 ///
-/// In memory they begin where a line of the cache does: half of each would else lie in the next one.
+/// Aligned to a cache line: otherwise half of each would be in the next line.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 pub struct Bundle<S: Isa, const N: usize>([Pack<S>; N]);

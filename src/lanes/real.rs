@@ -1,15 +1,15 @@
-//! The arithmetic that the equation of motion is written over: one number, a bundle of lanes, or
-//! either of them with its derivatives.
+//! The arithmetic of the equation of motion: over one number, a bundle of lanes, or either of them
+//! with derivatives.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::elementary;
 use super::sine::{self, Degree};
 
-/// A number as the model and the integrators see it.
+/// The number type of the model and the integrators.
 ///
-/// `f64`, [`Fused`], [`super::pack::Bundle`] and [`crate::integrate::tangent::Tangent`] are such
-/// numbers, so that the equation of motion and the Runge-Kutta-Nystrom step stand once.
+/// `f64`, [`Fused`], [`super::pack::Bundle`] and [`crate::integrate::tangent::Tangent`] implement
+/// it, so that the equation of motion and the Runge-Kutta-Nystrom step are written once.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -58,7 +58,7 @@ pub trait Real:
     fn sign(self) -> Self;
 }
 
-/// Work of several places that is compiled once, apart from all of them.
+/// Work called at several places that is compiled once, separately from them.
 pub trait Work {
     /// The work; mark the implementation `#[inline(always)]`, and all that it calls.
     fn run(self);
@@ -66,7 +66,7 @@ pub trait Work {
 
 /// A [`Real`] without derivatives: it can be stored, compared and reduced modulo a turn.
 pub trait Lane: Real {
-    /// The token of the instruction set that makes values; a marker without size.
+    /// The token of the instruction set that creates values; zero-sized.
     type Token: Copy;
     /// Number of trajectories side by side.
     const WIDTH: usize;
@@ -179,7 +179,7 @@ macro_rules! scalar_lane {
 
             #[inline(always)]
             fn apart<W: Work>((): (), work: W) {
-                // One number knows no instruction set: only within its caller it is the caller's.
+                // A single number has no instruction set: inlined, it uses its caller's.
                 work.run();
             }
             #[inline(always)]
@@ -242,7 +242,7 @@ fn multiply_then_add(x: f64, a: f64, b: f64) -> f64 {
 
 scalar_lane!(f64, |x: f64| x, |x: f64| x, false, multiply_then_add);
 
-/// One number whose products and sums round once: what a lane of an FMA instruction set does.
+/// One number whose products and sums round once, as in a lane of an FMA instruction set.
 ///
 /// Use it only inside [`super::dispatch`], where the compiler knows the instruction; elsewhere each
 /// product is a call into the C library.

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use super::real::Lane;
 
-/// How good a sine has to be: the coefficients of `P`, lowest power first.
+/// Precision of a sine: the coefficients of `P`, lowest power first.
 pub trait Degree: Copy {
     /// Number of coefficients.
     const COUNT: usize;

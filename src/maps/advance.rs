@@ -7,9 +7,9 @@ use crate::error::Error;
 use crate::integrate::Strobe;
 use crate::memory;
 
-/// Starts that one task takes: enough to fill any bundle many times.
+/// Starts per task: enough to fill any bundle many times.
 const BLOCK: usize = 1024;
-/// Periods between two looks at the control.
+/// Periods between two checks of the control.
 const STRETCH: usize = 64;
 /// Bytes of a start: where it began and its turns.
 const EACH: usize = 24;

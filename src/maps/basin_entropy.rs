@@ -1,4 +1,4 @@
-//! Basin entropy: how finely the basins are interwoven.
+//! Basin entropy: a measure of how finely basins are interwoven.
 
 use rayon::prelude::*;
 
@@ -12,20 +12,20 @@ const BOX: usize = 5;
 ///
 /// Entropies are those of Daza, Wagemakers, Georgeot, Guery-Odelin & Sanjuan (2016), Scientific
 /// Reports 6, 31416: of a box of 5 x 5 cells `S = -sum p ln p`, `p` the shares of the labels in it.
-/// Cells whose end is not known, undecided or failed, are left out; so are cells beyond the last
-/// whole box, where there is a whole one.
+/// Cells without a known attractor, undecided or failed, are left out; so are cells beyond the last
+/// whole box, if there is a whole one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// Basin entropy: the mean of `S` over the boxes in which an end is known.
+    /// Basin entropy: the mean of `S` over the boxes with a known cell.
     pub basin_entropy: f64,
-    /// Boundary basin entropy: the mean of `S` over the boxes that hold more than one label; 0 where
-    /// there are none.
+    /// Boundary basin entropy: the mean of `S` over the boxes with more than one label; 0 if there
+    /// are none.
     pub boundary_basin_entropy: f64,
     /// Standard error of that mean, from the spread over the boxes; infinite with fewer than two.
     pub boundary_stderr: f64,
-    /// Boxes in which an end is known.
+    /// Number of boxes with a known cell.
     pub boxes: usize,
-    /// Boxes that hold more than one label.
+    /// Number of boxes with more than one label.
     pub boundary_boxes: usize,
     /// Share of pairs of neighbouring cells that have the same label.
     pub neighbours_agree: f64,

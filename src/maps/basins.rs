@@ -15,22 +15,21 @@ use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::Pendulum;
 
-/// Starts whose step error is measured.
+/// Number of starts used to measure the step error.
 const ERROR_SAMPLE: usize = 400;
-/// Starts of the first search for attractors.
+/// Number of starts of the first search for attractors.
 pub(crate) const SEARCH_SAMPLE: usize = 400;
-/// Undecided starts that a further search begins from.
+/// Number of undecided starts of a further search.
 const FURTHER_SAMPLE: usize = 256;
-/// Further searches at the most.
+/// Largest number of further searches.
 const FURTHER: usize = 6;
-/// Where chaos coexists with other attractors, a start is given this many times the longest
-/// settling time that the search saw before it counts as chaotic.
+/// If chaos coexists with other attractors, a start is integrated for this multiple of the longest
+/// settling time of the search before it is classified as chaotic.
 const PATIENCE: u32 = 10;
 const LEAST_BOUND: u32 = 200;
-/// Cells of a map from which its uncertainty exponent is worth the 50,000 starts that it takes; a
-/// smaller map is a sketch, whatever a start costs.
+/// Number of cells from which a map's uncertainty exponent justifies its 50,000 starts.
 const LEAST_CELLS: usize = 10_000;
-/// Bytes of a start: label, settling time, turns, exponent, and what copies them.
+/// Memory of a start, bytes: label, settling time, turns, exponent, and their copies.
 const EACH: usize = 32;
 
 /// A request and its numerical choices.
@@ -44,7 +43,7 @@ pub struct Options {
     pub layer_periods: Option<u32>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
-    /// Shifts the samples.
+    /// Seed that shifts the samples.
     pub seed: u64,
     /// Whether to measure what needs further starts: the share of labels that half the step or
     /// mirroring changes, and the share that changes nearby.
@@ -60,11 +59,11 @@ impl Default for Options {
 /// Whether labels are meaningful for this map, and if not why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Labelling {
-    /// Labels tell basins apart.
+    /// Labels distinguish basins.
     Basins,
     /// Without damping there are no attractors.
     Conservative,
-    /// One chaotic attractor takes everything.
+    /// One chaotic attractor attracts all starts.
     OnlyChaos,
 }
 
@@ -75,30 +74,30 @@ pub struct BasinMap {
     pub attractors: Vec<Attractor>,
     /// Labels, settling times and turns.
     pub labels: Labels,
-    /// Turns and exponents over a fixed time, where labels are not meaningful.
+    /// Turns and exponents over a fixed time, if labels are not meaningful.
     pub layers: Option<FiniteTime>,
     /// Whether the labels are meaningful.
     pub labelling: Labelling,
     /// Periods of the finite-time layers.
     pub layer_periods: u32,
-    /// Starts from which attractors were searched first; where one chaotic attractor takes everything, all of them
-    /// end there.
+    /// Starts of the first search for attractors; if one chaotic attractor attracts everything, all
+    /// of them end on it.
     pub searched: usize,
     /// Share of the starts of each attractor.
     pub fractions: Vec<f64>,
-    /// Starts whose label changes nearby; `None` for a list, and where it was not asked for.
+    /// Starts whose label changes nearby; `None` for a list, and if not requested.
     pub uncertainty: Option<Uncertainty>,
     /// Texture of the labels.
     pub texture: Texture,
-    /// Parts of labels that half the step and mirroring change.
+    /// Shares of labels that half the step and mirroring change.
     pub reliability: Reliability,
     /// Steps a period.
     pub steps: usize,
-    /// The error that was reached, as [`accuracy::error_reached`] defines it.
+    /// The reached error, as [`accuracy::error_reached`] defines it.
     pub reached_error: f64,
-    /// Bound after which a start counted as undecided or, near chaos, as chaotic.
+    /// Bound after which a start was classified as undecided or, near chaos, as chaotic.
     pub bound: u32,
-    /// Periods within which nothing may capture a trajectory that counts as chaotic.
+    /// Periods without capture after which a trajectory is classified as chaotic.
     pub chaos_bound: u32,
     /// The instruction set.
     pub simd: InstructionSet,
@@ -246,7 +245,7 @@ fn to_capture(
     let max_periods = options.max_periods.unwrap_or_else(|| max_periods(&strobe.pendulum)).max(1);
     let bound = |catalogue: &Catalogue| {
         if catalogue.has_chaos() && catalogue.longest_settle == 0 && options.max_periods.is_none() {
-            // Several chaotic sets and nothing else: no settling to measure patience by.
+            // There are several chaotic sets only: no settling time to derive a bound from.
             searched
         } else if catalogue.has_chaos() && options.max_periods.is_none() {
             (PATIENCE * catalogue.longest_settle).clamp(LEAST_BOUND, max_periods)
@@ -275,7 +274,7 @@ fn to_capture(
             }
             now = bound(catalogue).max(now);
         } else if now < max_periods {
-            // The remaining starts get the whole bound.
+            // The remaining starts are integrated up to the whole bound.
             now = max_periods;
         } else {
             break;

@@ -1,4 +1,5 @@
-//! The attractors along one parameter: all that coexist, and the one that a slow change follows, up and down.
+//! The attractors along one parameter: all coexisting ones, and those followed under slow increase
+//! and decrease.
 
 use super::cell::Cell;
 use super::control::{Control, pool};
@@ -10,17 +11,17 @@ use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
 use crate::orbit::rotation::running_states;
 
-/// Points that are kept of an attractor that does not close.
+/// Number of points stored of a non-periodic attractor.
 const KEPT: usize = 200;
-/// Periods between two looks at where what is followed has come.
+/// Periods between two tests of a followed motion.
 const ROUND: usize = 32;
-/// Looks before it counts as on no known orbit.
+/// Number of tests before it is classified as on no known orbit.
 const ROUNDS: usize = 12;
 /// Distance to a known orbit, also a period later, below which a trajectory has arrived.
 const ARRIVED: f64 = 1e-3;
-/// Displacement at every value: no motion stays on an unstable orbit.
+/// Displacement at every value: no motion remains on an unstable orbit.
 const NUDGE: f64 = 1e-6;
-/// The place of the phase in the list of parameters, which a plane of one row needs.
+/// Index of the phase in the list of parameters, needed by a plane of one row.
 const PHASE: usize = 5;
 
 /// A request and its numerical choices.
@@ -30,7 +31,7 @@ pub struct Request {
     pub axis: Range,
     /// Where the trajectories of the search start.
     pub starts: Vec<State>,
-    /// How many of them each value takes, in turn.
+    /// Number of starts of each value, in turn.
     pub each: usize,
     /// Where what is followed starts, at either end; by default on the attractor that most starts end on.
     pub first: Option<State>,
@@ -45,9 +46,9 @@ pub struct Request {
 /// The followed motion at one value.
 #[derive(Clone, Debug, Default)]
 pub struct Followed {
-    /// The attractor that it is on, as a place among those of all values one after the other.
+    /// Index of its attractor in the list over all values.
     pub on: Option<usize>,
-    /// Its points, where that is none.
+    /// Its points, if it is on no attractor.
     pub loose: Vec<State>,
 }
 
@@ -62,7 +63,7 @@ pub struct Diagram {
     pub down: Vec<Followed>,
 }
 
-/// All attractors along one parameter, and what is followed from each end to the other.
+/// All attractors along one parameter, and the motions followed in both directions.
 ///
 /// # Errors
 /// Those of [`parameter_map`].
@@ -71,7 +72,7 @@ pub fn bifurcation(
     request: &Request,
     control: &Control,
 ) -> Result<Diagram, Error> {
-    // A plane of one row: of what varies nowhere any parameter will do.
+    // A plane of one row: any parameter serves as the constant one.
     let other = if request.axis.index == PHASE { 0 } else { PHASE };
     let value = base.parameters()[other].1;
     let axes = [request.axis.clone(), Range { index: other, values: vec![value] }];
@@ -95,7 +96,7 @@ pub fn bifurcation(
     Ok(Diagram { up: up?, down: down?, map })
 }
 
-/// The place of each cell's first attractor among those of all.
+/// The index of each cell's first attractor in the list of all.
 fn offsets(cells: &[Cell]) -> Vec<usize> {
     let mut next = 0;
     let place = |cell: &Cell| {
@@ -127,17 +128,17 @@ fn follow(
     Ok(followed)
 }
 
-/// A point of the attractor that most starts end on; of equals the first.
+/// A point of the attractor that most starts end on; the first of equals.
 fn leading(cell: &Cell) -> Option<State> {
     let most = cell.found.iter().map(|f| f.share).fold(0.0, f64::max);
     let found = cell.found.iter().find(|f| f.share >= most)?;
     found.attractor.points.first().copied()
 }
 
-/// Runs `state` until it has arrived on an attractor of the cell, whose place comes back; else its
-/// points.
+/// Integrates `state` until it has converged to an attractor of the cell and returns its index, or
+/// else the points.
 fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Vec<State>) {
-    // Without drive a running state keeps no time with the section: its band holds it.
+    // Without drive a running state is not synchronous with the section: its band traps it.
     let runs = cell.found.iter().any(|f| f.attractor.is_running());
     let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
     let running: Vec<(i64, Band)> = states

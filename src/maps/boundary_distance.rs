@@ -1,13 +1,13 @@
-//! Which cells of a map lie near a change of label.
+//! Distances of a map's cells from the nearest change of label.
 
 use super::starts::Axis;
 
-/// Cells of a map, those near a change of label first.
+/// Cells of a map, nearest to a change of label first.
 #[derive(Debug)]
 pub struct Nearness {
     /// Cells sorted by their distance from the next change.
     order: Vec<u32>,
-    /// How many lie at each distance or nearer, in cells along the farther axis.
+    /// Cumulative number of cells by distance, in cells along the farther axis.
     within: Vec<usize>,
     columns: usize,
 }
@@ -51,7 +51,8 @@ impl Nearness {
         Self { order, within, columns }
     }
 
-    /// How many cells, the first ones, a change can reach by a step of `eps` sides of the window.
+    /// Number of cells, from the first on, from which a step of `eps` sides of the window can reach
+    /// a change.
     #[must_use]
     pub fn reached(&self, eps: f64) -> usize {
         let rows = self.order.len() / self.columns;
@@ -59,13 +60,13 @@ impl Nearness {
         self.within[cells.min(self.within.len() - 1)]
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     #[must_use]
     pub fn count(&self) -> usize {
         self.order.len()
     }
 
-    /// A place in the cell of rank `rank`, in sides of the window; `part` is that in the cell.
+    /// A point in the cell of rank `rank`, in sides of the window; `part` is that in the cell.
     #[must_use]
     pub fn place(&self, rank: usize, part: [f64; 2], window: [&Axis; 2]) -> [f64; 2] {
         let cell = self.order[rank] as usize;

@@ -1,7 +1,7 @@
 //! Numbers of periods within which a trajectory must settle.
 //!
-//! Motions settle at the pace of the damping, so each bound is the time in which it shrinks a free motion
-//! by some power of e, within limits.
+//! Motions settle at the rate of the damping, so each bound is the time in which it shrinks a free
+//! motion by some power of e, within limits.
 
 use crate::attractor::Effort;
 use crate::model::Pendulum;
@@ -12,9 +12,9 @@ pub const LEAST: u32 = 4000;
 const MOST: f64 = 1e6;
 /// Damping shrinks a free motion by `exp(-DECAY)` within the bound of a start.
 const DECAY: f64 = 200.0;
-/// These numbers for a cell of a map over parameters, and its least bound.
+/// As [`DECAY`] and the least bound, for a cell of a parameter map.
 const CELL: (f64, f64) = (40.0, 64.0);
-/// Part of the bound of a start after which a search begins to watch uncaptured trajectories.
+/// Part of a start's bound after which a search begins to observe uncaptured trajectories.
 const SEARCHED: u32 = 4;
 
 /// Periods in which damping shrinks a free motion by `exp(-decay)`, `2 decay / (gamma T)`, within limits.
@@ -26,28 +26,28 @@ fn shrinking(pendulum: &Pendulum, decay: f64, least: f64) -> u32 {
     periods.clamp(least, MOST).ceil() as u32
 }
 
-/// Periods after which a start is undecided, where none are given.
+/// Periods after which a start is undecided, by default.
 #[must_use]
 pub fn max_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, DECAY, f64::from(LEAST))
 }
 
-/// Periods after which a cell of a map over parameters begins to watch uncaptured trajectories, where none are
-/// given.
+/// Periods after which the search of a parameter map's cell begins to observe uncaptured
+/// trajectories, by default.
 #[must_use]
 pub fn cell_periods(pendulum: &Pendulum) -> u32 {
     let (decay, least) = CELL;
     shrinking(pendulum, decay, least)
 }
 
-/// Periods after which a search begins to watch uncaptured trajectories, whatever bound is set for the starts:
-/// what counts as chaos does not depend on it.
+/// Periods after which a search begins to observe uncaptured trajectories, independent of the
+/// starts' bound: so is the classification as chaotic.
 #[must_use]
 pub fn search_periods(pendulum: &Pendulum) -> u32 {
     max_periods(pendulum) / SEARCHED
 }
 
-/// Periods within which nothing may capture a trajectory that counts as chaotic.
+/// Periods without capture after which a trajectory is classified as chaotic.
 #[must_use]
 pub fn chaos_periods(pendulum: &Pendulum) -> u32 {
     search_periods(pendulum) * (1 + Effort::THOROUGH.watch)

@@ -1,4 +1,4 @@
-//! One pendulum among many: its attractors from a few starts, and from those of pendulums like it.
+//! One pendulum among many: its attractors from a few starts, and from those of similar pendulums.
 
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
@@ -11,15 +11,15 @@ use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
-/// Points of like orbits of like pendulums are nearer than this.
+/// Largest distance between points of corresponding orbits of similar pendulums.
 const LIKE: f64 = 0.25;
-/// Points nearer than this are of one orbit.
+/// Distance within which points belong to one orbit.
 const SAME: f64 = 1e-6;
-/// Newton's method may not wander further than this from an orbit of a neighbour.
+/// Largest distance of Newton's method from an orbit of a neighbour.
 const REACH: f64 = 0.3;
-/// Hints that a search takes at the most.
+/// Largest number of hints of a search.
 const MOST_HINTS: usize = 16;
-/// Points of an attractor that does not close: where it has changed a little one alone may lie beside it.
+/// Points of a non-periodic attractor in a hint: after a small change one alone may be off it.
 pub const HINTED: usize = 4;
 
 /// An attractor of a cell.
@@ -36,7 +36,7 @@ pub struct Found {
 pub struct Cell {
     /// Its attractors.
     pub found: Vec<Found>,
-    /// Share of the starts that nothing captured within the bound.
+    /// Share of uncaptured starts within the bound.
     pub open: f64,
     /// Share of the starts that left the range of numbers.
     pub failed: f64,
@@ -44,8 +44,8 @@ pub struct Cell {
     pub watched: u32,
 }
 
-/// An attractor of another cell: one point of it, several where it does not close; its kind, period and
-/// turns.
+/// An attractor of another cell: one point of it, several if it is not periodic; its kind, period
+/// and turns.
 #[derive(Clone, Debug)]
 pub struct Hint {
     points: Vec<State>,
@@ -54,21 +54,22 @@ pub struct Hint {
     w: i64,
 }
 
-/// How every cell is searched.
+/// Settings of the search of every cell.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// Where trajectories start: each cell takes `each` of these, the next one those after them.
+    /// Initial conditions: each cell takes `each` of these in turn.
     pub starts: Vec<State>,
-    /// How many starts a cell has.
+    /// Number of starts of a cell.
     pub each: usize,
-    /// Periods after which a search begins to watch uncaptured trajectories; by default by the damping.
+    /// Periods after which a search begins to observe uncaptured trajectories; by default from the
+    /// damping.
     pub bound: Option<u32>,
-    /// Points that are kept of an attractor that does not close.
+    /// Number of points stored of a non-periodic attractor.
     pub kept: usize,
 }
 
 impl Search {
-    /// The attractors of cell `number`: rests, orbits that `hints` lead to, and where its starts end.
+    /// The attractors of cell `number`: rests, orbits found from `hints`, and those of its starts.
     #[must_use]
     pub fn cell(
         &self,
@@ -82,7 +83,7 @@ impl Search {
             return Cell { open: 1.0, ..Cell::default() };
         }
         let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
-        // At rest nothing moves it away, however unstable: such points are no starts.
+        // A point exactly at rest stays there even if unstable: such points are no starts.
         let rests = balances(&strobe.pendulum).map(|theta| ([theta, 0.0], 1));
         catalogue.take_over(strobe, &rests, cancel);
         let cycles: Vec<(State, usize)> =
@@ -102,8 +103,8 @@ impl Search {
         }
     }
 
-    /// The `hints` of attractors that `cell` does not have: a stable orbit that Newton's method finds
-    /// from there; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
+    /// Attractors from the `hints` that `cell` lacks: a stable orbit that Newton's method finds from a
+    /// hint; from a cell `beside` it also chaos of its kind, or an orbit of that period and winding
     /// that may have changed into another.
     #[must_use]
     pub fn promising(
@@ -137,8 +138,8 @@ impl Search {
         hints.into_iter().filter(promises).collect()
     }
 
-    /// Shares of the starts; an attractor that only a hint led to has none, nor has what friction holds
-    /// for ever where no start ends there.
+    /// Shares of the starts; attractors found only from a hint have none, nor have permanent sticks
+    /// on which no start ends.
     fn told(&self, strobe: &Strobe, catalogue: &Catalogue, endings: &[Ending]) -> Cell {
         let open: Vec<State> = endings
             .iter()
@@ -212,7 +213,7 @@ impl Cell {
 }
 
 impl Hint {
-    /// None from a rest, which every search looks at.
+    /// None from a rest, which every search includes.
     fn of(attractor: &Attractor) -> Option<Self> {
         if matches!(attractor.kind, Kind::Rest | Kind::InvertedRest) {
             return None;
@@ -223,8 +224,7 @@ impl Hint {
         (!points.is_empty()).then_some(Self { points, kind, n: attractor.n, w })
     }
 
-    /// Whether an attractor is like the one it comes from, or like its mirror image where there is
-    /// one.
+    /// Whether an attractor is similar to its origin, or to its mirror image if it has one.
     fn is_like(&self, attractor: &Attractor, symmetric: bool) -> bool {
         let w = attractor.w.unwrap_or(attractor.sense);
         let image = [-self.points[0][0], -self.points[0][1]];

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-/// Points of the interpolant, doubled until it is right.
+/// Initial number of points of the interpolant, doubled until it converges.
 const POINTS: [usize; 3] = [32, 64, 128];
-/// Coefficients this small beside the largest are rounding.
+/// Coefficients this small relative to the largest are rounding.
 const ROUNDING: f64 = 1e-12;
-/// Places between two points at which signs are looked at.
+/// Number of sign samples between two points.
 const BETWEEN: usize = 12;
 /// Halvings of a bracket.
 const HALVINGS: usize = 60;
@@ -56,7 +56,7 @@ impl<const K: usize> Interpolant<K> {
         0.5 * (self.low + self.high) + 0.5 * (self.high - self.low) * x
     }
 
-    /// Function `k` at a place, by Clenshaw's recurrence.
+    /// Function `k` at a point, by Clenshaw's recurrence.
     pub fn value(&self, k: usize, place: f64) -> f64 {
         let x = (2.0 * place - self.low - self.high) / (self.high - self.low);
         let mut last = [0.0; 2];
@@ -66,8 +66,8 @@ impl<const K: usize> Interpolant<K> {
         x * last[0] - last[1] + self.series[k].first().copied().unwrap_or(0.0)
     }
 
-    /// Where `combined`, made of the functions, changes its sign, in order; also where it does so twice
-    /// between two places at which it is looked at, next to an extremum.
+    /// The zeros of `combined`, made of the functions, in order; also pairs of zeros between two
+    /// samples, next to an extremum.
     pub fn zeros(&self, combined: impl Fn(Values<K>) -> f64) -> Vec<f64> {
         let at = |place: f64| combined(std::array::from_fn(|k| self.value(k, place)));
         let count = BETWEEN * self.series[0].len();
@@ -105,7 +105,7 @@ impl<const K: usize> Interpolant<K> {
     }
 }
 
-/// Where a function times `sign` is least, by the golden section.
+/// The minimum of a function times `sign`, by the golden section.
 fn least(function: &impl Fn(f64) -> f64, low: f64, high: f64, sign: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (low, high);

@@ -1,9 +1,9 @@
-//! Critical amplitudes under a torque: rest is an orbit of the drive's period then.
+//! Critical amplitudes under a torque, when rest is an orbit of the drive's period.
 //!
-//! The orbit that rest becomes as the torque grows from 0 is sought from where rest is stable: at one
-//! `p`, and along the amplitudes at which a multiplier is -1, since a stable interval may move by more
-//! than its length. Then it is followed along `p`, both ways, by Newton's method. As a function of `p`
-//! it goes on until it folds, where a multiplier is +1; there it ceases.
+//! The orbit that rest becomes as the torque grows from 0 is sought from values of `p` with stable
+//! rest, and along the amplitudes with a multiplier -1, since a stable interval may shift by more
+//! than its length. Then it is continued along `p`, both ways, by Newton's method, up to folds, at
+//! which a multiplier is +1 and the orbit ends.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,30 +15,31 @@ use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 
-/// Newton's steps onto the orbit, and the gap that counts as none, in units of what rounding leaves.
+/// Newton's steps onto the orbit, and the gap at which it has converged, in units of the rounding
+/// error.
 const ITERATIONS: usize = 8;
 const RESIDUAL: f64 = 1e-12;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Steps of the root of `p`, in units of the frequency: solutions turn and grow by a small part.
 const STEP: f64 = 0.05;
-/// A step is accepted if Newton's method moves the foreseen point by at most this.
+/// A step is accepted if Newton's method moves the predicted point by at most this.
 const NEAR: f64 = 0.1;
 /// The least step in `p`; the first and the least step of the torque, in parts of it.
 const LEAST_STEP: f64 = 1e-9;
 const FIRST_SHARE: f64 = 0.25;
 const LEAST_SHARE: f64 = 1e-4;
-/// The next point is foreseen from this many places.
+/// The next point is predicted from this number of points.
 const FORESEEN: usize = 5;
-/// A fold this far ahead in `p` is known well enough: the square of the gap falls linearly to it.
+/// A fold this near in `p` is located by extrapolation: the square of the gap falls linearly to it.
 const AT_FOLD: f64 = 1e-7;
-/// Places in a stable interval of the pendulum without torque, in parts of it, where orbits begin.
+/// Starting values of `p` for orbits, as parts of a stable interval of the pendulum without torque.
 const PLACES: [f64; 3] = [0.5, 0.02, 0.98];
 /// The first step and the last one to a place with the multiplier -1: it is where an orbit is followed from.
 const DOUBLED: f64 = 1e-6;
 /// Refinements of a zero at most, and the last one's size in parts of `1 + p`.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-12;
-/// Orbits this near at one `p` are one.
+/// Distance at one `p` within which orbits are identical.
 const SAME: f64 = 1e-6;
 
 /// The orbit at one `p`.
@@ -63,8 +64,8 @@ struct Continuation<'a> {
     p_max: f64,
 }
 
-/// The critical amplitudes of the orbits that continue a balance, whose own without torque are
-/// `level`'s.
+/// The critical amplitudes of the orbits that continue a balance, whose critical amplitudes without
+/// torque are `level`'s.
 pub(super) fn curve(pendulum: &Pendulum, balance: Balance, level: &Curve, p_max: f64) -> Curve {
     let omega = level.omega;
     let continuation = Continuation { pendulum, angle: balance.angle(), omega, p_max };
@@ -92,21 +93,21 @@ impl Place {
 }
 
 impl Sheet {
-    /// Whether the orbit is there and stable: it is so from one critical amplitude to the next.
+    /// Whether the orbit exists and is stable, which holds from one critical amplitude to the next.
     fn is_stable(&self, p: f64) -> bool {
         let side = |q: f64| self.critical.iter().filter(|c| c.0 < q).count();
         let known = self.places.iter().filter(|place| side(place.p) == side(p));
         let [low, high] = [self.places.first(), self.places.last()].map(|end| end.map(|e| e.p));
         let within = low.is_some_and(|low| self.begin(low) <= p)
             && high.is_some_and(|high| p <= self.end(high));
-        // That which lies furthest from a border tells best.
+        // The point farthest from the ends is the most reliable.
         within
             && known
                 .min_by(|a, b| (a.p - p).abs().total_cmp(&(b.p - p).abs()))
                 .is_some_and(|place| is_stable(place.monodromy))
     }
 
-    /// Where it begins: at a fold a little before its first place.
+    /// The start of its range: at a fold a little before its first point.
     fn begin(&self, low: f64) -> f64 {
         self.critical.first().map_or(low, |c| c.0.min(low))
     }
@@ -143,8 +144,8 @@ impl Continuation<'_> {
         None
     }
 
-    /// The orbit that rest becomes as the torque grows from 0, at `p`, or where a multiplier stays
-    /// -1; none where it folds before.
+    /// The orbit that rest becomes as the torque grows from 0, at `p`, or at a multiplier of -1;
+    /// none if it ends in a fold before.
     fn begun(&self, p: f64, doubling: bool) -> Option<Place> {
         let mut pendulum = self.pendulum.clone();
         let mut at = |share: f64, p: f64, guess: State| {
@@ -207,7 +208,7 @@ impl Continuation<'_> {
         self.followed(seed, self.p_max).0.pop().filter(|last| last.p <= self.p_max)
     }
 
-    /// All of the orbit from one of its places, both ways.
+    /// The whole orbit from one of its points, in both directions.
     fn sheet(&self, seed: Place) -> Sheet {
         let (mut places, begin) = self.followed(seed, 0.0);
         places.reverse();
@@ -219,7 +220,7 @@ impl Continuation<'_> {
         Sheet { places, critical }
     }
 
-    /// Places from `seed` on as far as `goal`, and the fold where the orbit ceases before.
+    /// Points from `seed` up to `goal`, and the fold at which the orbit ends before it.
     fn followed(&self, seed: Place, goal: f64) -> (Vec<Place>, Option<f64>) {
         let mut places = vec![seed];
         let mut step = f64::INFINITY;
@@ -238,7 +239,7 @@ impl Continuation<'_> {
             let usual = (root * root.abs() - here.p).abs();
             let ahead = fold.map_or(f64::INFINITY, |fold| 0.9 * (fold - here.p).abs());
             let length = usual.min(step).min(ahead).min(away.abs());
-            // The goal itself, not what rounding makes of it.
+            // The goal itself, without rounding.
             let p = if length < away.abs() { here.p + length.copysign(away) } else { goal };
             let guess = foreseen(places.iter().map(|place| (place.p, place.point)), p);
             let next = self
@@ -256,7 +257,7 @@ impl Continuation<'_> {
         }
     }
 
-    /// Where a multiplier passes -1, also where it does so twice between two places.
+    /// Passages of a multiplier through -1, also pairs of them between two points.
     fn doublings(&self, places: &[Place]) -> Vec<f64> {
         let size = |place: &Place| gap(-1.0, place.monodromy);
         let mut found = Vec::new();
@@ -275,14 +276,14 @@ impl Continuation<'_> {
         found
     }
 
-    /// The orbit between two of its places.
+    /// The orbit between two of its points.
     fn between(&self, a: &Place, b: &Place, p: f64) -> Option<Place> {
         let ratio = (p - a.p) / (b.p - a.p);
         self.solved(self.pendulum, p, extrapolated(b, a, -ratio))
     }
 
-    /// Where a multiplier passes -1 between two places, by false position; an end that stays twice
-    /// counts half (the Illinois variant).
+    /// The passage of a multiplier through -1 between two points, by false position; the value at
+    /// an end that is kept twice is halved (the Illinois variant).
     fn passed(&self, a: &Place, b: &Place) -> Option<f64> {
         let size = |place: &Place| gap(-1.0, place.monodromy);
         let mut ends = [(*a, size(a)), (*b, size(b))];
@@ -335,7 +336,7 @@ impl Continuation<'_> {
         None
     }
 
-    /// Whether an orbit is one of a sheet's.
+    /// Whether an orbit is on the sheet.
     fn holds(&self, sheet: &Sheet, seed: &Place) -> bool {
         let after = sheet.places.partition_point(|place| place.p < seed.p);
         let (Some(b), Some(a)) = (sheet.places.get(after), sheet.places.get(after.wrapping_sub(1)))
@@ -350,12 +351,12 @@ fn distance(a: State, b: State) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The point on the line through two places, `ratio` of their distance beyond the second.
+/// The point on the line through two points, `ratio` of their distance beyond the second.
 fn extrapolated(a: &Place, b: &Place, ratio: f64) -> State {
     [0, 1].map(|k| b.point[k] + ratio * (b.point[k] - a.point[k]))
 }
 
-/// Where the polynomial through the last of these values leads to, by Lagrange's formula.
+/// The extrapolation of the last of these values by Lagrange's formula.
 fn foreseen<const N: usize>(
     values: impl ExactSizeIterator<Item = (f64, [f64; N])>,
     at: f64,
@@ -378,7 +379,7 @@ fn continues(here: &Place, next: &Place) -> bool {
     gap(1.0, here.monodromy).signum() == gap(1.0, next.monodromy).signum()
 }
 
-/// Where the square of the gap to +1 would be 0 if it went on as between two places.
+/// The zero of the square of the gap to +1 by linear extrapolation from two points.
 fn fold_ahead(before: &Place, here: &Place) -> Option<f64> {
     let [first, second] = [before, here].map(|place| gap(1.0, place.monodromy).powi(2));
     (second < first).then(|| here.p + second * (here.p - before.p) / (first - second))

@@ -13,12 +13,12 @@ pub struct Control {
 }
 
 impl Control {
-    /// Asks all workers to stop at the next period's end.
+    /// Requests all workers to stop at the end of the next period.
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);
     }
 
-    /// The flag that the workers look at.
+    /// The flag read by the workers.
     #[must_use]
     pub fn flag(&self) -> &AtomicBool {
         &self.cancel
@@ -36,7 +36,7 @@ impl Control {
         self.total.store(total, Ordering::Relaxed);
     }
 
-    /// Counts `count` cells as done.
+    /// Adds `count` finished cells.
     pub fn add(&self, count: usize) {
         self.done.fetch_add(count, Ordering::Relaxed);
     }
@@ -48,7 +48,7 @@ impl Control {
     }
 }
 
-/// More workers than this only wait for one another.
+/// Largest number of workers; more only wait for one another.
 const MOST_THREADS: usize = 256;
 
 /// A pool of `threads` workers; 0 means one for each processor. It lives as long as the call that made

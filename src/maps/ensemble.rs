@@ -1,4 +1,4 @@
-//! Growth along many trajectories on one attractor, until its mean is known well enough.
+//! Growth along many trajectories on one attractor, until its mean has a given standard error.
 
 use rayon::prelude::*;
 
@@ -11,17 +11,17 @@ use crate::memory;
 use crate::model::pendulum::Route;
 use crate::orbit::PoincareMap;
 
-/// Trajectories of an ensemble.
+/// Number of trajectories of an ensemble.
 pub const TRAJECTORIES: usize = 256;
-/// Periods of a window: what a finite-time exponent of the result is over.
+/// Periods of a window, over which finite-time exponents of the result are.
 pub const WINDOW: usize = 20;
-/// Windows between two looks at the error.
+/// Windows between two tests of the error.
 pub(super) const ROUND: usize = 10;
-/// Rounds at least.
+/// Least number of rounds.
 const LEAST_ROUNDS: usize = 2;
-/// Members of the ensemble begin so near points of the attractor.
+/// Distance of the initial members from points of the attractor.
 pub(super) const NEAR: f64 = 1e-6;
-/// Trajectories and periods whose shrinking of phase area gives the sum of both exponents.
+/// Numbers of trajectories and periods from which the sum of both exponents is computed.
 const AREA: [usize; 2] = [32, 60];
 
 /// Growth along an ensemble.
@@ -42,9 +42,9 @@ pub struct Ensemble {
 /// The arguments of an ensemble.
 pub(super) struct Run<'a> {
     pub(super) strobe: &'a Strobe,
-    /// Standard error over the exponent that it goes on for.
+    /// Relative standard error of the exponent at which the ensemble ends.
     pub(super) precision: f64,
-    /// Chooses the members.
+    /// Seed of the members.
     pub(super) seed: u64,
     pub(super) pool: &'a rayon::ThreadPool,
     pub(super) control: &'a Control,
@@ -63,8 +63,8 @@ impl Run<'_> {
             .collect()
     }
 
-    /// Growth along trajectories from `states`, until the error is small enough or `most` periods are
-    /// over; and where they are then.
+    /// Growth along trajectories from `states`, until the error is small enough or after `most`
+    /// periods; and their final states.
     pub(super) fn ensemble(
         &self,
         states: &[State],
@@ -131,8 +131,8 @@ impl Run<'_> {
     }
 }
 
-/// Numbers in [0, 1) that a seed decides: Steele, Lea & Flood (2014), "Fast splittable pseudorandom
-/// number generators" (`SplitMix64`).
+/// Reproducible numbers in [0, 1): Steele, Lea & Flood (2014), "Fast splittable pseudorandom number
+/// generators" (`SplitMix64`).
 struct Draw(u64);
 
 impl Draw {

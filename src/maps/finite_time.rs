@@ -7,7 +7,7 @@ use super::starts::Starts;
 use crate::error::Error;
 use crate::integrate::Strobe;
 
-/// Starts that one task takes.
+/// Starts per task.
 const BLOCK: usize = 4096;
 
 /// Layers after a fixed number of periods, one entry a start.

@@ -1,4 +1,4 @@
-//! Every start to the attractor that captures it, on all threads.
+//! Assignment of every start to the attractor that captures it, on all threads.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI16, AtomicI32, AtomicUsize, Ordering};
@@ -18,12 +18,12 @@ pub const FAILED: i16 = -1;
 /// Settle time of a start without one.
 pub const NEVER: i32 = -1;
 
-/// Starts that a worker takes at a time.
+/// Starts per task.
 const TAKE: usize = 32;
-/// Open trajectories are given to chaotic attractors in such lots.
+/// Number of open trajectories that are assigned to chaotic attractors at a time.
 const LOT: usize = 512;
 
-/// Labels and what goes with them, one entry a start.
+/// Labels and related quantities, one entry a start.
 #[derive(Debug)]
 pub struct Labels {
     /// Attractor number from 1, or [`UNDECIDED`] or [`FAILED`].
@@ -34,7 +34,7 @@ pub struct Labels {
     pub turns: Vec<i32>,
     /// Undecided starts, by index.
     pub open: Vec<(usize, State)>,
-    /// Periods integrated in all.
+    /// Total number of integrated periods.
     pub work: u64,
 }
 
@@ -67,7 +67,7 @@ struct Worker<'a> {
     lot: Vec<(usize, State)>,
     open: Vec<(usize, State)>,
     work: u64,
-    /// Whether there was no memory for all that is open.
+    /// Whether memory for open trajectories was lacking.
     full: Option<Error>,
 }
 
@@ -108,7 +108,7 @@ impl Source for Worker<'_> {
 }
 
 impl Worker<'_> {
-    /// Gives the open trajectories of the lot to the chaotic attractors that they stay on.
+    /// Assigns the open trajectories of the lot to the chaotic attractors on which they stay.
     fn sort_lot(&mut self) {
         let Shared { catalogue, strobe, label, .. } = self.shared;
         let lot = std::mem::take(&mut self.lot);
@@ -128,8 +128,8 @@ impl Worker<'_> {
 
 /// Runs all starts (or those of `picks`) to capture, for at most `bound` periods.
 ///
-/// A start's result depends on nothing but the start, so neither the number of threads nor the
-/// order in which they take work shows.
+/// A start's result depends on the start alone, so neither the number of threads nor the order of
+/// their work changes it.
 ///
 /// # Errors
 /// [`Error::Interrupted`] if `control` was cancelled; [`Error::Memory`] without room for

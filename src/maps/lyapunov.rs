@@ -1,8 +1,9 @@
 //! The largest Lyapunov exponent of the attractor that a start reaches.
 //!
-//! For a closed orbit it is exact, from the multipliers; for chaos it is the mean growth of tangents along an
-//! ensemble of trajectories on the attractor, with a standard error from their spread. A chaotic
-//! transient has a positive exponent too: the attractor that captures it counts.
+//! For a periodic orbit it is exact, from the multipliers; for chaos it is the mean growth of
+//! tangents along an ensemble of trajectories on the attractor, with a standard error from their
+//! spread. A chaotic transient has a positive exponent too: the result is that of the attractor
+//! that captures it.
 
 use super::basins::SEARCH_SAMPLE;
 use super::bounds::{chaos_periods, max_periods, search_periods};
@@ -17,24 +18,25 @@ use crate::integrate::{State, accuracy};
 use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 
-/// Default of the largest number of periods that each trajectory is followed.
+/// Default of the largest number of periods of each trajectory.
 const MOST: u32 = 20_000;
-/// Where nothing is damped the tangent of regular motion grows in proportion to time, and no number
-/// of periods is enough.
+/// Without damping the tangent of regular motion grows in proportion to time, and no number of
+/// periods is sufficient.
 const MOST_UNDAMPED: u32 = 2_000;
-/// Periods dropped at least: tangents turn into the direction of growth, the members part.
+/// Least number of dropped periods: tangents align with the direction of growth, the members
+/// diverge.
 const DROPPED: f64 = 100.0;
-/// Beyond growing from [`NEAR`] to 1, members grow apart by this power of e before they count.
+/// Power of e by which members diverge, beyond growing from [`NEAR`] to 1, before averaging begins.
 const APART: f64 = 12.0;
-/// Periods dropped at the most.
+/// Largest number of dropped periods.
 const MOST_DROPPED: f64 = 5_000.0;
-/// Periods of the start's own growth after it has been captured, and of what nothing captures.
+/// Periods of the start's own growth after its capture, or without one.
 const COURSE: [usize; 2] = [100, 1_000];
-/// Periods between two looks at whether a trap has taken the start.
+/// Periods between two tests of whether a trap has captured the start.
 const STRETCH: usize = 64;
-/// Periods in which a trap takes what is in it: two hits.
+/// Periods in which a trap captures a state inside it: two hits.
 const AT_ONCE: u32 = 2;
-/// Periods within which a trap takes what lies in it.
+/// Periods within which a trap captures a nearby state.
 const TAKEN: u32 = 64;
 
 /// A request and its numerical choices.
@@ -42,56 +44,56 @@ const TAKEN: u32 = 64;
 pub struct Request {
     /// Angle and velocity at `tau = 0`.
     pub start: State,
-    /// Standard error over the exponent that the ensemble goes on for.
+    /// Relative standard error of the exponent at which the ensemble ends.
     pub precision: f64,
     /// The 95th percentile of the error after five periods.
     pub tol: f64,
-    /// Periods within which the start must be captured, and that each member is followed for.
+    /// Bound on the periods to capture, and on those of each member.
     pub max_periods: Option<u32>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
-    /// Chooses the ensemble.
+    /// Seed of the ensemble.
     pub seed: u64,
 }
 
-/// Where the start ended.
+/// Fate of the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// On an attractor with traps: its exponent is known.
     Captured,
     /// On a chaotic attractor.
     Chaotic,
-    /// Nowhere: nothing is damped.
+    /// On none: nothing is damped.
     Undamped,
-    /// On nothing within the bound.
+    /// On none within the bound.
     Undecided,
-    /// Out of the range of numbers, or ever faster.
+    /// Left the range of numbers, or accelerates for ever.
     Failed,
 }
 
-/// The exponent of what a start reaches.
+/// The exponent of the attractor of a start.
 #[derive(Clone, Debug)]
 pub struct Exponent {
     /// How the start ended.
     pub end: End,
     /// How the search ended.
     pub attractor: Option<Attractor>,
-    /// Periods until that captured it.
+    /// Periods until capture.
     pub transient: Option<u32>,
     /// The ensemble, for chaos and undamped motion.
     pub ensemble: Option<Ensemble>,
-    /// Members of an ensemble that something captured after all: what looked like an attractor is a
+    /// Number of members of an ensemble that were captured after all: the apparent attractor is a
     /// transient.
     pub lost: usize,
     /// Logarithm of the growth of the start's own tangent in each period from the first.
     pub growth: Vec<f64>,
-    /// Periods after which the start counted as undecided.
+    /// Periods after which the start was classified as undecided.
     pub bound: u32,
-    /// Periods within which nothing may capture a trajectory that counts as chaotic.
+    /// Periods without capture after which a trajectory is classified as chaotic.
     pub chaos_bound: u32,
     /// Steps a period.
     pub steps: usize,
-    /// The error that was reached, as [`accuracy::error_reached`] defines it.
+    /// The reached error, as [`accuracy::error_reached`] defines it.
     pub reached_error: f64,
     /// The instruction set.
     pub simd: InstructionSet,
@@ -152,7 +154,7 @@ pub fn lyapunov(
 }
 
 impl Run<'_> {
-    /// Follows the start to its end.
+    /// Integrates the start to its end.
     fn reach(
         &self,
         seeds: &[State],
@@ -171,7 +173,7 @@ impl Run<'_> {
         let (mut fate, mut periods) = self.follow(trajectory, &catalogue, result.bound)?;
         let mut home = self.home(trajectory, &catalogue, fate);
         if fate == Fate::Open && home.is_none() {
-            // Something that the search has not met: it begins anew where the start has come to.
+            // An attractor that the search has not found: it is repeated from the present state.
             let here: Vec<State> = trajectory.states.last().copied().into_iter().collect();
             catalogue.search(
                 self.strobe,
@@ -198,7 +200,7 @@ impl Run<'_> {
                 result.attractor = Some(chaos);
                 return Ok(());
             }
-            // A long transient: the start itself will be captured, sooner or later.
+            // A long transient: the start itself will be captured eventually.
             (fate, periods) = self.follow(trajectory, &catalogue, result.bound.max(MOST))?;
         }
         match fate {
@@ -213,10 +215,10 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Follows the start's own trajectory until a trap takes it, or `bound` periods are over: its fate, and
-    /// after how many periods.
+    /// Integrates the start until a trap captures it, or for `bound` periods; returns its fate and
+    /// the number of periods.
     ///
-    /// Of a chaotic transient another rounding has another end: the growth that is shown and the
+    /// With other rounding errors a chaotic transient ends elsewhere: the growth shown and the
     /// capture are of one trajectory.
     fn follow(
         &self,
@@ -255,8 +257,8 @@ impl Run<'_> {
         catalogue.homes(self.strobe, &last).into_iter().next().flatten()
     }
 
-    /// How many of the `ends` of an ensemble are captured: by what is known, or by what a search finds
-    /// from those whose neighbours come together.
+    /// Number of the `ends` of an ensemble that are captured: by known attractors, or by those that
+    /// a search finds from ends whose neighbours converge.
     fn lost(
         &self,
         catalogue: &mut Catalogue,

@@ -7,11 +7,13 @@
 //! - [`reliability`]: the part of labels that half the step or mirroring changes
 //! - [`lyapunov`]: the largest exponent of the attractor that a start reaches; [`ensemble`], [`tangent_growth`]:
 //!   exponents of many trajectories
-//! - [`orbits`]: all closed orbits of one period and winding; `multistart`: starting points of Newton's method
+//! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
+//!   Newton's method
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`cell`], [`resolution`]: one pendulum of
 //!   it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
-//! - [`tongues`]: where rest loses and gains stability, by `chebyshev`; `continuation`: under a torque
+//! - [`tongues`]: critical amplitudes of the stability of rest, by `chebyshev`; `continuation`:
+//!   under a torque
 //! - [`advance`]: plain integration of many starts
 //! - [`bounds`]: the number of periods within which a trajectory must settle
 //! - [`control`]: progress, cancellation, threads

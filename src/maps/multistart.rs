@@ -1,4 +1,4 @@
-//! Starting points for Newton's method on a field over the plane: all places where the field may vanish.
+//! Starting points for Newton's method: all points at which a field over the plane may vanish.
 //!
 //! [`places`] divides the plane into cells. In a cell the field is compared with its linear part `J`, both
 //! multiplied by `1 / J`: at a zero, at `x` from the centre in cells, `x + J^-1 F(0)` is the negative of the
@@ -31,11 +31,11 @@ const ITERATIONS: usize = 16;
 const PROMISING: usize = 8;
 /// Finite difference, in angle and in velocity, by which slopes are measured.
 const DIFFERENCE: f64 = 1e-5;
-/// Longest step in the plane.
+/// Largest step in the plane.
 const LONGEST_STEP: f64 = 0.5;
-/// Size of the field below which a place has arrived.
+/// Size of the field at which Newton's method has converged.
 const NEAR: f64 = 1e-4;
-/// Distance below which two places are one.
+/// Distance below which two points are identical.
 const SAME: f64 = 1e-5;
 
 /// The nodes of a cell and its ring, rows of equal velocity, the lowest first.
@@ -46,11 +46,11 @@ type Patch = [State; 16];
 struct Cell {
     /// Its corner with the lowest values.
     corner: State,
-    /// Where linearity puts the zero.
+    /// The zero of the linear part.
     aim: State,
 }
 
-/// Places from which Newton's method should find all zeros in the box.
+/// Points from which Newton's method should find all zeros in the box.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
@@ -114,7 +114,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     }
     for k in 0..2 {
         let spare = CLEAR * (high[k] - low[k]);
-        // Not true either where no value is a number.
+        // False too if a value is not a number.
         if !(low[k] <= spare && high[k] >= -spare) {
             return None;
         }
@@ -141,12 +141,12 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     if !(bent[0] + bent[1]).is_finite() {
         return unresolved;
     }
-    // Not beyond the cell: the linear part is known no further.
+    // At most to the cell's edge: the linear part is unknown beyond.
     let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
     Some(Cell { corner, aim })
 }
 
-/// A start on its way.
+/// A start during the iteration.
 struct Walker {
     first: State,
     point: State,
@@ -155,7 +155,7 @@ struct Walker {
     begun_at: f64,
 }
 
-/// The places near zeros of the field that the starts reach within `reach`, each once.
+/// The points near zeros of the field that the starts reach within `reach`, each once.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
@@ -207,7 +207,7 @@ pub(super) fn approach(
             let damped = (LONGEST_STEP / step.norm()).min(1.0);
             w.point = [w.point[0] + damped * step[0], w.point[1] + damped * step[1]];
             let way = (w.point[0] - w.first[0]).hypot(w.point[1] - w.first[1]);
-            // Not true either where the step is no number.
+            // False too if the step is not a number.
             if way <= reach {
                 on.push(w);
             }

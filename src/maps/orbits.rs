@@ -1,8 +1,8 @@
-//! All closed orbits of one period and winding in a box of starts, stable and unstable.
+//! All periodic orbits of one period and winding in a box of starts, stable and unstable.
 //!
-//! Newton's method starts wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped, may vanish
-//! (`multistart`). Next to an orbit near its birth it starts again, repelled by all known orbits:
-//! branches that are about to meet lie nearer to one another than any cell.
+//! Newton's method starts wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
+//! may vanish (`multistart`). Next to an orbit near its bifurcation it starts again, deflated by
+//! all known orbits: merging branches are closer to one another than any cell.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,36 +23,37 @@ use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
 use crate::orbit::symmetry::Mirror;
 
-/// The longest period that is looked for, in forcing periods.
+/// The longest period of a request, in forcing periods.
 pub const LONGEST: usize = 64;
-/// The error of the displacements after five periods: they only say where to begin.
+/// Error of the displacements after five periods, used for starting points only.
 const TOLERANCE: f64 = 1e-6;
-/// Bytes of a cell: its corner, where it comes to, and what both are made of.
+/// Memory of a cell, bytes: its corner, its image, and intermediate results.
 const EACH: usize = 128;
-/// Starts whose step error is measured.
+/// Number of starts used to measure the step error.
 const ERROR_SAMPLE: usize = 200;
 /// Largest distance of Newton's method from its start, in cells.
 const REACH_CELLS: f64 = 8.0;
 /// Least value of that distance.
 const LEAST_REACH: f64 = 0.3;
-/// Points nearer than this are of one orbit.
+/// Distance within which points belong to one orbit.
 const SAME: f64 = 1e-6;
-/// Under friction a speed below this is none.
+/// With friction, speeds below this are zero.
 const STILL: f64 = 1e-9;
-/// A multiplier this near to 1 is that.
+/// A multiplier this near to 1 is set to it.
 const CREEPS: f64 = 1e-3;
-/// Angles at which the pull on an undriven pendulum is looked at, and halvings between two of them.
+/// Number of angles at which the load on an undriven pendulum is sampled, and of halvings between
+/// two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
-/// Orbits beside another one are looked for only where the derivative of the displacement shrinks a
+/// Orbits near another one are sought only if the derivative of the displacement shrinks a
 /// direction below this.
 const WEAK: f64 = 0.3;
-/// Largest distance at which they are looked for.
+/// Largest distance at which they are sought.
 const FURTHEST: f64 = 0.3;
 /// Number of halvings of that distance.
 const HALVINGS: u32 = 9;
 
-/// A request for closed orbits.
+/// A request for periodic orbits.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
     /// Smallest period, in forcing periods.
@@ -67,20 +68,20 @@ pub struct Request {
     pub threads: usize,
 }
 
-/// The closed orbits found.
+/// The periodic orbits found.
 #[derive(Clone, Debug)]
 pub struct Orbits {
     /// Orbits of the stroboscopic map.
     pub closed: Vec<PeriodicOrbit>,
     /// Without drive: rotations, closed on the angle section.
     pub running: Vec<Rotation>,
-    /// How many places Newton's method began at.
+    /// Number of starting points of Newton's method.
     pub begun: usize,
 }
 
 /// The orbits of smallest period `n` and `w` net turns that have a point in the box.
 ///
-/// States that friction holds fast are none: they are a set.
+/// States held by friction are excluded: they are a set.
 ///
 /// # Errors
 /// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Range`] for an `n` out of
@@ -95,7 +96,8 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     memory::reckon("cells", cells, EACH)?;
     let none = Orbits { closed: Vec::new(), running: Vec::new(), begun: 0 };
     if pendulum.is_autonomous() && (request.n, request.w) != (1, 0) {
-        // A flow in the plane closes without turns where it is conservative, and then everywhere.
+        // Without turns a flow in the plane has closed orbits only if it is conservative, and then
+        // everywhere.
         let running = if request.n == 1 { running_states(pendulum) } else { Vec::new() };
         let running = running.into_iter().filter(|r| r.sense == request.w).collect();
         return Ok(Orbits { running, ..none });
@@ -104,8 +106,8 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let mirror = Mirror::of(pendulum);
     let rubs = pendulum.has_friction();
     let equation = pendulum.equation();
-    // Newton's method leaves a speed of the size of rounding, and creeps to the edge of what is held: there,
-    // too, the neighbours stay where they are, and a multiplier is 1.
+    // Newton's method leaves a velocity of the size of rounding, and creeps to the edge of the held
+    // set: there, too, neighbours remain at rest, and a multiplier is 1.
     let held = |orbit: &PeriodicOrbit| {
         let creeps = (orbit.multipliers.largest() - 1.0).abs() < CREEPS;
         let stays = |p: &State| p[1].abs() < STILL && (creeps || equation.holds_for_ever(p[0]));
@@ -122,7 +124,8 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     let mut begun = 0;
     let mut known: Vec<State> = Vec::new();
-    // First from all places, then from beside what was found last, until nothing new is.
+    // First from all starting points, then from near the orbits found last, until there are no new
+    // ones.
     let mut next = begin;
     while !next.is_empty() {
         control.begin(next.len());
@@ -162,8 +165,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     Ok(Orbits { closed: all, begun, ..none })
 }
 
-/// Where nothing accelerates an undriven pendulum at rest: all else that closes within a time that is
-/// given closes by chance.
+/// Equilibria of an undriven pendulum: other orbits close after a given time only by coincidence.
 fn rests(pendulum: &Pendulum, theta: Axis) -> Vec<State> {
     let pull = |theta: f64| pendulum.acceleration(0.0, theta, 0.0);
     let (low, high) = match pendulum.angle() {
@@ -185,7 +187,7 @@ fn rests(pendulum: &Pendulum, theta: Axis) -> Vec<State> {
     (0..LOOKS).filter_map(between).collect()
 }
 
-/// Where Newton's method begins at first.
+/// The starting points of Newton's method.
 fn beginnings(
     pendulum: &Pendulum,
     request: &Request,
@@ -195,7 +197,7 @@ fn beginnings(
     let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
     let sample = starts.sampled_states(ERROR_SAMPLE, 0);
     let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, InstructionSet::choose()?)?;
-    // The displacement is the whole way, of which the turns are net.
+    // The displacement is the total one, of which the turns are net.
     let displacements = |from: &[State]| -> Result<Vec<State>, Error> {
         let mut theta: Vec<f64> = from.iter().map(|s| s[0]).collect();
         let mut velocity: Vec<f64> = from.iter().map(|s| s[1]).collect();
@@ -212,8 +214,8 @@ fn beginnings(
     approach(&places, reach, displacements)
 }
 
-/// Starts beside an orbit whose displacement over `n` periods hardly changes in one direction: only
-/// there can another one lie nearer than a cell.
+/// Starts near an orbit whose displacement over `n` periods is almost constant in one direction:
+/// only there can another one be closer than a cell.
 fn beside(orbit: &PeriodicOrbit, n: usize) -> Vec<State> {
     let whole = orbit.monodromy[0].pow((n / orbit.n) as u32);
     let svd = (whole - Matrix2::identity()).svd(false, true);

@@ -1,9 +1,9 @@
-//! Which attractors exist over a plane of two parameters.
+//! The attractors over a plane of two parameters.
 //!
-//! From a coarse grid to the finest, each cell is searched from a few starts, others than the next one's, and from the
-//! attractors of its neighbours on the coarser grids; then cells take over what their neighbours have and
-//! they lack. A cell sees only what earlier passes have left, so nothing depends on the order in which threads
-//! work.
+//! From a coarse grid to the finest, each cell is searched from a few starts, different from the
+//! next one's, and from the attractors of its neighbours on the coarser grids; then cells are
+//! searched from attractors of neighbours that they lack. A cell uses only results of earlier
+//! passes, so nothing depends on the order of the threads.
 
 use rayon::prelude::*;
 
@@ -17,16 +17,16 @@ use crate::lanes::InstructionSet;
 use crate::memory;
 use crate::model::Pendulum;
 
-/// Cells between those of the coarsest grid.
+/// Spacing of the coarsest grid, in cells.
 const COARSEST: usize = 8;
-/// Distances over which cells exchange their attractors, pass after pass: what one cell alone has found
-/// comes to all that can have it.
+/// Distances over which cells exchange their attractors in successive passes: a result of one cell
+/// reaches all that can have it.
 const EXCHANGES: [usize; 3] = [8, 4, 2];
-/// Passes between next neighbours at the most; they end where no cell has gained an attractor.
+/// Largest number of passes between next neighbours; they end if no cell has gained an attractor.
 const MOST_PASSES: usize = 64;
-/// Bytes of a cell: its attractors, and their arrays.
+/// Memory of a cell, bytes: its attractors, and their arrays.
 const EACH: usize = 4096;
-/// Bytes of each point kept of an attractor that does not close.
+/// Memory of each stored point of a non-periodic attractor, bytes.
 const ROOM: usize = 64;
 /// Starts of that measurement.
 const PROBES: usize = 100;
@@ -34,7 +34,7 @@ const PROBES: usize = 100;
 /// A parameter and the values that it takes.
 #[derive(Clone, Debug)]
 pub struct Range {
-    /// Its place in [`Pendulum::parameters`].
+    /// Its index in [`Pendulum::parameters`].
     pub index: usize,
     /// The values.
     pub values: Vec<f64>,
@@ -45,16 +45,16 @@ pub struct Range {
 pub struct Request {
     /// The parameters of columns and rows.
     pub axes: [Range; 2],
-    /// Where trajectories start: what few starts miss in one cell those of others find.
+    /// Initial conditions: cells take different ones, so that they complement one another.
     pub starts: Vec<State>,
-    /// How many of them each cell takes, in turn.
+    /// Number of starts of each cell, in turn.
     pub each: usize,
     /// The 95th percentile of the error after five periods, on sampled cells.
     pub tol: f64,
-    /// Periods after which a trajectory that nothing captures is watched for as long again; by default
-    /// what damping asks for.
+    /// Periods after which an uncaptured trajectory is observed for as long again; by default from
+    /// the damping.
     pub bound: Option<u32>,
-    /// Points that are kept of an attractor that does not close.
+    /// Number of points stored of a non-periodic attractor.
     pub kept: usize,
     /// Workers; 0 for one a processor.
     pub threads: usize,
@@ -65,9 +65,9 @@ pub struct Request {
 pub struct ParameterMap {
     /// Rows of equal second parameter, the first value first.
     pub cells: Vec<Cell>,
-    /// Cells that were searched once more for what a neighbour has.
+    /// Cells that were searched again for attractors of a neighbour.
     pub searched_again: usize,
-    /// How long steps were.
+    /// The step lengths.
     pub resolution: Resolution,
 }
 
@@ -81,7 +81,7 @@ pub struct Plane<'a> {
 }
 
 impl Plane<'_> {
-    /// How many columns and rows.
+    /// Numbers of columns and rows.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         [self.axes[0].values.len(), self.axes[1].values.len()]
@@ -213,7 +213,7 @@ pub fn parameter_map(
                 .collect::<Result<_, Error>>()
         })?;
         searched_again += again.len();
-        // The first pass between next neighbours looks at all of them.
+        // The first pass between next neighbours includes all of them.
         gained.fill(stride > 1);
         for (cell, found) in again {
             let symmetric = plane.pendulum(cell).is_mirror_symmetric();

@@ -1,4 +1,4 @@
-//! Whether labels can be believed: what half the step, or mirroring, changes.
+//! Reliability of labels: the shares that half the step, or mirroring, changes.
 
 use super::control::Control;
 use super::label::{Labels, label};
@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::symmetry::Mirror;
 
-/// Labels that are tried again.
+/// Number of labels tested.
 const SAMPLE: usize = 2000;
 
 /// Shares of the sampled labels that change.
@@ -27,12 +27,12 @@ pub struct Reliability {
 /// Labels a sample of the starts again with half the step, and from the mirrored start.
 ///
 /// The arithmetic of the kernel is odd in the state, bit for bit, so a mirrored start would repeat
-/// every rounding error; it is moved by one unit in the last place, as any other way of computing it
-/// would do.
+/// every rounding error; it is shifted by one unit in the last place, like the result of any other
+/// arithmetic.
 ///
 /// # Errors
 /// [`Error::Interrupted`] if `control` was cancelled.
-#[allow(clippy::too_many_arguments)] // what a map is made of
+#[allow(clippy::too_many_arguments)] // the parts of a map
 pub fn reliability(
     strobe: &Strobe,
     catalogue: &Catalogue,

@@ -1,4 +1,4 @@
-//! How long steps may be over a plane of parameters.
+//! Step lengths over a plane of parameters.
 
 use super::parameter_map::Plane;
 use crate::error::Error;
@@ -10,7 +10,7 @@ use crate::model::Pendulum;
 /// Cells along each side at which the longest step is found.
 const MEASURED: usize = 9;
 
-/// The length of a step times the root of the greatest pull, by cell.
+/// The step length times the root of the greatest load, by cell.
 #[derive(Clone, Debug)]
 pub struct Resolution {
     columns: Vec<usize>,
@@ -18,7 +18,7 @@ pub struct Resolution {
     /// Rows of equal second parameter.
     step: Vec<f64>,
     simd: InstructionSet,
-    /// The greatest error that was measured, halfway between those cells.
+    /// The greatest error measured, halfway between those cells.
     pub reached_error: f64,
 }
 
@@ -76,12 +76,12 @@ impl Resolution {
         Strobe::new(pendulum, steps as usize, self.simd)
     }
 
-    /// The shortest of the steps of the cells around that were measured.
+    /// The smallest of the measured steps of the surrounding cells.
     fn step(&self, at: [usize; 2]) -> f64 {
         self.around(at).map(|k| self.step[k]).fold(f64::INFINITY, f64::min)
     }
 
-    /// Places in the table of the cells around one that were measured: itself, two or four.
+    /// Indices of the measured cells around one: itself, two or four.
     fn around(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = usize> + use<> {
         let beside = |places: &[usize], at: usize| {
             let after = places.partition_point(|place| *place < at).min(places.len() - 1);

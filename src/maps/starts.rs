@@ -53,7 +53,7 @@ impl Axis {
     }
 }
 
-/// Where the trajectories of a map start.
+/// Initial conditions of the trajectories of a map.
 #[derive(Clone, Debug)]
 pub enum Starts {
     /// Every cell of a grid, rows of equal velocity, the lowest first.
@@ -77,7 +77,7 @@ impl Starts {
         }
     }
 
-    /// Whether there are none.
+    /// Whether it is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

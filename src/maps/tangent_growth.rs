@@ -1,4 +1,4 @@
-//! Tangents along many trajectories, on all threads: by how much each has grown, window by window.
+//! Growth of tangents along many trajectories, on all threads, window by window.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::memory;
 
-/// Trajectories that one task takes.
+/// Trajectories per task.
 const BLOCK: usize = 32;
 
 /// Trajectories with a tangent each.
@@ -38,20 +38,20 @@ impl Bundle {
         self.theta.len()
     }
 
-    /// Whether there are none.
+    /// Whether it is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.theta.is_empty()
     }
 
-    /// Where the trajectories are, angles in [-pi, pi].
+    /// The present states, angles in [-pi, pi].
     #[must_use]
     pub fn states(&self) -> Vec<State> {
         self.theta.iter().zip(&self.velocity).map(|(a, b)| [*a, *b]).collect()
     }
 
-    /// `windows` times `window` periods on; the natural logarithms of the factors by which the tangents
-    /// have grown, one row of windows for each trajectory.
+    /// Advances `windows` times by `window` periods; returns the natural logarithms of the growth
+    /// factors of the tangents, one row of windows for each trajectory.
     ///
     /// Adds the trajectories to `control` when they are done.
     ///
@@ -102,7 +102,7 @@ pub struct TangentTrajectory {
     bundle: Bundle,
     /// Logarithm of the growth of its tangent in each period.
     pub growth: Vec<f64>,
-    /// Where it is after each period, the start first; angles in [-pi, pi].
+    /// The state after each period, the start first; angles in [-pi, pi].
     pub states: Vec<State>,
 }
 
@@ -113,7 +113,7 @@ impl TangentTrajectory {
         Self { bundle: Bundle::new(&[start]), growth: Vec::new(), states: vec![start] }
     }
 
-    /// Goes on until `periods` are over from the start.
+    /// Advances until `periods` after the start.
     ///
     /// # Errors
     /// Those of [`Bundle::grow`].

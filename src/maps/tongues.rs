@@ -1,4 +1,5 @@
-//! Where rest, hanging or inverted, loses and gains stability: critical amplitudes, by Floquet.
+//! Critical amplitudes at which hanging or inverted rest loses or gains stability, by Floquet
+//! theory.
 //!
 //! The derivative `M` of the stroboscopic map at rest is the monodromy matrix of the linearised
 //! equation, eq. 1.3 with damping, with the opposite sign of gravity upright. Rest changes where a multiplier passes +1,
@@ -24,18 +25,18 @@ use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::fold::{Fold, fold_of_onset};
 
-/// The largest `p` that is asked for.
+/// Largest `p` of a request.
 pub const MOST_P: f64 = 100.0;
 /// Over a part of the range of `p` solutions grow at most by the exponential of about this.
 const GROWTH: f64 = 8.0;
-/// Entries, or products of multipliers, that differ by less than this part are alike.
+/// Relative difference below which entries, or products of multipliers, are equal.
 const ALIKE: f64 = 1e-9;
-/// A load on the pendulum at rest up to this is none.
+/// Largest load on the pendulum at rest that is rounding.
 const NO_LOAD: f64 = 1e-13;
-/// Times in a period, and share of gravity of the drive, at which that is looked at.
+/// Number of times in a period at which the load is sampled.
 const TIMES: usize = 16;
 
-/// The two places where gravity has no torque.
+/// The two angles at which gravity has no torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Balance {
     /// Angle 0.
@@ -58,9 +59,9 @@ impl Balance {
 pub struct Critical {
     /// Amplitude of the drive.
     pub p: f64,
-    /// The multiplier there: 1 or -1.
+    /// The critical multiplier: 1 or -1.
     pub multiplier: f64,
-    /// Whether rest is stable right below, and right above.
+    /// Whether rest is stable just below, and just above.
     pub stable: [bool; 2],
 }
 
@@ -71,7 +72,7 @@ pub struct Curve {
     pub omega: f64,
     /// In order of `p`.
     pub critical: Vec<Critical>,
-    /// Whether rest is stable between `p = 0` and the first.
+    /// Whether rest is stable between `p = 0` and the first of them.
     pub stable_at_first: bool,
     /// Where the oscillation that is born at the first loss of stability turns back: below that `p`
     /// it is not. `None` where it is born toward larger `p`, and under a torque.
@@ -79,7 +80,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Where rest is stable.
+    /// The intervals of stable rest.
     pub(super) fn stable_intervals(&self, p_max: f64) -> Vec<[f64; 2]> {
         let inner = self.critical.iter().map(|c| c.p);
         let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
@@ -134,14 +135,14 @@ pub fn tongues(
     })
 }
 
-/// This pendulum under another drive.
+/// This pendulum with another drive.
 pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
     let mut other = pendulum.clone();
     (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);
     other
 }
 
-/// Whether rest is a solution under all these drives, and nothing holds it.
+/// Whether rest is a solution with all these drives, and not held by friction.
 fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> Result<(), Error> {
     pendulum.check_mappable()?;
     if pendulum.has_friction() {
@@ -166,7 +167,7 @@ fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> R
 
 /// Entries of the monodromy matrix by rows, and its determinant.
 fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Values<5> {
-    // Without drive a period is another one: so little of it changes nothing.
+    // Without drive the period is arbitrary: so small a drive changes nothing.
     let map = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega));
     let image = map.once([balance.angle(), 0.0]);
     let m = image.derivative;
@@ -246,7 +247,7 @@ pub(super) fn bordered(
     (critical.iter().zip(between.windows(2)).map(with_sides).collect(), between[0])
 }
 
-/// A zero of the interpolant moved to that of the function itself, by one step of Newton's method.
+/// A zero of the interpolant, corrected by one step of Newton's method on the function itself.
 fn corrected(
     panel: &Interpolant<5>,
     zero: f64,
@@ -257,6 +258,6 @@ fn corrected(
     let side = |by: f64| function(std::array::from_fn(|k| panel.value(k, zero + by)));
     let slope = (side(width) - side(-width)) / (2.0 * width);
     let step = function(at(zero)) / slope;
-    // At a tip the slope is none, and nothing is to be gained.
+    // At a tip the slope vanishes, and no correction is possible.
     if step.abs() < width { zero - step } else { zero }
 }

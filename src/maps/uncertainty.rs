@@ -1,4 +1,4 @@
-//! How far a start must be known for its end to be known.
+//! Uncertain starts: those whose attractor changes within a given distance.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -14,15 +14,15 @@ const SCALES: [i32; 2] = [-6, -26];
 /// First exponent where a short and smooth boundary leaves fewer distances than `LEAST_SCALES`.
 const WIDEST: i32 = -4;
 const LEAST_SCALES: usize = 5;
-/// Starts at every other distance that say how many each takes.
+/// Number of starts at every other distance in the pilot.
 const PILOT: usize = 512;
-/// Uncertain starts that are aimed at for each distance.
+/// Target number of uncertain starts for each distance.
 const AIM: f64 = 600.0;
-/// Starts a distance, at least and at most.
+/// Least and largest number of starts for a distance.
 const STARTS: [f64; 2] = [200.0, 16_000.0];
-/// Uncertain starts in the pilot that tell the share.
+/// Number of uncertain starts in the pilot that determine the share.
 const LEAST_TELLING: usize = 3;
-/// A distance at which fewer are expected from the most starts says too little.
+/// Least expected number of uncertain starts for a distance to be used.
 const LEAST_UNCERTAIN: f64 = 40.0;
 /// Number of labels: the least, the multiple of the cells of the map, and the most.
 const LABELS: [f64; 3] = [30_000.0, 0.125, 150_000.0];
@@ -35,18 +35,19 @@ const NEAR: f64 = 0.9;
 /// Labels of a start: its own and one on either side.
 const SIDES: usize = 3;
 
-/// How many starts are uncertain: some of them have another label than a start at a distance `eps`,
-/// on one side or on the other, in a direction drawn at random for each (Grebogi, `McDonald`, Ott &
+/// Numbers of uncertain starts, whose label differs from that of a start at a distance `eps`, on
+/// one side or on the other, in a direction drawn at random for each (Grebogi, `McDonald`, Ott &
 /// Yorke 1983, Physics Letters A 99, 415).
 ///
-/// Starts are drawn anew for each distance, so the counts are independent. Those with an end that is
-/// not known, own or beside, are left out. Where the pilot meets uncertain starts only in cells from which
-/// the map shows a change of label within the distance, most starts are drawn there, the others elsewhere,
-/// and both count with their shares of the map (stratified sampling): the counts are those of as many
-/// starts drawn evenly as tell the share as precisely.
+/// Starts are drawn anew for each distance, so the counts are independent. Those with an unknown
+/// label, their own or a neighbour's, are left out. If the pilot meets uncertain starts only in
+/// cells from which the map shows a change of label within the distance, most starts are drawn
+/// there, the others elsewhere, and both are weighted by their shares of the map (stratified
+/// sampling): the counts are those of uniformly drawn starts that would give the share with the
+/// same precision.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Uncertainty {
-    /// Distances, in sides of the window, falling.
+    /// Distances, in sides of the window, decreasing.
     pub eps: Vec<f64>,
     /// Uncertain starts.
     pub uncertain: Vec<u64>,
@@ -54,14 +55,14 @@ pub struct Uncertainty {
     pub tried: Vec<u64>,
 }
 
-/// The shares of uncertain starts in a window of angle and velocity whose map has the labels `map`, by what
-/// `label` says of starts.
+/// The shares of uncertain starts in a window of angle and velocity whose map has the labels `map`;
+/// `label` labels starts.
 ///
-/// A pilot says at which distances enough starts are uncertain, and how many each needs; it is not
-/// counted. Empty where no boundary was met.
+/// A pilot determines the distances at which enough starts are uncertain, and the number of starts
+/// that each needs; it is not included in the counts. Empty if it meets no boundary.
 ///
 /// # Errors
-/// Whatever `label` meets.
+/// Errors of `label`.
 pub fn uncertainty(
     window: [&Axis; 2],
     map: &[i16],
@@ -119,7 +120,7 @@ pub fn uncertainty(
     })
 }
 
-/// Starts drawn from some cells of a map, and what became of them.
+/// Starts drawn from some cells of a map, and their results.
 #[derive(Clone, Copy, Debug)]
 struct Stratum {
     first: usize,
@@ -196,8 +197,8 @@ impl Counts {
     }
 }
 
-/// Distances, and starts for each, from the pilot's counts: of the distances that tell enough the first
-/// ones, as many as leave the exponent the least error.
+/// Distances, and starts for each, from the pilot's counts: the first of the usable distances, in
+/// the number that minimises the error of the exponent.
 fn plan(pilot: &[(i32, usize)], seen: &[Counts], part: f64, labels: f64) -> Vec<(i32, usize)> {
     let told = seen.iter().take_while(|c| c.uncertain() >= LEAST_TELLING).count();
     if told == 0 {
@@ -210,7 +211,7 @@ fn plan(pilot: &[(i32, usize)], seen: &[Counts], part: f64, labels: f64) -> Vec<
             prices.push((seen[k].price(part) * seen[k + 1].price(part)).sqrt());
         }
     }
-    // Beyond what the pilot tells the share may fall as on a smooth boundary.
+    // Beyond the distances of the pilot the share may fall as on a smooth boundary.
     let last = prices[prices.len() - 1];
     prices.extend((1..SCALES[0] - SCALES[1]).map(|k| last * 2_f64.powi(k)));
     let all = (pilot[0].0 - SCALES[1]) as usize + 1;

@@ -1,4 +1,4 @@
-//! Where the angle of a pendulum lives: on the circle, or on the line.
+//! Topology of a pendulum's angle: the circle, or the line.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +16,7 @@ pub enum Angle {
 }
 
 impl Angle {
-    /// Other angles, relative to one, that are the same or may be beside it.
+    /// Other angles, relative to one, that are equal to it or may be adjacent.
     #[must_use]
     pub const fn turns(self) -> &'static [f64] {
         match self {
@@ -34,7 +34,7 @@ impl Angle {
         }
     }
 
-    /// Which half turn an angle is nearest to: even numbers hang, odd ones are upside down.
+    /// The half turn nearest to an angle: even numbers hang, odd ones are inverted.
     #[must_use]
     pub fn half_turn(self, angle: f64) -> i64 {
         let nearest = (angle / PI).round() as i64;

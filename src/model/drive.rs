@@ -35,7 +35,7 @@ impl HarmonicDrive {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(Error::Range { name: "omega", value: omega, allowed: "a number above 0" });
         }
-        // Whole turns off: added to a large phase the time would be lost in rounding.
+        // Without whole turns: added to a large phase the time would be lost in rounding.
         Ok(Self { p, omega, phase: if phase.abs() > TAU { phase % TAU } else { phase } })
     }
 }

@@ -1,4 +1,4 @@
-//! The equation of motion, once.
+//! The equation of motion, written once.
 //!
 //! `th'' + gamma th' + (1 + a(tau)) sin th + l(tau) cos th = torque - theta_r sign(th') + effects`:
 //! eq. 1.2 of Horton, Wiercigroch & Xu (2008), their eq. 2.1 without dimensions where there is
@@ -54,7 +54,8 @@ pub struct Equation<R> {
     corner: Option<(Kind, [R; MOST_PARAMETERS])>,
     sideways: bool,
     plain: bool,
-    /// Whether what friction holds changes with the drive, and with the time in the laboratory.
+    /// Whether the load that friction can hold changes with the drive, and with the laboratory's
+    /// time.
     holds: [bool; 2],
 }
 
@@ -69,7 +70,7 @@ pub struct Forcing<R> {
     pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
-    /// Phase of the harmonic drive, rad, where a formula asks for it.
+    /// Phase of the harmonic drive, rad, if a formula uses it.
     pub phase: R,
 }
 
@@ -242,7 +243,7 @@ impl<R: Real> Equation<R> {
         false
     }
 
-    /// Where the formulas are evaluated; `sense` is 1 or -1.
+    /// The point at which formulas are evaluated; `sense` is 1 or -1.
     #[inline(always)]
     pub fn point(&self, forcing: &Forcing<R>, theta: R, velocity: R, sense: R) -> Point<R> {
         let mut at = self.point_held(forcing, theta, velocity, [sense, sense.like(1.0)]);
@@ -273,7 +274,7 @@ impl<R: Real> Equation<R> {
         [self.keepers[0].is_some(), self.keepers[1].is_some()]
     }
 
-    /// The memory of the torque, or the reading of the play less the angle; none where there is none.
+    /// The memory of the torque, or the reading of the play less the angle; none if there is none.
     #[must_use]
     pub fn kept(&self, which: usize, at: &Point<R>) -> Option<R> {
         let (kind, parameters) = self.keepers[which].as_ref()?;
@@ -325,11 +326,11 @@ impl<R: Real> Equation<R> {
         self.corner.is_some()
     }
 
-    /// All torques per inertia but friction.
+    /// All torques per inertia except friction.
     pub fn load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
         let mut sum = self.moving_load(forcing, at);
         for (formula, parameters) in &self.formulas {
-            // A formula is summed up whole.
+            // A formula is summed as a whole.
             sum = sum + formula.friction(parameters, at) * at.sense;
         }
         sum
@@ -361,7 +362,7 @@ impl<R: Real> Equation<R> {
     /// All torques, and the friction of formulas, moving in the sense of `at`.
     #[inline(always)]
     fn moving_load(&self, forcing: &Forcing<R>, at: &Point<R>) -> R {
-        // First, so that nothing need be kept in registers meanwhile.
+        // Evaluated first, so that no other value has to be kept in registers.
         let extra = self.extra(forcing, at);
         let damping = Kind::ViscousDamping.torque(&Self::only(self.gamma), at);
         let bias = Kind::BiasTorque.torque(&Self::only(self.torque), at);

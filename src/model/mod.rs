@@ -1,4 +1,4 @@
-//! The equation of motion, what drives it and what else acts.
+//! The equation of motion, its drive and its effects.
 
 pub mod angle;
 pub mod drive;

@@ -1,4 +1,5 @@
-//! The reading of the sensor, by angle and velocity. The motion does not depend on it: maps leave it out.
+//! The sensor's reading as a function of angle and velocity. The motion does not depend on it: maps
+//! ignore it.
 
 use super::effects::{Action, Kind, MOST_PARAMETERS};
 use super::pendulum::Pendulum;
@@ -37,8 +38,8 @@ impl<R: Real> Observation<R> {
         self
     }
 
-    /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity` at the laboratory's
-    /// time `lab`: each effect in the order of the model takes what the one before it gives.
+    /// The reading at the angle `theta`, rad and not wrapped, passed at `velocity` at the
+    /// laboratory's time `lab`: effects are applied in the order of the model.
     #[must_use]
     pub fn read(&self, theta: R, velocity: R, lab: R) -> R {
         let mut reading = theta;

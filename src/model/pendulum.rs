@@ -9,7 +9,7 @@ use super::effects::{Action, Effect, Kind, Mappable, Role};
 use super::equation::Equation;
 use crate::error::Error;
 
-/// The parametrically excited pendulum, nondimensional; [`Equation`] is what it obeys.
+/// The parametrically excited pendulum, nondimensional, with the equation of motion [`Equation`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pendulum {
     /// Viscous damping `c / (m w0)`, twice the damping ratio.
@@ -20,34 +20,34 @@ pub struct Pendulum {
     pub torque: f64,
     /// Coulomb friction `Tr / w0^2`.
     pub theta_r: f64,
-    /// Whatever else acts.
+    /// The effects.
     pub effects: Vec<Effect>,
     /// Time in the laboratory at `tau = 0`, for effects that drift.
     pub lab_time: f64,
 }
 
-/// How the mirrored motion `(-th, -v)` is a motion too.
+/// Symmetry under which the mirrored motion `(-th, -v)` is a motion too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Symmetry {
     /// At the same phase of the drive.
     AtOnce,
-    /// Half a period of the drive later: under a torque that changes its sign by then.
+    /// Half a period of the drive later, with a torque that changes its sign in that time.
     HalfPeriod,
 }
 
-/// Which way through the kernel a pendulum takes.
+/// The route of a pendulum through the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
     /// Torques of angle and time, viscous damping: Runge-Kutta-Nystrom.
     Smooth,
     /// A friction that does not depend on the velocity: Runge-Kutta-Nystrom and events.
     Friction,
-    /// Torques of the velocity: Runge-Kutta, with events where something changes with its sign.
+    /// Torques of the velocity: Runge-Kutta, with events if something changes with its sign.
     General,
 }
 
 impl Pendulum {
-    /// How many parameters it has besides those of its effects.
+    /// Number of parameters in addition to those of its effects.
     pub const OWN_PARAMETERS: usize = 6;
 
     /// Without friction and effects. Checks the ranges: all finite, gamma not negative, omega
@@ -79,7 +79,7 @@ impl Pendulum {
         Ok(self)
     }
 
-    /// This pendulum with one effect more.
+    /// This pendulum with one more effect.
     ///
     /// Viscous damping, Coulomb friction and a bias torque become `gamma`, `theta_r` and `torque`:
     /// they are the same effects under the paper's names.
@@ -107,7 +107,7 @@ impl Pendulum {
         }
         self.effects.push(effect);
         if self.effects.iter().filter(|e| e.has_corner()).count() > 1 {
-            // Steps end at the corner of one effect: those of formulas are stepped over.
+            // Steps end at the corner of one effect; those of formulas are ignored.
             for other in &mut self.effects {
                 other.kind = other.kind.loosened();
             }
@@ -115,7 +115,7 @@ impl Pendulum {
         Ok(self)
     }
 
-    /// The equation of motion with its numbers.
+    /// The equation of motion with plain numbers.
     #[must_use]
     pub fn equation(&self) -> Equation<f64> {
         Equation::lift(self, |_, value| value)
@@ -189,7 +189,8 @@ impl Pendulum {
         None
     }
 
-    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
+    /// The acceleration `th''` at time `tau`, with the sense of `velocity` unchanged for a long
+    /// time.
     #[must_use]
     pub fn acceleration(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
         self.equation().acceleration_at(tau, theta, velocity)
@@ -201,7 +202,7 @@ impl Pendulum {
         self.equation().motion
     }
 
-    /// The greatest factor on gravity that the drive reaches, at most.
+    /// An upper bound on the factor of gravity under the drive.
     #[must_use]
     pub fn greatest_pull(&self) -> f64 {
         let motion = self.motion();
@@ -241,7 +242,7 @@ impl Pendulum {
         if self.is_mirror_symmetric() {
             return Some(Symmetry::AtOnce);
         }
-        // A moving pivot is not what it was half a period before.
+        // A moving pivot differs from its motion half a period before.
         let symmetric = self.torque == 0.0 && self.motion().p == 0.0;
         (symmetric && self.effects.iter().all(later)).then_some(Symmetry::HalfPeriod)
     }
@@ -254,13 +255,13 @@ impl Pendulum {
             || self.effects.iter().any(|e| e.is(&[Action::Velocity, Action::Kinked]) || e.rubs())
     }
 
-    /// How fast the motion loses its speed, at speed 1: `gamma + theta_r` and what effects add.
+    /// The rate of loss of speed, at speed 1: `gamma + theta_r` and contributions of effects.
     #[must_use]
     pub fn damping_rate(&self) -> f64 {
         0.5 * (self.acceleration(0.0, 0.0, -1.0) - self.acceleration(0.0, 0.0, 1.0))
     }
 
-    /// Which way through the kernel it takes.
+    /// Its route through the kernel.
     #[must_use]
     pub fn route(&self) -> Route {
         let has = |actions: &[Action]| self.effects.iter().any(|e| e.is(actions));
@@ -277,7 +278,7 @@ impl Pendulum {
         }
     }
 
-    /// Whether something can hold it fast.
+    /// Whether a friction can hold it.
     #[must_use]
     pub fn has_friction(&self) -> bool {
         self.theta_r > 0.0 || self.effects.iter().any(Effect::rubs)
@@ -290,14 +291,14 @@ impl Pendulum {
         self.has_friction() || self.effects.iter().any(kinked) || self.has_corner()
     }
 
-    /// Whether an effect has a corner besides the velocity's zeros.
+    /// Whether an effect has a corner other than at the velocity's zeros.
     #[must_use]
     pub fn has_corner(&self) -> bool {
         self.equation().has_corner()
     }
 
-    /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb
-    /// friction.
+    /// Whether a torque of angle and time acts in addition to gravity, the constant torque and
+    /// Coulomb friction.
     #[must_use]
     pub fn has_extra_load(&self) -> bool {
         let position =
@@ -305,14 +306,14 @@ impl Pendulum {
         self.motion().lateral != 0.0 || self.effects.iter().any(position)
     }
 
-    /// Where its angle lives.
+    /// Topology of its angle.
     #[must_use]
     pub fn angle(&self) -> Angle {
         let counts = |e: &Effect| e.kind.counts_turns(&e.parameters);
         if self.effects.iter().any(counts) { Angle::Line } else { Angle::Circle }
     }
 
-    /// Whether a turn makes no difference.
+    /// Whether it is invariant under a turn.
     #[must_use]
     pub fn repeats_every_turn(&self) -> bool {
         let differs = |e: &Effect| e.kind.bars_maps(&e.parameters) == Some(NOT_PERIODIC);

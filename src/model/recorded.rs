@@ -9,7 +9,7 @@ use crate::error::Error;
 /// The recorded quantity of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Where the pivot is.
+    /// Position of the pivot.
     Position,
     /// Its velocity.
     Velocity,

@@ -1,4 +1,4 @@
-//! The pendulum at rest under friction: whether it lasts, and when it ends.
+//! The pendulum at rest under friction: its stability, and the time of its release.
 //!
 //! Stuck now: `|load| <= friction` at `th' = 0`. Under the harmonic drive, with `S = sin th` and all
 //! torques and frictions that do not change in `torque` and `theta_r`, the excess of the load in the
@@ -10,9 +10,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::equation::{Equation, Forcing};
 
-/// An excess that does not pass this part of the friction counts as none: it opens a window of time
-/// so short that what moves in it, about the square of the excess, is lost in the last place of the
-/// angle.
+/// An excess below this part of the friction is neglected: it would open a window of time so short
+/// that the motion in it, about the square of the excess, is below the rounding of the angle.
 const EDGE: f64 = 1e-10;
 /// Samples of the excess in a period.
 const SAMPLES: usize = 96;
@@ -69,7 +68,7 @@ impl Equation<f64> {
         self.pushed(vertical, 0.0, 0.0)
     }
 
-    /// Whether the pendulum at rest at `theta` is never let go.
+    /// Whether the pendulum at rest at `theta` is held for ever.
     #[must_use]
     pub fn holds_for_ever(&self, theta: f64) -> bool {
         self.excess(theta) <= EDGE * self.hold(theta)
@@ -107,14 +106,14 @@ pub enum Release {
     Now(f64),
     /// At that time, in that sense.
     At(f64, f64),
-    /// Not before the time asked for.
+    /// Not before the requested time.
     Later,
     /// Never.
     Never,
 }
 
-/// When a pendulum that is at rest at `theta` at time `tau` moves; looked for until `until` where
-/// the equation does not repeat.
+/// The time at which a pendulum at rest at `theta` at time `tau` moves; sought up to `until` if the
+/// equation is not periodic.
 pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
     let [forth, back] = excesses(load, tau, theta);
     // The load cancels in their sum.
@@ -159,7 +158,7 @@ fn closed<L: Load>(load: &L, tau: f64, theta: f64, edge: f64) -> Release {
         if size - limit <= edge {
             continue;
         }
-        // Where it is positive lies within `half` on either side of the phase 0.
+        // It is positive within `half` on either side of the phase 0.
         let half = (limit / size).clamp(-1.0, 1.0).acos();
         let turn = if sense * swing < 0.0 { PI } else { 0.0 };
         let mut wait = (-half - (motion.omega * tau + motion.phase + turn)).rem_euclid(TAU);

@@ -1,4 +1,4 @@
-//! Floquet multipliers of a closed orbit.
+//! Floquet multipliers of a periodic orbit.
 
 use nalgebra::{Complex, Matrix2};
 
@@ -10,13 +10,13 @@ use nalgebra::{Complex, Matrix2};
 pub struct Multipliers(pub [Complex<f64>; 2]);
 
 impl Multipliers {
-    /// The largest modulus: below 1 the orbit attracts.
+    /// The largest modulus: the orbit attracts if it is below 1.
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.0[0].norm()
     }
 
-    /// The largest Lyapunov exponent of an orbit that closes after `duration`.
+    /// The largest Lyapunov exponent of an orbit of the given duration.
     #[must_use]
     pub fn exponent(&self, duration: f64) -> f64 {
         self.largest().ln() / duration

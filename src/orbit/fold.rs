@@ -1,4 +1,4 @@
-//! The oscillation that is born where rest loses its stability, followed to where it turns back.
+//! The oscillation that branches off at the loss of stability of rest, continued to its fold.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
@@ -8,18 +8,18 @@ use crate::model::Pendulum;
 
 /// Length of a step along the branch, in the space of angle, velocity and `p`.
 const STEP: f64 = 0.08;
-/// Steps at most.
+/// Largest number of steps.
 const MOST_STEPS: usize = 80;
 /// Change of `p` by which the map's derivative by it is measured.
 const DIFFERENCE: f64 = 1e-6;
-/// Newton's steps onto the branch, and how near is there.
+/// Newton's steps onto the branch, and the tolerance of convergence.
 const ITERATIONS: usize = 12;
 const RESIDUAL: f64 = 1e-12;
 /// Refinements of the place of the fold.
 const REFINEMENTS: usize = 30;
 const LEVEL: f64 = 1e-9;
 
-/// Where a branch of oscillations turns back.
+/// The fold of a branch of oscillations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fold {
     /// Amplitude of the drive: below it the oscillation does not exist.
@@ -64,7 +64,7 @@ impl Branch<'_> {
         Some(if along.dot(&before) < 0.0 { -along } else { along })
     }
 
-    /// The point of the branch so far along `from`'s direction.
+    /// The point of the branch at this distance along `from`'s direction.
     fn onto(&self, from: Place, length: f64) -> Option<Place> {
         let (start, along) = from;
         let mut z = start + along * length;
@@ -93,7 +93,7 @@ pub fn fold_of_onset(pendulum: &Pendulum, multiplier: f64) -> Option<Fold> {
     let branch = Branch { pendulum, multiplier };
     let derivative = PoincareMap::new(pendulum).once([0.0; 2]).derivative;
     let weak = derivative - Matrix2::identity() * multiplier;
-    // The vector that it turns into nothing.
+    // The vector in its kernel.
     let rows = [weak.row(0), weak.row(1)];
     let row = rows[usize::from(rows[1].norm() > rows[0].norm())];
     let shed = Vector2::new(-row[1], row[0]).try_normalize(0.0)?;

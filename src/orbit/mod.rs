@@ -1,4 +1,4 @@
-//! Closed orbits: the precise stroboscopic map, Newton's method, Floquet multipliers.
+//! Periodic orbits: the precise stroboscopic map, Newton's method, Floquet multipliers.
 
 pub mod floquet;
 pub mod fold;

@@ -9,11 +9,11 @@ use super::poincare::PoincareMap;
 use crate::integrate::State;
 use crate::model::Angle;
 
-/// Largest `|P^n(x) - x|` of an orbit that counts as found, where rounding allows it.
+/// Largest `|P^n(x) - x|` of a converged orbit, if rounding allows it.
 pub const RESIDUAL: f64 = 1e-12;
 /// Rounding error of a point, times the derivative: the least residual that rounding allows.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Largest relative deviation of a period's shrinking of area from the exact product.
+/// Largest relative deviation of a period's contraction of area from the exact product.
 pub const PRODUCT: f64 = 1e-9;
 const ITERATIONS: usize = 16;
 /// By this iteration the gap must have fallen tenfold, or the start was too far.
@@ -21,7 +21,7 @@ const PROMISING: usize = 5;
 /// Points closer than this are one point of the orbit.
 const SAME_POINT: f64 = 1e-8;
 
-/// A closed orbit of the stroboscopic map.
+/// A periodic orbit of the stroboscopic map.
 #[derive(Clone, Debug)]
 pub struct PeriodicOrbit {
     /// Smallest period, in forcing periods, modulo a turn.
@@ -36,7 +36,7 @@ pub struct PeriodicOrbit {
     pub multipliers: Multipliers,
     /// Derivative of `P^n` at each point.
     pub monodromy: Vec<Matrix2<f64>>,
-    /// Where the angle lives.
+    /// Topology of the angle.
     pub angle: Angle,
 }
 
@@ -97,7 +97,7 @@ pub fn find_other(
 ) -> Option<PeriodicOrbit> {
     let mut point = polish(map, [map.angle.wrapped(start[0]), start[1]], n, reach, known)?;
     if !known.is_empty() {
-        // Where zeros lie close the gap is small all about: once more without what repels.
+        // Near several zeros the gap is small everywhere: repeated without deflation.
         point = polish(map, point, n, reach, &[])?;
     }
     let image = |d: usize| map.iterate(point, d);
@@ -108,19 +108,19 @@ pub fn find_other(
     complete(map, [map.angle.wrapped(point[0]), point[1]], smallest)
 }
 
-/// The place of the point with the lowest angle.
+/// The index of the point with the lowest angle.
 fn lowest(points: &[State]) -> usize {
     (0..points.len()).min_by(|a, b| points[*a][0].total_cmp(&points[*b][0])).unwrap_or(0)
 }
 
-/// The least gap that can be told from none.
+/// The least resolvable gap.
 fn least_gap(derivative: &Matrix2<f64>) -> f64 {
     RESIDUAL.max(ROUNDING * derivative.norm())
 }
 
 fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]) -> Option<State> {
     let mut point = start;
-    // How large the gap is over the least one.
+    // Ratio of the gap to the least one.
     let mut best: Option<(f64, State)> = None;
     let mut first = f64::INFINITY;
     for iteration in 0..ITERATIONS {
@@ -138,12 +138,12 @@ fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]
             break;
         }
         match best {
-            // At the level of rounding the gap no longer falls: that is the end.
+            // At the level of rounding the gap no longer falls: the iteration ends.
             Some((least, _)) if size >= least && least < 1.0 => break,
             Some((least, _)) if size >= least => {}
             _ => best = Some((size, point)),
         }
-        // None where all that is near closes too, as about rest without damping and drive.
+        // None if all nearby states close too, as about rest without damping and drive.
         let Some(step) = (Matrix2::identity() - image.derivative).lu().solve(&gap) else { break };
         let step = repelled(map.angle, step, point, known);
         let length = step.norm();
@@ -177,7 +177,7 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
         let image = map.once(state);
         derivatives.push(image.derivative);
         products.push(image.product);
-        // Not the turns taken off alone: a point at pi may come back at -pi.
+        // Not only by the turns removed: a point at pi may come back at -pi.
         way += image.turns as f64 * TAU + image.state[0] - state[0];
         state = image.state;
     }

@@ -20,7 +20,7 @@ const STEP: f64 = 0.025;
 pub struct PoincareMap {
     /// The model.
     pub pendulum: Pendulum,
-    /// Where its angle lives.
+    /// Topology of its angle.
     pub angle: Angle,
     way: Way,
 }
@@ -34,12 +34,12 @@ enum Way {
     Lanes(Box<Strobe>),
 }
 
-/// An image of the map with its derivative.
+/// An image under the map with its derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Image {
     /// Angle, on the circle in [-pi, pi], and velocity.
     pub state: State,
-    /// Whole turns taken off the angle.
+    /// Whole turns removed from the angle.
     pub turns: i64,
     /// Derivative of the state by the first state.
     pub derivative: Matrix2<f64>,
@@ -63,14 +63,14 @@ impl PoincareMap {
         Self { pendulum: pendulum.clone(), angle: pendulum.angle(), way }
     }
 
-    /// The map that `strobe` steps: as precise as that, and as quick.
+    /// The map of `strobe`'s steps, with the same precision and speed.
     #[must_use]
     pub fn of_steps(strobe: &Strobe) -> Self {
         let way = Way::Lanes(Box::new(strobe.clone()));
         Self { pendulum: strobe.pendulum.clone(), angle: strobe.angle, way }
     }
 
-    /// One period on.
+    /// Advances by one period.
     #[must_use]
     pub fn once(&self, state: State) -> Image {
         let flow_of = match &self.way {
@@ -92,13 +92,13 @@ impl PoincareMap {
         }
     }
 
-    /// The way from one state to another, on the circle modulo a turn.
+    /// The difference of two states, on the circle modulo a turn.
     #[must_use]
     pub fn gap(&self, from: State, to: State) -> Vector2<f64> {
         Vector2::new(self.angle.wrapped(to[0] - from[0]), to[1] - from[1])
     }
 
-    /// `periods` periods on, with the derivative of the whole.
+    /// Advances by `periods` periods, with the derivative of the whole.
     #[must_use]
     pub fn iterate(&self, state: State, periods: usize) -> Image {
         let mut image =
@@ -116,7 +116,7 @@ impl PoincareMap {
     }
 }
 
-/// One period of `strobe` on, a lane for each column of the derivative.
+/// Advances by one period of `strobe`, a lane for each column of the derivative.
 fn stretched(strobe: &Strobe, state: State) -> Image {
     let (mut theta, mut velocity) = ([state[0]; 2], [state[1]; 2]);
     let (mut turns, mut growth) = ([0.0; 2], [0.0; 2]);

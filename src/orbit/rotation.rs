@@ -24,7 +24,7 @@ const FASTEST: f64 = 200.0;
 /// A rotation of the undriven pendulum: the velocity repeats after one turn.
 #[derive(Clone, Debug)]
 pub struct Rotation {
-    /// Velocity where the pendulum hangs down (`theta = 0`).
+    /// Velocity at the hanging position (`theta = 0`).
     pub velocity: f64,
     /// Time of one turn.
     pub period: f64,
@@ -63,7 +63,7 @@ fn carry(
     let sense = number(sense, [0.0; 2]);
     let (state, ends) = (&mut state, &mut [sense; 2]);
     let stages = &mut Stages::new(sense);
-    // Both signs are the sense: what has a corner does not come here.
+    // Both signs are the sense: models with a corner do not use this.
     let signs = [sense; 2];
     Stepping { equation, clock, signs, part: ALL_STAGES, state, ends, stages }.run();
     let Running { theta, velocity } = *state;

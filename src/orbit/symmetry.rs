@@ -9,7 +9,7 @@ use crate::model::{Angle, Pendulum};
 
 /// Error of a step of the flow over half a period.
 const STEP_ERROR: f64 = 1e-12;
-/// Newton's method may not wander further than this from the image that half a period gives.
+/// Largest distance of Newton's method from the image given by half a period.
 const REACH: f64 = 0.1;
 
 /// The symmetry of a pendulum, acting on stroboscopic states.
@@ -21,7 +21,7 @@ pub struct Mirror {
 }
 
 impl Mirror {
-    /// The symmetry of `pendulum`; none where it has no such symmetry.
+    /// The symmetry of `pendulum`; none if it has none.
     #[must_use]
     pub fn of(pendulum: &Pendulum) -> Option<Self> {
         let half = match pendulum.symmetry()? {
@@ -54,7 +54,7 @@ impl Mirror {
     /// The mirror image of an orbit of `map`, and where that is exact the number of places that its points
     /// have moved ([`PeriodicOrbit::mirrored`]).
     ///
-    /// None where Newton's method does not find it.
+    /// None if Newton's method does not find it.
     #[must_use]
     pub fn orbit(
         &self,

@@ -1,4 +1,4 @@
-//! Arrays, states and attractors, which several results have.
+//! Shared conversions: arrays, states and attractors.
 
 use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pendmap::attractor;
@@ -11,7 +11,7 @@ use super::raise;
 /// An array of one dimension.
 pub type Array<T> = Py<PyArray1<T>>;
 
-/// The array that takes over `values`.
+/// The array that takes ownership of `values`.
 pub fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Array<T> {
     values.into_pyarray(py).unbind()
 }
@@ -29,12 +29,12 @@ pub fn states(
     Ok(theta.iter().zip(velocity).map(|(a, b)| [*a, *b]).collect())
 }
 
-/// An attractor, or a closed orbit.
+/// An attractor, or a periodic orbit.
 #[pyclass(frozen, get_all, subclass, module = "pendmap._core")]
 pub struct Attractor {
     name: String,
     kind: &'static str,
-    /// Period in forcing periods; none where it has no meaning.
+    /// Period in forcing periods; none if meaningless.
     n: Option<usize>,
     /// Net turns over that period.
     w: Option<i64>,

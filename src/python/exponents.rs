@@ -14,7 +14,7 @@ use super::model::Model;
 use super::motion::strobe;
 use super::{raise, reckon};
 
-/// Numerical choices as Python hands them over.
+/// Numerical choices as Python passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct ExponentChoices {

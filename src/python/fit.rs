@@ -33,7 +33,7 @@ type FreeTuple = (Vec<(usize, String)>, f64);
 /// `(record, first sample, one after the last, angle, velocity)`.
 type WindowTuple = (usize, usize, usize, f64, f64);
 
-/// A recorded motion of the pivot as Python hands it over.
+/// A recorded motion of the pivot as Python passes it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Pivot<'py> {
@@ -60,7 +60,8 @@ impl Pivot<'_> {
     }
 }
 
-/// A sensor on the rod as Python hands it over: its factors, and about which angles it saw.
+/// A sensor on the rod as Python passes it: its factors, and the approximate angles at its
+/// readings.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Sensor<'py> {
@@ -71,7 +72,7 @@ pub struct Sensor<'py> {
     angle: Floats<'py>,
 }
 
-/// A record as Python hands it over.
+/// A record as Python passes it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Run<'py> {
@@ -116,7 +117,7 @@ impl Run<'_> {
     }
 }
 
-/// Choices of a fit as Python hands them over.
+/// Choices of a fit as Python passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct FitChoices {
@@ -252,7 +253,7 @@ impl FittedRun {
     }
 }
 
-/// The best values of the free parameters, and what follows from them.
+/// The best values of the free parameters, and derived results.
 #[pyfunction]
 #[pyo3(signature = (runs, free, choices, windows=None))]
 pub fn fit_runs(

@@ -66,7 +66,7 @@ fn simd() -> PyResult<&'static str> {
     Ok(InstructionSet::choose().map_err(raise)?.name())
 }
 
-/// The instruction sets that this processor has, quickest first.
+/// The instruction sets of this processor, fastest first.
 #[pyfunction]
 fn simd_available() -> Vec<&'static str> {
     InstructionSet::ALL
@@ -76,7 +76,7 @@ fn simd_available() -> Vec<&'static str> {
         .collect()
 }
 
-/// Refuses `count` of `what`, with `each` bytes each, where that is more memory than is free.
+/// Refuses `count` of `what`, with `each` bytes each, if that exceeds the free memory.
 #[pyfunction]
 fn reckon(what: &str, count: usize, each: usize) -> PyResult<()> {
     memory::reckon(what, count, each).map_err(raise)
@@ -112,7 +112,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        // Loads numpy's functions now: later an interrupt could come in between.
+        // Loads numpy's functions now, since an interrupt could occur during a later import.
         numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

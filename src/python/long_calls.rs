@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use super::raise;
 
-/// How often signals and progress are looked at.
+/// Interval between checks of signals and progress.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Runs `work` on another thread and waits for it, detached from the interpreter; at every
@@ -29,8 +29,8 @@ pub fn watched<T: Send>(
     stop.map_or_else(|| result.map_err(raise), Err)
 }
 
-/// Like [`watched`], in a pool of this call's own: threads that outlived a call would be missing in a
-/// forked child, and whoever gave them work there would wait for ever.
+/// Like [`watched`], in a pool of this call's own: threads of an earlier call would be missing in a
+/// forked child, and work given to them would never finish.
 pub fn pooled<T: Send>(
     py: Python<'_>,
     threads: usize,
@@ -40,8 +40,8 @@ pub fn pooled<T: Send>(
     watched(py, progress, |control| pool(threads)?.install(|| work(control)))
 }
 
-/// Like [`watched`] with anything done at every pause; what `work` came to, and what stopped it, a
-/// signal or an error of `report`.
+/// Like [`watched`] with any action at every pause; returns the result of `work`, and the signal or
+/// error of `report` that stopped it.
 pub fn stopped<T: Send>(
     py: Python<'_>,
     mut report: impl FnMut(Python<'_>, &Control) -> PyResult<()> + Send,

@@ -14,7 +14,7 @@ use super::long_calls::watched;
 use super::model::Model;
 use super::{raise, reckon};
 
-/// `(low, high, count)` as Python hands it over.
+/// `(low, high, count)` as Python passes it.
 pub type AxisTuple = (f64, f64, usize);
 
 /// The axes of a grid of starts.
@@ -23,7 +23,7 @@ pub fn axes(theta: AxisTuple, velocity: AxisTuple) -> PyResult<[Axis; 2]> {
     Ok([axis("theta", theta)?, axis("velocity", velocity)?])
 }
 
-/// Numerical choices as Python hands them over.
+/// Numerical choices as Python passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Choices {
@@ -42,7 +42,7 @@ impl From<Choices> for Options {
     }
 }
 
-/// Entropies of a plane of labels, and how often neighbours agree.
+/// Entropies of a plane of labels, and the share of agreeing neighbours.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
 pub struct Texture {
     basin_entropy: f64,
@@ -51,7 +51,7 @@ pub struct Texture {
     boxes: usize,
     boundary_boxes: usize,
     neighbours_agree: f64,
-    /// How often neighbours would agree by chance.
+    /// The expected share of agreeing neighbours by chance.
     chance: f64,
 }
 

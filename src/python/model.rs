@@ -1,4 +1,4 @@
-//! A model as Python hands it over: a `pendmap.Pendulum`, read by its attributes.
+//! A model as Python passes it: a `pendmap.Pendulum`, read by its attributes.
 
 use std::sync::Arc;
 

@@ -48,7 +48,7 @@ pub fn strobe(pendulum: &Pendulum, steps: usize) -> PyResult<Strobe> {
     Ok(Strobe::new(pendulum, steps, InstructionSet::choose().map_err(raise)?))
 }
 
-/// Many starts, the same number of forcing periods on.
+/// Advances many starts by the same number of forcing periods.
 #[pyfunction]
 #[pyo3(signature = (model, theta, velocity, periods, steps_per_period, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
@@ -126,7 +126,7 @@ impl Trajectory {
     }
 }
 
-/// One trajectory. With `live` its samples are handed over as they come, `live(times, angles,
+/// One trajectory. With `live` its samples are passed on as they are computed, `live(times, angles,
 /// velocities)`, and an interrupt ends it with the last one.
 #[pyfunction]
 #[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]

@@ -1,4 +1,4 @@
-//! Bindings of closed orbits.
+//! Bindings of periodic orbits.
 
 use pendmap::attractor;
 use pendmap::attractor::catalogue::arrange;
@@ -10,15 +10,15 @@ use super::long_calls::watched;
 use super::maps::{AxisTuple, axes};
 use super::model::Model;
 
-/// A closed orbit.
+/// A periodic orbit.
 #[pyclass(frozen, get_all, extends = Attractor, module = "pendmap._core")]
 pub struct Orbit {
-    /// How far it is from closing.
+    /// Its residual, the distance by which it fails to close.
     residual: f64,
     stable: bool,
 }
 
-/// The closed orbits that a search found.
+/// The periodic orbits found by a search.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
 pub struct OrbitSearch {
     orbits: Vec<Py<Orbit>>,
@@ -28,7 +28,8 @@ pub struct OrbitSearch {
     friction: bool,
 }
 
-/// All closed orbits of period `n` and winding `w` in a box, with where the search began.
+/// All periodic orbits of period `n` and winding `w` in a box, and the starting points of the
+/// search.
 #[pyfunction]
 #[pyo3(signature = (model, winding, theta, velocity, threads, progress=None))]
 pub fn orbits(

@@ -35,14 +35,14 @@ pub struct ParameterMap {
     /// Share of undecided starts of each cell.
     undecided: Array<f64>,
     failed: Array<f64>,
-    /// Periods for which chaos was watched in each cell.
+    /// Periods for which chaos was observed in each cell.
     chaos_periods: Array<u32>,
     reached_error: f64,
     searched_again: usize,
     simd: &'static str,
 }
 
-/// The attractors along one parameter, their points, and what is followed up and down.
+/// The attractors along one parameter, their points, and the motions followed up and down.
 #[pyclass(frozen, get_all, extends = ParameterMap, module = "pendmap._core")]
 pub struct Bifurcation {
     /// The attractor of each point.
@@ -58,7 +58,7 @@ pub struct Bifurcation {
 pub struct Followed {
     /// The attractor at each value; -1 for none.
     on: Array<i32>,
-    /// Place of the value, angle and velocity of points that are on no attractor.
+    /// Index of the value, angle and velocity of points that are on no attractor.
     value: Array<i32>,
     theta: Array<f64>,
     velocity: Array<f64>,
@@ -143,7 +143,7 @@ pub fn parameter_map(
     ParameterMap::new(py, &map)
 }
 
-/// The attractors along one parameter, their points, and what is followed up and down.
+/// The attractors along one parameter, their points, and the motions followed up and down.
 #[pyfunction]
 #[pyo3(signature = (model, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter

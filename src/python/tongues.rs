@@ -26,7 +26,7 @@ pub struct CriticalAmplitudes {
 
 #[pymethods]
 impl CriticalAmplitudes {
-    /// The result for a pendulum without rest there: none.
+    /// The result for a pendulum without such a rest: empty.
     #[staticmethod]
     fn no_rest() -> Self {
         Self { stable: vec![false], ..Self::default() }

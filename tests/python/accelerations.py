@@ -1,4 +1,4 @@
-"""What an accelerometer on the rod reads of the decays of scipy, and its files."""
+"""Readings of an accelerometer on the rod, computed from decays integrated with scipy."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ SENSORS: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "angular": ({"direction": "angular", "noise": 0.2}, 'direction = "angular"'),
 }
-"""What :func:`readings` takes of a sensor, and what [columns] says of it."""
+"""Parameters of a sensor for :func:`readings`, and its entries in [columns]."""
 
 
 def column(sensor: str) -> str:
-    """Return what [columns] says of the acceleration."""
+    """Return the entry of [columns] that describes the acceleration."""
     unit = "rad/s2" if sensor == "angular" else "m/s2"
     return f'{{ name = "acc", unit = "{unit}", {SENSORS[sensor][1]} }}'
 
 
-def handled(  # noqa: PLR0913 (the hand's way)
+def handled(  # noqa: PLR0913 (the motion of the hand)
     sensor: str,
     releases: Sequence[tuple[float, float]],
     *,
@@ -49,10 +49,11 @@ def handled(  # noqa: PLR0913 (the hand's way)
     tremble: float = 0.0,
     rate: int = 100,
 ) -> tuple[Floats, Floats, list[tuple[float, float]]]:
-    """Return times and readings of several releases, and from when to when each swings freely.
+    """Return times, readings, and the interval of free swing of each of several releases.
 
     The pendulum is carried to each angle (rad) along a quintic, held there, and swings for the
-    seconds given; a hand stops it at once. ``tremble`` (rad) is the hand's, at 7 Hz.
+    given number of seconds; a hand stops it at once. ``tremble`` is the amplitude (rad) of the
+    hand's tremor at 7 Hz.
     """
     given = {"gravity": GRAVITY, "noise": 0.02, "distance": 1.0, **SENSORS[sensor][0]}
     noise, gravity = given.pop("noise"), given["gravity"]
@@ -112,7 +113,7 @@ def readings(  # noqa: PLR0913 (the pendulum and the sensor)
 def experiment(
     folder: Path, column: str, *columns: Floats, names: str = "t_s,acc", more: str = ""
 ) -> Path:
-    """Write a folder with one run; ``column`` is what [columns] says of the acceleration."""
+    """Write a folder with one run; ``column`` describes the acceleration in [columns]."""
     folder.mkdir(exist_ok=True)
     table = np.stack(columns, axis=1)
     np.savetxt(folder / "run.csv", table, delimiter=",", header=names, comments="", fmt="%.10g")

@@ -1,4 +1,4 @@
-"""An experiment whose pendulum has a bump that no effect of the library is, by scipy."""
+"""An experiment, by scipy, whose pendulum has a bump that no effect of the library describes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 W0, C_OVER_M = 6.2, 0.06
 BUMP = {"height": 0.9, "width": 0.18}
-"""In rad/s^2 and rad: 1/40 of gravity, about an angle of 0.8 rad."""
+"""Parameters of the bump, rad/s^2 and rad: 1/40 of gravity, about an angle of 0.8 rad."""
 PLACE = 0.8
 
 FILE = f"""
@@ -30,13 +30,13 @@ parameters = {{ k = 1.5 }}
 
 
 def torque(theta: float) -> float:
-    """The bump, rad/s^2."""
+    """Return the torque of the bump, rad/s^2."""
     off = math.remainder(theta - PLACE, math.tau)
     return BUMP["height"] * math.exp(-((off / BUMP["width"]) ** 2))
 
 
 def experiment(folder: Path, *, seed: int = 1) -> Path:
-    """Four free decays, one of them held back, read by an encoder with some noise."""
+    """Write four free decays, one of them held out, read by an encoder with noise."""
     folder.mkdir()
     rng = np.random.default_rng(seed)
     lines = ["[rig]", "encoder_counts = 4096"]

@@ -1,4 +1,4 @@
-"""What several tests share: reference values, the command itself."""
+"""Shared fixtures: reference values, the command line, strict recordings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
 
-# No test fails for what else the machine does; files of one example are overwritten by the next.
+# The load of the machine fails no test; files of one example are overwritten by the next.
 settings.register_profile(
     "steady",
     deadline=None,
@@ -33,7 +33,7 @@ settings.load_profile("steady")
 
 @pytest.fixture(scope="session", autouse=True)
 def known_diagnoses(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of `hidden.diagnosed`: of this run alone, and of all its processes."""
+    """Return the folder of `hidden.diagnosed`, shared by all processes of this test run."""
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "diagnoses"
     folder.mkdir(exist_ok=True)
@@ -43,7 +43,7 @@ def known_diagnoses(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def truths() -> dict[str, Any]:
-    """Reference values from independent tools; tests/truths.json says which."""
+    """Return reference values from independent tools; tests/truths.json states which."""
     content: dict[str, Any] = json.loads((HERE.parent / "truths.json").read_text(encoding="utf-8"))
     return content
 
@@ -54,21 +54,21 @@ class Run(Protocol):
     def __call__(
         self, *words: object, env: dict[str, str] | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """Run it to its end."""
+        """Run the command to its end."""
         ...
 
 
 def run_command(
     folder: Path, *words: object, env: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run `pendmap` with these words in a folder, without a display."""
+    """Run `pendmap` with the given words in a folder, without a display."""
     clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
     return subprocess.run(
         [str(COMMAND), *map(str, words)],
         capture_output=True,
         text=True,
         check=False,
-        timeout=600,  # s: what hangs; what else the machine does may take minutes
+        timeout=600,  # s: limit for a command that hangs; a loaded machine may take minutes
         cwd=folder,
         env=clean | (env or {}),
     )
@@ -76,14 +76,14 @@ def run_command(
 
 @pytest.fixture
 def pendmap_command(tmp_path: Path) -> Run:
-    """Run `pendmap` with these words in `tmp_path`, without a display."""
+    """Return a function that runs `pendmap` in `tmp_path`, without a display."""
     return functools.partial(run_command, tmp_path)
 
 
 @pytest.fixture
 def strict_recordings() -> Iterator[None]:
-    """Rerun raises what it would only warn of."""
-    import rerun as rr  # noqa: PLC0415 (most tests need none of it)
+    """Make Rerun raise errors that it would only warn of."""
+    import rerun as rr  # noqa: PLC0415 (few tests need it)
 
     rr.set_strict_mode(True)
     yield
@@ -92,7 +92,7 @@ def strict_recordings() -> Iterator[None]:
 
 @pytest.fixture
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """`pendmap rig` with these words in `tmp_path`, within this process: a start costs most."""
+    """Return a function that runs `pendmap rig` in `tmp_path`, within this process for speed."""
     monkeypatch.chdir(tmp_path)
 
     def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:

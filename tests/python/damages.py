@@ -1,4 +1,4 @@
-"""What can become of a record on its way: each kind made from a clean one."""
+"""Kinds of damage to a record, each made from a clean one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["DAMAGES", "DESCRIPTIONS", "Damage", "one_line", "sound"]
 
 @functools.cache
 def sound() -> str:
-    """A clean record of 10 s."""
+    """Return a clean record of 10 s."""
     return text(clean(duration=10.0))
 
 
@@ -42,7 +42,7 @@ def one_line(message: str) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Damage:
-    """A kind of damage: what makes it, which findings it must lead to, or how it is refused."""
+    """A kind of damage: how it is made, and its expected findings or refusal."""
 
     make: Callable[[str], str | bytes]
     says: tuple[str, ...] | None = ()
@@ -66,13 +66,13 @@ def lines(change: Callable[[list[str]], list[str]]) -> Callable[[str], str]:
 
 
 def at(values: Floats, places: object, new: object) -> Floats:
-    """Put values at places."""
+    """Set values at the given places."""
     values[places] = new  # type: ignore[index]
     return values
 
 
 def every(row: str, k: int) -> Callable[[str], str]:
-    """Put a row between every k rows."""
+    """Insert a row after every k rows."""
     return lines(
         lambda rows: [
             part
@@ -94,17 +94,17 @@ def parquet(change: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[str], b
 
 
 def bad(make: Callable[[str], str | bytes], refused: str, suffix: str = ".csv") -> Damage:
-    """What is refused."""
+    """Return a damage whose record is refused with this message."""
     return Damage(make, None, refused, suffix)
 
 
 def said(make: Callable[[str], str | bytes], *keys: str, suffix: str = ".csv") -> Damage:
-    """What is read, and said."""
+    """Return a damage whose record is read, with these findings."""
     return Damage(make, keys, suffix=suffix)
 
 
 def _again(a: Floats) -> tuple[Floats, Floats]:
-    """A hand takes the pendulum, carries it back in 1 s, holds it 0.3 s, and lets it go."""
+    """Append a second release: a hand carries the pendulum back in 1 s, and holds it 0.3 s."""
     carried = a[-1] + (a[0] - a[-1]) * (1 - np.cos(np.pi * np.arange(100) / 100)) / 2
     theta = np.r_[a, carried, np.full(30, a[0]), a[:600]]
     return np.arange(theta.size) / 100, theta

@@ -1,4 +1,4 @@
-"""Free decays integrated with scipy, half cycle by half cycle: nothing of pendmap's is used."""
+"""Free decays integrated with scipy, half cycle by half cycle, without code of pendmap."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Decay:
     spline: CubicHermiteSpline
 
     def angle(self, time: Floats) -> Floats:
-        """Angle at these times, rad; where it stopped it stays."""
+        """Return the angle at these times, rad; constant after the pendulum has stopped."""
         end = self.spline.x[-1]
         return np.asarray(self.spline(np.minimum(time, end)))
 
@@ -87,7 +87,7 @@ def record(  # noqa: PLR0913 (the sensor)
     offset: float = 0.0,
     seed: int = 0,
 ) -> tuple[Floats, Floats]:
-    """Read a decay: times and angles with noise, counted."""
+    """Return times and angles of a decay with noise, rounded to counts."""
     time = np.arange(round(seconds * rate) + 1) / rate
     noise = math.radians(noise_deg) * np.random.default_rng(seed).standard_normal(time.size)
     angle = made.angle(time) + offset + noise

@@ -1,4 +1,4 @@
-"""Figures drawn without a file, and what stands in them."""
+"""Figures drawn without a file, and their texts."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def written(figure: Figure) -> str:
 
 
 def shown(text: object) -> bool:
-    """Whether a text is visible and not empty."""
+    """Return whether a text is visible and not empty."""
     return isinstance(text, Text) and text.get_visible() and bool(text.get_text().strip())
 
 
 def overlap(one: Bbox, other: Bbox) -> bool:
-    """Whether two boxes share more than 1.5 pixels in both directions."""
+    """Return whether two boxes overlap by more than 1.5 pixels in both directions."""
     wide = min(one.x1, other.x1) - max(one.x0, other.x0)
     high = min(one.y1, other.y1) - max(one.y0, other.y0)
     return bool(wide > 1.5 and high > 1.5)

@@ -1,4 +1,4 @@
-"""Motions for the tests of identification, made with scipy: nothing that is tested made them."""
+"""Motions for the tests of identification, integrated with scipy independently of pendmap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calls every public function, then each of them again in a child of this process."""
+"""Call every public function, then each of them again in a forked child."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ROOMS = ("pendmap", "pendmap.comparison", "pendmap.identification", "pendmap.diagnosis")
 PATIENCE = 60
-"""Seconds after which a child is taken to wait for ever."""
+"""Seconds after which a child is assumed to be blocked."""
 
 EXPERIMENT = """
 [[run]]
@@ -45,7 +45,7 @@ parameters = { k = { power = 1.5 } }
 
 
 def public() -> set[str]:
-    """Return the names of all public functions of pendmap's own."""
+    """Return the names of all public functions defined in pendmap."""
     found: set[str] = set()
     for room in ROOMS:
         module = importlib.import_module(room)
@@ -112,14 +112,14 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
 
 
 def in_child(job: Callable[[], object]) -> str:
-    """Call it in a child of this process; return what went wrong, or nothing."""
+    """Call a job in a forked child; return a description of its failure, or ``None``."""
     child = os.fork()
     if child == 0:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.alarm(PATIENCE)
         try:
             job()
-        except BaseException:  # noqa: BLE001 (the child ends here whatever it is)
+        except BaseException:  # noqa: BLE001 (the child ends here on any exception)
             traceback.print_exc()
             os._exit(1)
         os._exit(0)
@@ -128,7 +128,7 @@ def in_child(job: Callable[[], object]) -> str:
 
 
 def main() -> int:
-    """Say what does not work in a child; the number of these."""
+    """Print the failures of calls in a child; return their number."""
     with tempfile.TemporaryDirectory() as folder:
         all_jobs = jobs(Path(folder))
         wrong = dict.fromkeys(public() - set(all_jobs), "is not tried")

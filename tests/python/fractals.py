@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def centres(side: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Centres of side x side cells of the unit square."""
+    """Return the centres of side x side cells of the unit square."""
     middle = (np.arange(side) + 0.5) / side
     return np.meshgrid(middle, middle)[0], np.meshgrid(middle, middle)[1]
 
 
 def line(side: int, seed: int) -> Labels:
-    """Two labels on both sides of a straight line: dimension 1."""
+    """Return two labels on both sides of a straight line: dimension 1."""
     rng = np.random.default_rng(seed)
     x, y = centres(side)
     angle, shift = rng.uniform(0, 2 * np.pi), rng.uniform(-0.1, 0.1)
@@ -27,7 +27,7 @@ def line(side: int, seed: int) -> Labels:
 
 
 def disc(side: int, seed: int) -> Labels:
-    """A disc somewhere: dimension 1."""
+    """Return the labels of a disc at a random place: dimension 1."""
     rng = np.random.default_rng(seed)
     x, y = centres(side)
     radius, (left, low) = rng.uniform(0.2, 0.35), rng.uniform(0.4, 0.6, 2)
@@ -35,9 +35,10 @@ def disc(side: int, seed: int) -> Labels:
 
 
 def cantor(side: int, seed: int, ratio: float) -> Labels:
-    """Gaps of a Cantor set, labels in turn from generation to generation, times an interval.
+    """Return labels of a Cantor set's gaps, by generation, times an interval.
 
-    Each of both parts has ``ratio`` of the whole's length: dimension ``1 + ln 2 / ln (1/ratio)``.
+    Each of the two parts has ``ratio`` of the length of the whole: dimension ``1 + ln 2 / ln
+    (1/ratio)``.
     """
     rng = np.random.default_rng(seed)
     u = (centres(side)[0] + rng.uniform(0.1, 0.4)) / rng.uniform(1.5, 2.0)
@@ -51,5 +52,5 @@ def cantor(side: int, seed: int, ratio: float) -> Labels:
 
 
 def spread(side: int, seed: int, labels: int) -> Labels:
-    """Labels at random: dimension 2."""
+    """Return random labels: dimension 2."""
     return np.random.default_rng(seed).integers(1, labels + 1, (side, side))

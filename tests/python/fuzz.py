@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 LIMIT = 10.0
-"""Seconds of the processor that a command may take; of the clock twelve times as many."""
+"""Limit on the processor time of a command, s; its wall time may be twelve times as long."""
 
 MEMORY = 8 * 2**30
-"""Bytes of address space that a command may take."""
+"""Limit on the address space of a command, bytes."""
 
 SEEDS = {
     "basins": ["--grid=12"],
@@ -51,11 +51,11 @@ SEEDS = {
     "lyapunov": ["--p=0.6", "--precision=0.1", "--max-periods=50"],
     "lifetime": ["--starts=100", "--max-periods=50"],
 }
-"""Commands whose results are drawn from."""
+"""Commands that make the results from which cases are drawn."""
 
 
 def make_seeds(folder: Path) -> None:
-    """Let pendmap write a result of each kind, in forks as the cases are."""
+    """Write a result of each kind with pendmap, in forks as for the cases."""
     for name, words in SEEDS.items():
         file = folder / f"{name}.nc"
         pid = os.fork()
@@ -66,7 +66,7 @@ def make_seeds(folder: Path) -> None:
 
 
 def import_all() -> None:
-    """Import what cases need once; every case is a fork of this process, which computes nothing."""
+    """Import the modules of the cases once; every case is a fork of this process."""
     os.environ["MPLBACKEND"] = "agg"
     for name in fuzz_cases.SMALL:
         importlib.import_module(f"pendmap.cli.{name}")
@@ -107,7 +107,7 @@ def child(folder: Path, case: fuzz_cases.Case) -> NoReturn:
         run_command()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 0
-    except BaseException:  # noqa: BLE001 (a traceback is what is looked for)
+    except BaseException:  # noqa: BLE001 (a traceback is the fault sought)
         traceback.print_exc()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):
@@ -116,7 +116,7 @@ def child(folder: Path, case: fuzz_cases.Case) -> NoReturn:
 
 
 def spent(pid: int) -> float:
-    """Return the seconds of the processor that a child has used."""
+    """Return the processor time of a child, s."""
     with contextlib.suppress(OSError):
         fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -124,7 +124,7 @@ def spent(pid: int) -> float:
 
 
 def ended(pid: int, case: fuzz_cases.Case) -> int | None:
-    """Wait for a child; return how it ended, ``None`` where it took too long."""
+    """Wait for a child; return its exit status, ``None`` if it took too long."""
     begun, stopped = time.monotonic(), case.stop is None
     while time.monotonic() - begun < 12 * LIMIT and spent(pid) < LIMIT:
         if not stopped and time.monotonic() - begun > case.after:
@@ -149,7 +149,7 @@ def contents(folder: Path) -> dict[str, str]:
 
 
 def strict(text: str) -> bool:
-    """Whether a text is one JSON object without NaN."""
+    """Return whether a text is one JSON object without NaN."""
 
     def refuse(constant: str) -> NoReturn:
         raise ValueError(constant)
@@ -161,7 +161,7 @@ def strict(text: str) -> bool:
 
 
 def faults_of(place: Path, case: fuzz_cases.Case) -> Iterator[str]:
-    """Run a case in a folder and say what is wrong with how it ended."""
+    """Run a case in a folder; return a description of each violated rule."""
     shutil.rmtree(place, ignore_errors=True)
     folder = place / "in"
     folder.mkdir(parents=True)
@@ -188,7 +188,7 @@ def faults_of(place: Path, case: fuzz_cases.Case) -> Iterator[str]:
 
 
 def _said_wrong(code: int, case: fuzz_cases.Case, said: str, heard: str) -> Iterator[str]:
-    """Say what is wrong with a code and with what was printed."""
+    """Describe what is wrong with an exit code and the printed text."""
     killed = case.stop is not None and -code == getattr(signal, case.stop)  # before pendmap began
     allowed = {0, 2} | ({1} if case.most else set()) | ({130} if case.stop else set())
     if code not in allowed and not killed:
@@ -206,7 +206,7 @@ def _said_wrong(code: int, case: fuzz_cases.Case, said: str, heard: str) -> Iter
 
 
 def _named(lost: list[str], case: fuzz_cases.Case) -> bool:
-    """Whether all that changed was named as an output: figures and results replace files."""
+    """Return whether all changed files were named as outputs, which may be replaced."""
     outputs = [word.partition("=")[2] for word in case.words if "=" in word]
     return all(name in outputs for name in lost)
 

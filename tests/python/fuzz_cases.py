@@ -1,4 +1,4 @@
-"""Bad input, drawn: options, models, formulas, experiments, tables, results, faults of the machine.
+"""Randomly drawn bad input: options, models, formulas, experiments, tables, results, system faults.
 
 Each function of ``KINDS`` draws one :class:`Case` from a generator of random numbers.
 """
@@ -29,10 +29,10 @@ __all__ = ["KINDS", "SEEDS", "Case"]
 
 @dataclasses.dataclass
 class Case:
-    """A command with the files that it finds.
+    """A command and its input files.
 
-    ``files`` holds contents by name: bytes, or ``"pipe"``, ``"endless"`` and ``"folder"``. No file
-    may grow beyond ``most`` bytes; ``stop`` is a signal that comes after ``after`` seconds.
+    ``files`` maps names to contents: bytes, or ``"pipe"``, ``"endless"`` and ``"folder"``. The size
+    of a file is limited to ``most`` bytes; the signal ``stop`` is sent after ``after`` seconds.
     """
 
     words: list[str]
@@ -43,7 +43,7 @@ class Case:
 
 
 SEEDS: Final[dict[str, bytes]] = {}
-"""Results by name, which :mod:`fuzz` lets pendmap write."""
+"""Results by name, written by pendmap at the request of :mod:`fuzz`."""
 
 NUMBERS: Final = (
     *("nan", "inf", "-inf", "0", "-0", "-1", "1e-320", "1e-12", "0.1", "1", "3.7", "1e3", "1e16"),
@@ -93,7 +93,7 @@ SMALL: Final = {
     "tongues": ["--omega=1.8:2.2:4"],
     "view": ["x.rrd"],
 }
-"""Every command, and what keeps it small."""
+"""Options by command that keep its computation small."""
 
 MODEL: Final = b"""[pendulum]
 w0 = 6.2
@@ -202,7 +202,7 @@ def mangled(rng: random.Random, data: bytes) -> bytes:
 
 
 def _toml(rng: random.Random, text: bytes) -> bytes:
-    """Return TOML with other values, lines lost and lines doubled; sometimes other bytes."""
+    """Return TOML with values replaced, lines lost or doubled; sometimes bytes are changed."""
     if rng.random() < 0.25:
         return mangled(rng, text)
     lines = text.decode().splitlines()
@@ -241,7 +241,7 @@ def options(rng: random.Random) -> Case:
 
 
 def model(rng: random.Random) -> Case:
-    """Draw a model file of which something is wrong."""
+    """Draw an invalid model file."""
     words = rng.choice(
         [
             ["simulate", "--until=3"],
@@ -281,13 +281,13 @@ def _term(rng: random.Random, depth: int) -> str:
 
 
 def experiment(rng: random.Random) -> Case:
-    """Draw an experiment's description."""
+    """Draw the description of an experiment."""
     words = rng.choice([["look", "lab", "--json"], ["look", "lab", "--plot=x.png"]])
     return Case(words, {"lab/experiment.toml": _toml(rng, EXPERIMENT), "lab/run.csv": _record()})
 
 
 def table(rng: random.Random) -> Case:
-    """Draw a record: text or Parquet, with columns of all kinds, then with other bytes."""
+    """Draw a record: text or Parquet, with columns of all kinds, then with bytes changed."""
     time, angle = _decay()
     scale = rng.choice([1.0, 1.0, 1e-12, 1e3, 1e9, 1e15, -1.0])
     columns: dict[str, Any] = {"t_s": scale * time, "theta_rad": angle}
@@ -315,7 +315,7 @@ def table(rng: random.Random) -> Case:
     if name == "run.parquet":
         try:
             data = frame.to_parquet()
-        except Exception:  # noqa: BLE001 (what cannot be written is drawn as rubbish)
+        except Exception:  # noqa: BLE001 (a table that cannot be written is drawn as random bytes)
             data = rng.randbytes(5000)
     else:
         text = frame.to_csv(index=False, sep=rng.choice(",,,;\t "), header=rng.random() < 0.8)
@@ -334,7 +334,7 @@ def table(rng: random.Random) -> Case:
 
 
 def result(rng: random.Random) -> Case:
-    """Draw a result to plot: of other bytes, with attributes and numbers that no result has."""
+    """Draw a damaged result to plot: bytes changed, or impossible attributes and numbers."""
     name = rng.choice(sorted(SEEDS))
     data = SEEDS[name]
     if rng.random() < 0.3:

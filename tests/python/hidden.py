@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 KNOWN: list[Path] = []
-"""The folder of diagnoses that this run of the tests has made; conftest.py sets it."""
+"""Folder of the diagnoses made in this test run; set by conftest.py."""
 
 
 def diagnosed(
@@ -29,17 +29,17 @@ def diagnosed(
     seed: int = 3,
     without: Sequence[str] = (),
     max_effects: int = 3,
-    **given: Any,  # noqa: ANN401 (what the rig is asked for)
+    **given: Any,  # noqa: ANN401 (parameters of the request)
 ) -> tuple[Discrepancy, dict[str, dict[str, float]]]:
     """Hide effects, diagnose the experiment, then read the truth: parameters by effect.
 
-    Each experiment is diagnosed once in a run of the tests, over all processes.
+    Each experiment is diagnosed once in a test run, over all processes.
     """
     request = virtual_rig.Request("hidden", seed=seed, effects=effects or ("none",), **given)
     asked = repr((request, tuple(without), max_effects)).encode()
     known = KNOWN[0] / f"{hashlib.sha256(asked).hexdigest()}.pickle"
     with known.with_suffix(".lock").open("w") as lock:
-        # Other processes wait here until the first has diagnosed.
+        # Other processes wait here until the diagnosis is complete.
         fcntl.flock(lock, fcntl.LOCK_EX)
         if known.exists():
             return pickle.loads(known.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 (our own)
@@ -55,7 +55,7 @@ def diagnosed(
 
 
 @functools.cache
-def once(*effects: str, **given: Any) -> Discrepancy:  # noqa: ANN401 (what the rig is asked for)
-    """Hide effects and diagnose the experiment, as one object for all tests of a process."""
+def once(*effects: str, **given: Any) -> Discrepancy:  # noqa: ANN401 (parameters of the request)
+    """Return the diagnosis of hidden effects, the same object for all tests of a process."""
     with tempfile.TemporaryDirectory() as folder:
         return diagnosed(Path(folder), *effects, **given)[0]

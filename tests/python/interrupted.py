@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str]]:  # noqa: ANN401
-    """Start a process that hears Ctrl-C, and does not outlive the test.
+    """Start a process that receives Ctrl-C and ends with the test.
 
-    What a shell puts in the background ignores Ctrl-C, and all that it starts does as well.
+    A process that a shell starts in the background ignores Ctrl-C, and its children inherit this.
     """
     process = subprocess.Popen(
         words,
@@ -33,5 +33,5 @@ def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str
 
 
 def any_file(folder: Path, pattern: str) -> bool:
-    """Whether a file matches, also while folders beside it come and go."""
-    return bool(glob.glob(str(folder / pattern)))  # noqa: PTH207 (Path.glob fails where one goes)
+    """Return whether a file matches, also while folders beside it are created and removed."""
+    return bool(glob.glob(str(folder / pattern)))  # noqa: PTH207 (Path.glob fails if a folder is removed)

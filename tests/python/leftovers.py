@@ -1,4 +1,4 @@
-"""Residuals of no fit: noise of a law that is known, beside a swing that was adapted."""
+"""Synthetic residuals: noise of a known spectrum, with a fitted swing subtracted."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INTERVAL, W0 = 0.02, 6.0
 RUNS, SAMPLES = 4, 800
 COUNT = 1.0
-"""Counts are the unit of everything that is counted here."""
+"""Size of a count: all quantities here are in counts."""
 
 
 def swing(samples: int = SAMPLES) -> Floats:
@@ -43,7 +43,7 @@ def coloured(
 
 
 def counted(rng: np.random.Generator, noise: Floats) -> Floats:
-    """Return what is left, beside swings of 300 counts, of noise in counts that is rounded."""
+    """Return rounded noise in counts about swings of 300 counts, the exact swing subtracted."""
     runs, samples = noise.shape
     phases = W0 * INTERVAL * np.arange(samples) + rng.uniform(0, math.tau, (runs, 1))
     motion = 300 * COUNT * np.sin(phases)
@@ -51,7 +51,7 @@ def counted(rng: np.random.Generator, noise: Floats) -> Floats:
 
 
 def noise_of(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> ResidualNoise:
-    """Return what residuals hold beside the swing, which is fitted here.
+    """Return the residual noise in addition to the swing, which is fitted here.
 
     ``floor`` is the variance of rounding, in the residuals' units squared.
     """
@@ -62,7 +62,7 @@ def noise_of(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> R
 
 
 def fitted_to(residuals: Floats, floor: float = 0.0) -> FittedModel:
-    """Return a fit that leaves these residuals, each run's along a row."""
+    """Return a fit with the given residuals, one run a row."""
     count, samples = residuals.shape
     runs = [FitRun(INTERVAL * np.arange(samples), np.zeros(samples), 1.0) for _ in residuals]
     curve = np.vstack([np.zeros(samples), W0 * swing(samples)[0]])

@@ -51,7 +51,7 @@ records = [{ file = "run_00.csv", sha256 = "00ff" }]
 
 
 def written(folder: Path, text: str | bytes) -> Path:
-    """A file with this text."""
+    """Write a file with this text and return its path."""
     path = folder / "model.toml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path

@@ -1,6 +1,6 @@
 """Maps and trajectories in the project's schema, integrated with numpy alone.
 
-They come from a plain fourth-order Runge-Kutta method: pictures of something real.
+They are computed by a plain fourth-order Runge-Kutta method, to test figures with real motions.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def _twin(one: synthetic.Painted, found: Sequence[synthetic.Painted]) -> int:
 def chaotic(
     *, p: float = 1.7, gamma: float = 0.1, omega: float = 0.87, cells: int = 60, periods: int = 10
 ) -> xr.Dataset:
-    """Return a map whose labels tell nothing: chaos takes all, or nothing attracts (gamma = 0)."""
+    """Return a map without meaningful labels: one chaotic attractor, or none (gamma = 0)."""
     theta, velocity = np.meshgrid(
         synthetic.centres(-math.pi, math.pi, cells), synthetic.centres(-3, 3, cells)
     )

@@ -1,4 +1,4 @@
-"""Clean synthetic records, and how they are written down."""
+"""Clean synthetic records, and functions that write them to files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def motion(
     rate: float = 100.0,
     drive: tuple[float, float, float] = (0.0, 1.0, 0.0),
 ) -> tuple[Floats, Floats, Floats]:
-    """Time, angle and velocity of a pendulum with viscous and (nearly) Coulomb friction."""
+    """Return time, angle and velocity of a pendulum with viscous and (nearly) Coulomb friction."""
     p, omega, phi = drive
     time = np.arange(round(duration * rate) + 1) / rate
 
@@ -49,25 +49,25 @@ def motion(
 
 
 def noisy(theta: Floats, noise: float = 0.001, count: float = COUNT, seed: int = 1) -> Floats:
-    """Readings with noise, in counts."""
+    """Return readings with noise, rounded to counts."""
     read = theta + noise * np.random.default_rng(seed).standard_normal(theta.size)
     return count * np.round(read / count) if count else read
 
 
 def text(columns: Sequence[Floats], names: str = "t_s,theta_rad", form: str = "%.6f") -> str:
-    """The text of a CSV file."""
+    """Return the text of a CSV file."""
     rows = [",".join(form % value for value in row) for row in np.column_stack(columns)]
     return "\n".join([*([names] if names else []), *rows]) + "\n"
 
 
 def clean(**given: Any) -> tuple[Floats, Floats]:  # noqa: ANN401 (those of motion)
-    """A record without flaws: time and readings, both writeable."""
+    """Return a record without flaws: time and readings, both writeable."""
     time, theta, _ = motion(**given)
     return time.copy(), noisy(theta)
 
 
 def read(folder: Path, content: str | bytes, name: str = "record.csv") -> pendmap.Run:
-    """Write a file, read it, and give its run."""
+    """Write a file, read it, and return its run."""
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     (run,) = pendmap.read_experiment(path).runs
@@ -75,7 +75,7 @@ def read(folder: Path, content: str | bytes, name: str = "record.csv") -> pendma
 
 
 def found(run: pendmap.Run) -> dict[str, pendmap.Finding]:
-    """What was found in a run, by its key."""
+    """Return the findings of a run by key."""
     return {finding.what: finding for finding in run.findings}
 
 

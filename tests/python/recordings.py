@@ -1,4 +1,4 @@
-"""Recordings read back: what stands in an .rrd file."""
+"""Reader of recordings: contents of an .rrd file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ReadBack:
-    """A recording as it stands in the file."""
+    """A recording read from its file."""
 
     def __init__(self, path: Path) -> None:
         reader = RrdReader(path)
@@ -42,28 +42,28 @@ class ReadBack:
                     name = batch.column("ViewBlueprint:display_name").to_pylist()[0][0]
                     self.views[origin] = name
 
-    def one(self, entity: str, component: str) -> Any:  # noqa: ANN401 (whatever was logged)
+    def one(self, entity: str, component: str) -> Any:  # noqa: ANN401 (any logged value)
         """Return the only value of a static component."""
         (row,) = self.columns[entity][component]
         return row[0] if len(row) == 1 else row
 
     def image(self, entity: str, archetype: str, kind: type) -> npt.NDArray[Any]:
-        """The image of an entity, of numbers of ``kind``."""
+        """Return the image of an entity, with numbers of the given ``kind``."""
         shape = self.one(entity, f"{archetype}:format")
         buffer = np.asarray(self.one(entity, f"{archetype}:buffer"), dtype=np.uint8)
         return buffer.view(kind).reshape(shape["height"], shape["width"])
 
     def rows(self, entity: str, component: str) -> npt.NDArray[np.float64]:
-        """The values of a column, one an instant."""
+        """Return the values of a column, one per instant."""
         return np.array([row[0] for row in self.columns[entity][component]], dtype=float)
 
     def seconds(self, entity: str) -> npt.NDArray[np.float64]:
-        """The instants on the timeline, s."""
+        """Return the instants on the timeline, s."""
         times = self.columns[entity]["sim_time"]
         return np.array([t.total_seconds() for t in times])
 
     def names(self, entity: str) -> dict[int, str]:
-        """The names of an entity's classes."""
+        """Return the names of an entity's classes."""
         context = self.columns[entity]["AnnotationContext:context"][0][0]
         return {e["class_id"]: e["class_description"]["info"]["label"] for e in context}
 

@@ -1,4 +1,4 @@
-"""Records of several releases: between them a hand carries the pendulum, holds it and trembles."""
+"""Records of several releases, between which a trembling hand carries and holds the pendulum."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ RATE = 100.0
 
 @dataclasses.dataclass(frozen=True)
 class Released:
-    """Readings, and when nobody touches the pendulum: first and last time of each release."""
+    """Readings, and the first and last time of each free swing."""
 
     time: Floats
     theta: Floats
     spans: list[tuple[float, float]]
 
 
-def released(  # noqa: PLR0913 (the releases, and what the hand does)
+def released(  # noqa: PLR0913 (the releases, and the motion of the hand)
     starts: Sequence[float],
     seconds: Sequence[float],
     *,
@@ -38,7 +38,7 @@ def released(  # noqa: PLR0913 (the releases, and what the hand does)
     tremor: float = 0.01,
     seed: int = 0,
 ) -> Released:
-    """Releases from rest at ``starts`` (rad); a hand takes over after ``seconds`` of each."""
+    """Return releases from rest at ``starts`` (rad), each stopped by a hand after ``seconds``."""
     rng = np.random.default_rng(seed)
     parts: list[Floats] = []
     spans = []
@@ -56,13 +56,13 @@ def released(  # noqa: PLR0913 (the releases, and what the hand does)
     return Released(np.arange(theta.size) / RATE, noisy(theta, seed=seed), spans)
 
 
-def _hand(  # noqa: PLR0913, PLR0917 (from where to where, and how)
+def _hand(  # noqa: PLR0913, PLR0917 (the ends of the motion and its parameters)
     begin: float, end: float, carry: float, hold: float, tremor: float, rng: np.random.Generator
 ) -> Floats:
     count = round(carry * RATE)
     way = (1 - np.cos(np.pi * np.arange(count) / count)) / 2
     place = np.concatenate([begin + (end - begin) * way, np.full(round(hold * RATE), end)])
-    # White noise over 0.2 s: a tremor of 5 Hz and less, none as the hand takes and lets go.
+    # White noise averaged over 0.2 s: a tremor of at most 5 Hz, zero at both ends of the hold.
     shaking = np.convolve(rng.standard_normal(place.size + 40), np.ones(20), "same") / math.sqrt(20)
     fading = np.minimum(1.0, np.arange(place.size) / 15)
     return np.asarray(place + tremor * shaking[: place.size] * fading * fading[::-1])

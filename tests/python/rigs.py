@@ -1,4 +1,4 @@
-"""Experiments of the virtual rig: small ones, and their files read back."""
+"""Small experiments of the virtual rig, and readers of their files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def record(path: Path) -> np.ndarray:
     return np.array(rows[1:], float)
 
 
-def short(**given: Any) -> Experiment:  # noqa: ANN401 (of a request)
-    """A small experiment without hidden effects, if nothing else is said."""
+def short(**given: Any) -> Experiment:  # noqa: ANN401 (parameters of a request)
+    """Return a small experiment, by default without hidden effects."""
     settings = {"effects": ("none",), "free": 2, "forced": 1, "duration": 5.0, "noise": 0.0}
     return make(Request("hidden", **(settings | given)))  # type: ignore[arg-type]

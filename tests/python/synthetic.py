@@ -1,4 +1,4 @@
-"""Maps in the project's schema, painted: made-up basins, for tests of layout and bookkeeping."""
+"""Synthetic maps in the project's schema, for tests of layout and bookkeeping."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNRELIABLE: dict[str, Any] = {"labels_reliable": 0, "unreliable": 0.207}
 
 @dataclass(frozen=True)
 class Painted:
-    """One attractor of a synthetic map: what the attractor table says of it."""
+    """One attractor of a synthetic map: its row of the attractor table."""
 
     name: str
     kind: str
@@ -52,7 +52,7 @@ def assemble(  # noqa: PLR0913 (the schema has many parts)
     velocity: tuple[float, float] = (-3.0, 3.0),
     **attrs: Any,  # noqa: ANN401 (attributes of any type)
 ) -> xr.Dataset:
-    """Put arrays and attractors together as ``pendmap.basins`` returns them."""
+    """Assemble arrays and attractors into a Dataset as ``pendmap.basins`` returns it."""
     rows, columns = label.shape
     cells = label.size
     shares = np.array([np.count_nonzero(label == k + 1) / cells for k in range(len(attractors))])
@@ -172,7 +172,7 @@ def painted(
     failed: int = 0,
     **options: Any,  # noqa: ANN401 (options of assemble)
 ) -> xr.Dataset:
-    """Return a map of wavy bands, one an attractor; its first cells undecided, its last failed."""
+    """Return a map of wavy bands, one per attractor; first cells undecided, last ones failed."""
     rows, columns = shape
     y = np.arange(rows)[:, None] / rows
     x = np.arange(columns)[None, :] / columns

@@ -24,7 +24,7 @@ FUNCTIONS = [name for name in pendmap.__all__ if inspect.isfunction(getattr(pend
 
 
 def examples(name: str) -> list[doctest.DocTest]:
-    """The examples of one module."""
+    """Return the examples of one module."""
     return [
         test
         for test in doctest.DocTestFinder().find(importlib.import_module(name))
@@ -33,7 +33,7 @@ def examples(name: str) -> list[doctest.DocTest]:
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_examples_print_what_they_say(
+def test_examples_print_the_stated_output(
     name: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -1,6 +1,6 @@
-"""The layout of the package: sizes, directions of imports, names and places of things.
+"""Layout of the package: sizes, directions of imports, names and locations.
 
-The limits marked as ratchets are what the package has; a change may lower them, never raise them.
+Limits marked as ratchets equal the present values; a change may lower them, never raise them.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ INTERNAL = 117
 
 @functools.cache
 def tree(path: Path) -> ast.Module:
-    """The syntax of a file."""
+    """Return the syntax tree of a file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def name_of(path: Path) -> str:
-    """The dotted name of a module."""
+    """Return the dotted name of a module."""
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def imported(path: Path) -> set[str]:
-    """The modules of the package that a file imports, anywhere in it, for type checking too."""
+    """Return the modules of the package imported anywhere in a file, type checking included."""
     known = {name_of(module) for module in MODULES}
     found = set()
     for node in ast.walk(tree(path)):
@@ -95,7 +95,7 @@ def test_no_module_imports_itself_through_others() -> None:
         visit(module, [])
 
 
-def test_only_fronts_say_what_they_export() -> None:
+def test_only_fronts_list_their_exports() -> None:
     listed = {
         path
         for path in MODULES
@@ -118,8 +118,8 @@ def test_every_parameter_of_an_effect_has_a_role_and_a_unit() -> None:
             assert parameter["unit"], parameter
 
 
-def test_effects_are_named_in_the_library_alone() -> None:
-    """A name of an effect in Python decides something that the library should say."""
+def test_effects_are_named_only_in_the_library() -> None:
+    """Code that names an effect decides something that the library should define."""
     names = {effect["name"] for effect in _core.effects()}
     found = {
         (path.relative_to(PACKAGE).as_posix(), node.value)
@@ -129,12 +129,12 @@ def test_effects_are_named_in_the_library_alone() -> None:
         if isinstance(node, ast.Constant) and node.value in names
     }
     assert {name for _, name in found} <= {
-        "bias_torque",  # the torque that a pendulum has of its own
-        "coulomb_friction",  # likewise its friction
+        "bias_torque",  # the torque of the pendulum itself
+        "coulomb_friction",  # the friction of the pendulum itself
         "drive_phase",
         "encoder_gain",
         "encoder_offset",  # the zero of the sensor, fitted by every method
-        "quadratic_drag",  # tried by identify unasked
+        "quadratic_drag",  # tried by identify by default
         "stribeck_friction",
         "viscous_damping",
     }

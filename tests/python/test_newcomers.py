@@ -1,6 +1,6 @@
-"""The how-tos of CONTRIBUTING.md: an effect is four files, an analysis five, a chart one.
+"""The how-tos of CONTRIBUTING.md: an effect takes four files, an analysis five, a chart one.
 
-The chart is written in test_charts.py.
+The test of the chart is in test_charts.py.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RUST_TEST = "tests/rust/effects.rs"
 
 
 def how_to(title: str) -> str:
-    """A section of CONTRIBUTING.md."""
+    """Return a section of CONTRIBUTING.md."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     return text.split(f"## {title}\n")[1].split("\n## ")[0]
 
@@ -62,11 +62,11 @@ NAMED_ELSEWHERE = {
     "quadratic_drag": "identify tries it unasked",
     "stribeck_friction": "a summary says that it lowers the friction at rest",
 }
-"""Effects that the code names outside the library, and why; a new effect is none of them."""
+"""Effects named by code outside the library, with reasons; a new effect is not among them."""
 
 
 def named(path: Path) -> set[str]:
-    """The effects that a file names in its code, comments and documentation left out."""
+    """Return the effects that a file names in its code, comments and documentation excluded."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".rs":
         words = set(re.findall(r"\w+", re.sub(r"//.*", "", text)))
@@ -77,14 +77,14 @@ def named(path: Path) -> set[str]:
 
 
 def place(path: Path) -> str:
-    """A file, the files of the virtual rig's effects as one: an effect stands in one of them."""
+    """Return the key of a file; files of the virtual rig's effects share one."""
     name = path.relative_to(ROOT).as_posix()
     return TWINS if name.startswith(TWINS) else name
 
 
 @pytest.fixture(scope="module")
 def places() -> dict[str, set[str]]:
-    """The effects that each place names."""
+    """Return the effects named in each place."""
     found: dict[str, set[str]] = {}
     for folder in ("src", "python/pendmap", "tests"):
         for path in ROOT.joinpath(folder).rglob("*.*"):
@@ -105,7 +105,7 @@ def test_an_effect_is_written_in_four_files(places: dict[str, set[str]]) -> None
 @pytest.mark.parametrize("name", sorted(EFFECTS.keys() - NAMED_ELSEWHERE.keys()))
 def test_no_other_code_names_an_effect(name: str, places: dict[str, set[str]]) -> None:
     code = {place for place, names in places.items() if name in names and "tests/" not in place}
-    # A law may use a function of another law.
+    # The law of an effect may use a function of another.
     code -= {f"{LIBRARY}/{other}.rs" for other in EFFECTS if other != name}
     assert code == {f"{LIBRARY}/{name}.rs", f"{LIBRARY}/mod.rs", TWINS}
 
@@ -264,7 +264,7 @@ def test_an_analysis_is_five_files(tmp_path: Path) -> None:
     run("pendmap", "plot", "a.nc", "--out", "b.png")
     found = json.loads(run("pendmap", "swing", "--json"))
     assert found["largest"] == 3.0
-    # The tests that hold every analysis take the new one in without a line of their own.
+    # The tests of all analyses include the new one without a change.
     schema = str(ROOT / "tests" / "python" / "analysis" / "test_schema.py")
     run(
         "pytest",

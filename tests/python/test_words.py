@@ -1,4 +1,4 @@
-"""Numbers with their errors, in words: nothing small is hidden."""
+"""Numbers with their errors as text: no small value is rounded away."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ use pendmap::model::{Angle, Pendulum};
 use crate::support::{basins_on_plane, driven};
 use crate::truths::{attractors_at, fractions_at};
 
-/// The reference maps, each computed once: p, and how far fractions may be off.
+/// The reference maps, each computed once: p, and the tolerance on fractions.
 fn maps() -> &'static [(f64, f64, BasinMap); 3] {
     static MAPS: OnceLock<[(f64, f64, BasinMap); 3]> = OnceLock::new();
     MAPS.get_or_init(|| {
@@ -94,7 +94,8 @@ fn twins_are_mirror_images_with_equal_shares() {
             for point in &attractor.points {
                 assert!(contains(&map.attractors[twin], [-point[0], -point[1]], 1e-9));
             }
-            // The grid is its own mirror image; what rounding moves is a fractal boundary's.
+            // The grid is its own mirror image; cells changed by rounding are at a fractal
+            // boundary.
             assert!((map.fractions[i] - map.fractions[twin]).abs() < *allowed, "p = {p}");
         }
     }
@@ -118,7 +119,7 @@ fn settling_takes_longer_where_multipliers_are_larger() {
         settle.iter().map(|s| f64::from(*s)).sum::<f64>() / settle.len() as f64
     };
     assert!(mean(0) < mean(1) && mean(1) < mean(2));
-    // The aim for speed: under 45 periods a start at p = 1.
+    // The target for speed: under 45 periods a start at p = 1.
     assert!(maps()[1].2.mean_periods() < 45.0, "{}", maps()[1].2.mean_periods());
 }
 

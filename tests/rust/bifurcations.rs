@@ -1,4 +1,4 @@
-//! Multipliers of +1 and -1 where orbits are known to change.
+//! Multipliers of +1 and -1 at known bifurcations.
 
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::support::driven;
 use crate::truths::{list, number, table, truths};
 
-/// A bifurcation: pendulum, point, period, and the multiplier there.
+/// A bifurcation: pendulum, point, period, and the critical multiplier.
 struct Event {
     name: String,
     pendulum: Pendulum,
@@ -54,7 +54,7 @@ fn multipliers_at_the_known_bifurcations() {
         let image = map.iterate(event.point, event.n);
         let gap = distance(image.state, event.point);
         assert!(gap < 1e-12, "{}: closes to {gap:e}", event.name);
-        // With one multiplier m = +-1 the other is the product over it.
+        // With one multiplier m = +-1 the other is the determinant over m.
         let product = (-event.pendulum.gamma * event.n as f64 * event.pendulum.period()).exp();
         let trace = event.multiplier + product / event.multiplier;
         let error = (image.derivative.trace() - trace).abs();
@@ -68,7 +68,7 @@ fn traces_are_the_reference_ones() {
         let map = PoincareMap::new(&event.pendulum);
         let tables = [&truths()["bifurcations_gamma0.1_omega2"], &truths()["rotation_saddle_node"]];
         let entry = tables.iter().find_map(|t| t.get(&event.name)).expect("its entry");
-        // Of the symmetric oscillation the reference has the trace of -P, its root.
+        // For the symmetric oscillation the reference has the trace of -P, its root.
         let symmetric = event.name == "osc_SB";
         let n = if symmetric { 1 } else { event.n };
         let sign = if symmetric { -1.0 } else { 1.0 };
@@ -90,7 +90,7 @@ fn doublings_take_the_stability() {
         let after = at(p + 1e-5);
         assert!(!after.is_stable() && after.multipliers.0[0].re < -1.0, "{} after", event.name);
         assert_eq!(after.n, event.n, "{}: Newton keeps to the orbit that doubles", event.name);
-        // On the spot: Newton's method has no trouble with -1.
+        // At the bifurcation itself: Newton's method is regular at -1.
         let there = at(p);
         assert!((there.multipliers.0[0].re + 1.0).abs() < 1e-9, "{}", event.name);
         assert!(there.contains(event.point, 1e-9), "{}", event.name);
@@ -129,7 +129,7 @@ fn symmetry_breaking_makes_two_of_one() {
     assert!(before.is_stable() && before.contains(mirror(before.points[0]), 1e-9));
     let after = find_at(p + 0.01, event.point);
     assert!(!after.is_stable() && after.multipliers.0[0].re > 1.0);
-    // Beside it two stable ones lean to either side and are each other's image.
+    // Next to it are two stable ones, leaning to either side, mirror images of each other.
     let map = PoincareMap::new(&driven(0.1, p + 0.01, 2.0));
     let beside = [event.point[0] + 0.15, event.point[1]];
     let settled = map.iterate(beside, 1000).state;

@@ -1,4 +1,4 @@
-//! Chaotic attractors, and transients that must not be taken for such.
+//! Chaotic attractors, and transients that must not be mistaken for them.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
@@ -24,7 +24,7 @@ fn planes() -> &'static [(f64, f64, BasinMap); 4] {
     })
 }
 
-/// A torque greater than the friction, and nothing that grows with the velocity.
+/// A torque greater than the friction, and no loss that grows with the velocity.
 fn runaway() -> Pendulum {
     Pendulum::new(0.0, 0.5, 2.0, 0.0, 1.3).and_then(|p| p.with_friction(0.1)).expect("in range")
 }
@@ -38,7 +38,7 @@ fn a_rotation_that_gains_speed_for_ever_is_no_chaos() {
 
 #[test]
 fn trajectories_that_leave_their_region_form_no_set() {
-    // Where nothing else would have left it out.
+    // No other criterion would have left it out.
     let states: Vec<State> = (0..6).map(|k| [0.4 * f64::from(k), 20.0]).collect();
     for simd in instruction_sets() {
         let strobe = Strobe::new(&runaway(), 60, simd);
@@ -48,7 +48,7 @@ fn trajectories_that_leave_their_region_form_no_set() {
     }
 }
 
-/// The one chaotic attractor of a plane that has nothing else.
+/// The chaotic attractor of a plane with no other attractor.
 fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
     assert_eq!(map.labelling, Labelling::OnlyChaos);
     let [chaos] = map.attractors.as_slice() else { panic!("{} attractors", map.attractors.len()) };
@@ -64,12 +64,12 @@ fn only_chaos(map: &BasinMap) -> &pendmap::attractor::Attractor {
 fn tumbling_chaos_takes_everything_at_the_three_points_of_figure_2() {
     for (_, _, map) in planes() {
         let chaos = only_chaos(map);
-        // The points lie on it: none is captured by anything, and both senses are there.
+        // Its points are on it: none is captured elsewhere, and both senses occur.
         assert!(
             chaos.points.iter().any(|s| s[1] > 0.5) && chaos.points.iter().any(|s| s[1] < -0.5)
         );
         assert!((map.fractions[0] - 1.0).abs() < 1e-12);
-        // Labels tell nothing, so the layers do.
+        // Labels are meaningless, so the other layers are computed.
         let layers = map.layers.as_ref().expect("layers");
         assert!((3..=60).contains(&map.layer_periods));
         assert!(layers.turns.iter().any(|t| *t > 0) && layers.turns.iter().any(|t| *t < 0));
@@ -90,7 +90,7 @@ fn exponents_are_the_reference_ones() {
         let allowed = 3.0 * stderr.hypot(chaos.exponent_stderr);
         let error = (chaos.exponent - exact).abs();
         assert!(error < allowed, "{name}: {} for {exact}, {allowed} allowed", chaos.exponent);
-        // A standard error that means something: two in a hundred at the most.
+        // A meaningful standard error: at most two per cent.
         assert!(chaos.exponent_stderr < 0.02 * exact, "{name}: {}", chaos.exponent_stderr);
     }
 }
@@ -107,7 +107,7 @@ fn exponent_of_one_trajectory() {
     let exact = number(&entry["lle_per_tau"]);
     assert!((mean - exact).abs() < 3.0 * stderr.hypot(number(&entry["se"])), "{mean} +- {stderr}");
     assert!(stderr < 0.05 * exact, "{stderr}");
-    // On a focus of the map both multipliers have the modulus exp(-gamma n T / 2).
+    // At a focus of the map both multipliers have the modulus exp(-gamma n T / 2).
     let (mean, stderr) = exponent(1.0, 2.0, 4000.0, [0.5, 0.0]);
     assert!((mean + 0.05).abs() < 3.0 * stderr + 1e-3, "{mean} +- {stderr}");
 }
@@ -122,7 +122,7 @@ fn long_transients_are_not_called_chaotic() {
             assert!(attractor.exponent < 0.0);
         }
         assert!(map.share(0) < 0.01, "p = {p}: {} undecided", map.share(0));
-        // Some do take hundreds of periods.
+        // Some take hundreds of periods.
         assert!(map.labels.settle.iter().any(|s| *s > 200), "p = {p}");
     }
 }
@@ -140,7 +140,7 @@ fn chaos_beside_other_attractors() {
     let share = cells.len() as f64 / starts.len() as f64;
     assert!(share > 0.02 && share < 0.1, "{share}");
     assert!(cells.iter().all(|i| labels.settle[*i] == NEVER));
-    // No other attractor captures a start with this label for very long.
+    // No other attractor captures a start with this label within a very long time.
     let states: Vec<State> = cells.iter().map(|i| starts.get(*i)).collect();
     for outcome in outcomes(strobe, &catalogue.traps, 3000, &states, &AtomicBool::new(false))
         .expect("outcomes")

@@ -1,5 +1,5 @@
-//! Kind, number and share of chaotic attractors: against what trajectories do that the classical
-//! Runge-Kutta method of this file integrates.
+//! Kind, number and share of chaotic attractors, against trajectories integrated in this file by
+//! the classical Runge-Kutta method.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,7 @@ use pendmap::maps::parameter_map::Range;
 
 use crate::support::{basins_on_plane, driven, instruction_sets, plane, spread};
 
-/// Steps a period of the method of this file.
+/// Steps a period of the integration in this file.
 const STEPS: usize = 200;
 const P: usize = 3;
 
@@ -52,7 +52,8 @@ impl Own {
         (0..periods).fold(start, |state, _| self.period(state)[STEPS - 1])
     }
 
-    /// The way of the angle in each of `periods`, and the largest distance from hanging on it.
+    /// The change of the angle in each of `periods`, and the largest distance from hanging
+    /// meanwhile.
     fn ways(&self, start: State, periods: usize) -> (Vec<f64>, f64) {
         let (mut state, mut highest) = (start, 0.0_f64);
         let mut ways = Vec::new();
@@ -72,7 +73,7 @@ fn some(attractor: &Attractor) -> Vec<State> {
     attractor.points.iter().step_by(stride).copied().collect()
 }
 
-/// Whether the trajectories from its points do what its kind says.
+/// Whether the trajectories from its points behave as its kind states.
 fn does_what_it_says(own: &Own, attractor: &Attractor) {
     for point in some(attractor) {
         let (ways, highest) = own.ways(point, 60);
@@ -105,7 +106,7 @@ fn rotating_chaos_is_two_attractors_with_half_of_the_starts_each() {
             assert!(ways.iter().all(|way| way * attractor.sense as f64 > 0.0));
         }
     }
-    // Where starts of the plane end after the transients is in those proportions, too.
+    // Starts of the plane end in these proportions after the transients, too.
     let starts = plane(8).sampled_states(24, 3);
     let senses: Vec<f64> = starts.iter().map(|s| own.after(*s, 1500)[1].signum()).collect();
     let forward = senses.iter().filter(|s| **s > 0.0).count();
@@ -187,7 +188,7 @@ fn libration_chaos_is_followed_to_its_crisis() {
     }
 }
 
-/// The stable rotations of period 2 that hide in tumbling chaos, found by Newton's method of this file.
+/// The stable rotations of period 2 within tumbling chaos, by Newton's method in this file.
 #[test]
 fn a_stable_orbit_of_few_periods_is_no_part_of_chaos() {
     let own = Own { p: 2.5, omega: 1.620_689_655_172_413_7 };

@@ -1,4 +1,4 @@
-//! The order of convergence, measured: eight, with and without damping and torque.
+//! The measured order of convergence: eight, with and without damping and torque.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use pendmap::model::Pendulum;
 
 use crate::support::{advanced, along, driven, fine_strobe, simd, spread};
 
-/// Root mean square over starts of the error after one period, for each number of steps.
+/// Root mean square error over starts after one period, for each number of steps.
 fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {
     let starts = spread(64, PI, 3.0);
     let exact = advanced(&fine_strobe(pendulum, 600, simd()), &starts, 1);
@@ -67,7 +67,7 @@ fn the_tableau_meets_the_simple_order_conditions() {
 
 #[test]
 fn schedules_join() {
-    // A period in two parts of other step lengths is the whole period.
+    // A period in two parts with different step lengths equals the whole period.
     let pendulum = Pendulum::new(0.2, 1.2, 1.7, 0.3, 0.1).expect("in range");
     let period = pendulum.period();
     let cut = 0.37 * period;
@@ -79,8 +79,8 @@ fn schedules_join() {
     assert!((second.duration() - (period - cut)).abs() < 1e-15);
 }
 
-/// Errors at the end of equal steps of the reference integrator, and the greatest one of the curves
-/// between, where a friction holds its sense throughout.
+/// Errors at the end of equal steps of the reference integrator, and the greatest error of the
+/// interpolants, while the sense of friction is constant.
 fn equal_steps(count: usize) -> [f64; 2] {
     let pendulum = driven(0.3, 1.1, 2.0).with_friction(0.2).expect("in range");
     let ode = OdeProblem::new(&pendulum, true, 1e-15, |_, value| value);

@@ -1,4 +1,4 @@
-//! The corner of the friction that grows with the rod's load, where that load passes zero.
+//! The corner of the load-dependent friction, at which the rod's load passes zero.
 
 use std::f64::consts::PI;
 
@@ -12,13 +12,13 @@ use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::support::{advanced, driven, simd, spread};
 
-/// A pendulum with that friction besides Coulomb's.
+/// A pendulum with this friction in addition to Coulomb's.
 fn loaded(base: Pendulum, theta_r: f64, k: f64) -> Pendulum {
     let effect = Effect::new(Kind::LoadDependentFriction, &[k]).expect("in range");
     base.with_friction(theta_r).and_then(|p| p.with_effect(effect)).expect("in range")
 }
 
-/// Both rods whose load changes sign often and one that also rotates.
+/// Rods whose load changes sign often, and one that also rotates.
 fn models() -> [Pendulum; 3] {
     [
         loaded(driven(0.1, 0.6, 2.0), 0.05, 0.15),
@@ -27,7 +27,7 @@ fn models() -> [Pendulum; 3] {
     ]
 }
 
-/// Without drive and damping, and with as much Coulomb friction, `w = v^2` obeys between turns and
+/// Without drive and damping, and with equal Coulomb friction, `w = v^2` obeys between turns and
 /// corners `dw/dth + c w = -2 sin th - c cos th` with `c` the friction times 2, the sense and the
 /// side: `w = A cos th + B sin th + C exp(-c th)`.
 struct Exact {
@@ -44,7 +44,7 @@ impl Exact {
     }
 }
 
-/// The first angle in the sense at which `value` is negative.
+/// The first angle, in the sense of motion, at which `value` is negative.
 fn first_below(from: f64, sense: f64, value: impl Fn(f64) -> f64) -> f64 {
     let mut low = 1e-9;
     while value(from + sense * (low + 1e-4)) >= 0.0 && low < 7.0 {
@@ -62,8 +62,8 @@ fn first_below(from: f64, sense: f64, value: impl Fn(f64) -> f64) -> f64 {
     from + sense * high
 }
 
-/// The angles of the first turns from `theta = 0`, where `k` is the strength of both frictions, and
-/// the number of corners on the way.
+/// The angles of the first turns from `theta = 0`, with `k` the strength of both frictions, and the
+/// number of corners before the last.
 fn exact_turns(k: f64, velocity: f64, count: usize) -> (Vec<f64>, usize) {
     let (mut state, mut sense, mut side) = ([0.0, velocity * velocity], 1.0, 1.0);
     let (mut turns, mut corners) = (Vec::new(), 0);
@@ -153,7 +153,7 @@ fn derivatives_stay_right_through_corners() {
     }
 }
 
-/// The distances of lanes from the reference after a number of periods, in rising order.
+/// The sorted distances of lanes from the reference after a number of periods.
 fn errors(pendulum: &Pendulum, starts: &[State], steps: usize, periods: usize) -> Vec<f64> {
     let flow = Flow::new(pendulum);
     let ends = advanced(&Strobe::new(pendulum, steps, simd()), starts, periods);
@@ -208,8 +208,8 @@ fn steps_for_a_tolerance_are_those_of_other_effects() {
 
 #[test]
 fn a_load_that_only_just_touches_zero_is_not_missed() {
-    // Between a start with two corners more in a period and one without them lies one whose load
-    // touches zero: on both sides, ever nearer, lanes must do what the reference does.
+    // Between a start with two further corners in a period and one without them is one whose load
+    // touches zero: on both sides, at decreasing distances, lanes must agree with the reference.
     let pendulum = loaded(driven(0.1, 0.6, 2.0), 0.02, 0.2);
     let flow = Flow::new(&pendulum);
     let strobe = Strobe::new(&pendulum, 60, simd());
@@ -257,7 +257,7 @@ fn a_load_that_only_just_touches_zero_is_not_missed() {
     assert!(touches > 3, "{touches}");
 }
 
-/// The equation holds the side of one corner: a second effect with one needs more.
+/// The equation stores the side of one corner: a second effect with a corner needs another.
 #[test]
 fn one_effect_of_the_library_has_a_corner() {
     let cornered = Kind::ALL.iter().filter(|kind| {

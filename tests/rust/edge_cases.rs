@@ -1,4 +1,4 @@
-//! Where rounding could decide: grazing contacts, starts at rest, the stick's edge.
+//! Cases that rounding could decide: grazing contacts, starts at rest, the limit of the stick.
 
 use pendmap::integrate::State;
 use pendmap::integrate::reference::driver::Driver;
@@ -45,7 +45,7 @@ fn distance(a: State, b: State) -> f64 {
 #[test]
 fn a_start_at_rest_moves_sticks_or_waits() {
     let pendulum = rubbing(0.1, 1.5, 0.87, 0.2);
-    // The load is 2.5 sin th at once, and 0.5 sin th at the least.
+    // The load is 2.5 sin th at first, and 0.5 sin th at least.
     let moving = run(&pendulum, 0.0, [0.3, 0.0], 1.0, 1);
     assert!(moving.events.is_empty() && moving.states[0][1] < 0.0);
     let waiting = run(&pendulum, 2.5, [0.1, 0.0], 6.5, 1);
@@ -63,7 +63,7 @@ fn a_start_at_the_instant_of_release_is_released() {
             let before = run(&pendulum, 2.0, [theta, 0.0], 9.0, 1);
             let release = before.events[1];
             assert_eq!(release.kind, EventKind::Release);
-            // A little earlier, at it, and one place of the clock later.
+            // A little earlier, at the instant, and one floating-point number of the clock later.
             for tau in [release.tau - 1e-9, release.tau, release.tau.next_up()] {
                 let from = run(&pendulum, tau, [theta, 0.0], 9.0, 1);
                 let error = distance(from.states[0], before.states[0]);
@@ -92,7 +92,8 @@ fn the_stick_s_edge_creeps_without_end() {
 
 #[test]
 fn a_grazing_contact_is_the_limit_of_a_pass() {
-    // Up to the top, slower and slower: from some velocity on the pendulum passes without a stop.
+    // Up to the top with decreasing velocity: above some start velocity the pendulum passes without
+    // a stop.
     let pendulum = rubbing(0.05, 0.8, 1.2, 0.3);
     for theta in [0.0, 0.5, 1.0] {
         let stops = |velocity: f64| {
@@ -126,8 +127,8 @@ fn without_friction_a_kink_is_passed_smoothly() {
         let effect = Effect::new(Kind::QuadraticDrag, &[q]).expect("in range");
         driven(0.1, 1.2, 1.3).with_effect(effect).expect("once")
     };
-    // Of order 8 although the drag's second derivative jumps at each turn: the error follows the
-    // tolerance.
+    // The order is 8 although the drag's second derivative jumps at each turn: the error follows
+    // the tolerance.
     let end = |tolerance: f64| {
         let ode = OdeProblem::new(&drag(0.3), true, tolerance, |_, value| value);
         let mut driver = Driver::new(&ode, 0.0, [2.0, 0.0], 30.0);
@@ -195,7 +196,7 @@ proptest! {
                     EventKind::Stick => stuck = true,
                     EventKind::Release => {
                         stuck = false;
-                        // The sense of the load.
+                        // The sign of the load.
                         sense = if Resting::still(&ode, 0.0).excess_toward(event.tau, event.theta, 1.0)
                             > Resting::still(&ode, 0.0).excess_toward(event.tau, event.theta, -1.0) { 1.0 } else { -1.0 };
                     }
@@ -221,7 +222,7 @@ proptest! {
 
     #[test]
     fn friction_takes_the_energy_that_is_missing(pendulum in models(), start in starts()) {
-        // Without drive energy and the work of friction and damping make a constant.
+        // Without drive, energy plus the work of friction and damping is constant.
         let still = Pendulum { drive: undriven(0.0, 0.0).drive, gamma: 0.0, ..pendulum };
         let run = run(&still, 0.0, start, 20.0, 1);
         let energy = |[theta, velocity]: State| {

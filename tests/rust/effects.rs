@@ -1,4 +1,4 @@
-//! The library of effects: every effect of it, in every respect, by loops over the whole list.
+//! The library of effects: loops over all effects, for every property.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -13,7 +13,7 @@ use pendmap::model::{Effect, Equation, Kind, Observation, Pendulum};
 
 use crate::support::{driven, spread};
 
-/// Numbers between 0 and 1 that look drawn at random.
+/// Deterministic numbers in (0, 1) that look random.
 pub struct Draws(pub u64);
 
 impl Draws {
@@ -26,7 +26,7 @@ impl Draws {
         low + (high - low) * self.next()
     }
 
-    /// The effect with typical values; one that counts periods counts whole ones.
+    /// The effect with typical values; a number of periods is a whole one.
     pub fn effect(&mut self, kind: &Kind) -> Effect {
         let value = |p: Parameter| {
             let value = self.between(p.typical);
@@ -41,14 +41,14 @@ impl Draws {
     }
 }
 
-/// The pendulum with the effect, 250 into the laboratory's time.
+/// The pendulum with the effect, 250 after the origin of the laboratory's time.
 pub fn has(pendulum: Pendulum, effect: Effect) -> Pendulum {
     let mut pendulum = pendulum.with_effect(effect).expect("once");
     pendulum.lab_time = 250.0;
     pendulum
 }
 
-/// A driven pendulum with nothing but the effect.
+/// A driven pendulum with the effect alone.
 fn alone(effect: Effect) -> Pendulum {
     has(Pendulum::new(0.0, 0.7, 1.3, 0.4, 0.0).expect("in range"), effect)
 }
@@ -77,7 +77,7 @@ fn definitions_are_whole() {
             | Action::Friction
             | Action::SlidingFriction
             | Action::LoadedFriction => Group::Damping,
-            // A constant torque, forth and back alike, is what it comes to.
+            // The effect reduces to a constant torque, equal in both senses.
             Action::Position if *kind == Kind::AsymmetricCoulomb => Group::Damping,
             Action::Position | Action::Driven | Action::Timed | Action::Inertia => Group::Torque,
             Action::Drive | Action::FurtherDrive => Group::Drive,
@@ -104,7 +104,7 @@ fn definitions_are_whole() {
     }
 }
 
-/// Every effect's acceleration in SI, as textbooks have it: velocities in rad/s, times in s.
+/// Every effect's acceleration in SI by textbook formulas: velocities in rad/s, times in s.
 #[allow(clippy::too_many_lines)] // one line an effect
 fn in_si(kind: &Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f64, t: f64) -> f64 {
     let (p, omega, phase) = (0.7, 1.3 * w0, 0.4);
@@ -121,7 +121,7 @@ fn in_si(kind: &Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f6
         ("cubic_damping", [k3]) => own = -k3 * velocity.powi(3),
         ("power_law_drag", [q, n]) => own = -q * speed.powf(*n) * sign,
         ("eddy_brake", [b, vc]) => own = -b * velocity * vc * vc / (vc * vc + velocity * velocity),
-        // After a long way in one sense.
+        // After a long motion in one sense.
         ("dahl_friction", [f, _]) => own = -f * sign,
         ("stribeck_friction", [a, vs]) => own = -a * (-(velocity / vs).powi(2)).exp() * sign,
         ("load_dependent_friction", [k]) => {
@@ -173,7 +173,7 @@ fn in_si(kind: &Kind, value: &[f64], w0: f64, theta: f64, velocity: f64, lab: f6
             let all = gravity + 0.5 * e * n * angle.sin() * velocity * velocity;
             own = all / (1.0 + e * angle.cos()) - gravity;
         }
-        // The mode's displacement and momentum `x' + mu v cos th` being 0.
+        // With displacement and momentum `x' + mu v cos th` of the mode equal to 0.
         ("pivot_compliance", [mu, wx, z]) => {
             let (sine, cosine) = theta.sin_cos();
             let gravity = -w0 * w0 * (1.0 + up) * sine;
@@ -226,7 +226,7 @@ fn readings_match_their_formulas() {
     for (kind, values, theta, expected) in [
         (Kind::EncoderOffset, &[0.1][..], 2.0, 2.1),
         (Kind::EncoderGain, &[0.1], -20.0, -22.0),
-        // 250 into the laboratory's time, and 40 more.
+        // 250 after the origin of the laboratory's time, and 40 more.
         (Kind::EncoderDrift, &[1e-3], 2.0, 2.29),
         (Kind::EncoderEccentricity, &[0.1, 0.5 * PI], 2.0 * PI, 2.0 * PI + 0.1),
         (Kind::SensorLag, &[0.01], 2.0, 2.0 - 0.01 * 3.0),
@@ -250,11 +250,11 @@ fn readings_follow_one_another_in_order() {
     }
 }
 
-/// The effect's number of derivatives and more: its pendulum's parameters, angle and velocity.
+/// Number of derivatives, at least the effect's: its pendulum's parameters, angle and velocity.
 const MOST: usize = Pendulum::OWN_PARAMETERS + MOST_PARAMETERS + 2;
 pub type Dual = Tangent<f64, MOST>;
 
-/// Acceleration and reading, with derivatives where `R` has them.
+/// Acceleration and reading, with derivatives if `R` has them.
 pub fn evaluated(
     pendulum: &Pendulum,
     tau: f64,
@@ -303,14 +303,14 @@ fn derivatives_agree_with_differences() {
                         [h, -h].map(|h| evaluated(&pendulum, tau, at, Some((index, h))));
                     [0, 1].map(|k| (plus[k] - minus[k]) / (2.0 * h))
                 };
-                // Richardson's combination of two steps leaves errors of the fourth order.
+                // Richardson extrapolation from two steps leaves errors of the fourth order.
                 let (coarse, fine) = (difference(2e-4), difference(1e-4));
                 for k in 0..2 {
                     let expected = (4.0 * fine[k] - coarse[k]) / 3.0;
                     let error = (exact[k].slope[index] - expected).abs();
                     // A narrow magnet has large fifth derivatives.
                     let allowed = 1e-8 * (1.0 + 100.0 * expected.abs());
-                    // Across the corner of a load no difference tells.
+                    // Finite differences are meaningless across the corner of a load.
                     let corner = *kind == Kind::LoadDependentFriction && near_no_load(tau, at);
                     let what = format!("{:?} by {index}, {at:?}", pendulum.effects);
                     assert!(corner || error < allowed, "{what}: {error:e} of {expected}");
@@ -320,7 +320,7 @@ fn derivatives_agree_with_differences() {
     }
 }
 
-/// Whether the rod of [`alone`] carries next to nothing.
+/// Whether the load on the rod of [`alone`] is almost zero.
 fn near_no_load(tau: f64, [theta, velocity]: State) -> bool {
     let up = 0.7 * (1.3 * tau + 0.4).cos();
     ((1.0 + up) * theta.cos() + velocity * velocity).abs() < 0.01

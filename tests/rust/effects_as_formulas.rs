@@ -1,10 +1,10 @@
-//! Effects of the library, written as formulas of a user.
+//! Effects of the library, written as user formulas.
 
 use pendmap::model::effects::{Parameter, Power};
 use pendmap::model::formula::{ParameterSpec, Spec};
 use pendmap::model::{Effect, Formula, Kind};
 
-/// The term of an effect whose torque a formula can say.
+/// The term of an effect whose torque a formula can express.
 pub fn term(kind: &Kind) -> Option<&'static str> {
     Some(match kind.definition().name {
         "viscous_damping" => "-gamma*v",
@@ -29,7 +29,7 @@ pub fn term(kind: &Kind) -> Option<&'static str> {
     })
 }
 
-/// A parameter of a formula like one of the library.
+/// The parameter of a formula with the properties of one of the library.
 fn like(parameter: Parameter) -> ParameterSpec {
     let Parameter { name, unit, power, range, typical, meaning, .. } = parameter;
     let (power, less) = match power {
@@ -38,7 +38,7 @@ fn like(parameter: Parameter) -> ParameterSpec {
         Power::TwoMinus(place) => (2.0, Some(place)),
     };
     let name = match name {
-        // Names that have another meaning in terms.
+        // Names that have another meaning in formulas.
         "a" => "size",
         "phase" => "psi",
         other => other,
@@ -75,7 +75,7 @@ pub fn formula(name: &str, term: &str, parameters: &[(&str, f64)]) -> Spec {
     }
 }
 
-/// An effect of the library as a formula with the same parameters, where there is one.
+/// An effect of the library as a formula with the same parameters, if it can be expressed.
 pub fn rewritten(effect: &Effect) -> Option<Effect> {
     let definition = effect.kind.definition();
     let spec = Spec {

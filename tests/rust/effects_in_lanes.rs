@@ -1,4 +1,4 @@
-//! The library of effects in lanes and maps: bits, errors, what is refused.
+//! The library of effects in lanes and maps: equality of bits, errors, refusals.
 
 use std::f64::consts::PI;
 
@@ -19,7 +19,7 @@ use crate::support::{
     advanced, bits, columns, driven, instruction_sets, plane, simd, spread, unchecked,
 };
 
-/// All that a map may have, each without and with Coulomb friction.
+/// All effects that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {
     let mut draws = Draws(6);
     let mut all = Vec::new();
@@ -85,7 +85,7 @@ fn lanes_agree_with_the_reference_integrator() {
         let [median, error] = errors_in_lanes(&pendulum, 120);
         println!("{median:e} {error:e} {:?} {}", pendulum.effects, pendulum.theta_r);
         let allowed = match kind {
-            // After a turn its torque grows as a power of time that is not whole.
+            // After a turn its torque grows as a non-integer power of time.
             Kind::PowerLawDrag => 1e-7,
             _ => 1e-9,
         };
@@ -105,7 +105,7 @@ fn a_friction_that_turns_negative_holds_nothing() {
         let [median, error] = errors_in_lanes(&pendulum, 200);
         println!("{kind:?} {median:e} {error:e}");
         assert!(error < 1e-8, "{kind:?}: {error:e}");
-        // At a quarter turn all three are negative, and the load is what moves it.
+        // At a quarter turn all three are negative, and the load drives the motion.
         let arrival = Flow::new(&pendulum).carry([0.5 * PI, 0.0], 0.0, 0.1);
         assert!(arrival.state[1] < -0.01 && !arrival.stuck, "{kind:?}: {arrival:?}");
     }
@@ -133,7 +133,7 @@ fn drifts_are_held_in_maps_and_go_on_in_trajectories() {
         (Kind::CoulombWarmUp, -5e-2),
         (Kind::ViscousWarmUp, -5e-2),
     ] {
-        // Two stretches, one after the other, are one.
+        // Two stretches in succession equal one.
         let early =
             has(Pendulum::new(0.0, 0.0, 1.0, 0.0, 0.0).expect("ok"), effect(kind.clone(), size));
         let mut late = early.clone();

@@ -30,7 +30,7 @@ fn worst(numbers: &[f64], values: &[f64], exact: fn(f64) -> f64) -> (f64, f64) {
         .fold((0.0, 0.0), |a, b| if b.0 > a.0 || b.0.is_nan() { b } else { a })
 }
 
-/// Numbers all over a range, and the neighbours of each multiple of `ln 2 / 2` in it.
+/// Numbers over a whole range, and the neighbours of each multiple of `ln 2 / 2` in it.
 fn exponents() -> Vec<f64> {
     let mut all: Vec<f64> = (0..=200_000).map(|i| -707.9 + 0.007_084 * f64::from(i)).collect();
     all.extend((-2040..2040).flat_map(|k| {
@@ -64,7 +64,7 @@ fn the_exponential_stays_among_normal_numbers() {
 
 #[test]
 fn the_logarithm_is_good_to_the_last_places() {
-    // All binades, and the neighbourhood of 1, where it vanishes.
+    // All binades, and the neighbourhood of 1, at which the logarithm vanishes.
     let mut numbers: Vec<f64> =
         (0..200_000).map(|i| 10_f64.powf(-307.0 + 0.003_07 * f64::from(i))).collect();
     numbers.extend((0..20_000).map(|i| 0.5 + 1e-4 * f64::from(i)));

@@ -1,4 +1,4 @@
-//! Motions whose course is known: in closed form, by a conserved energy, or to 30 digits.
+//! Motions with known solutions: in closed form, by a conserved energy, or to 30 digits.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
@@ -21,7 +21,7 @@ fn end(trajectory: &Trajectory) -> State {
 
 #[test]
 fn small_swings_decay_as_the_linear_oscillator() {
-    // At 1e-7 rad the sine is the angle to within 2e-15 of it.
+    // At 1e-7 rad the sine equals the angle to within 2e-15 relative.
     let amplitude = 1e-7;
     for gamma in [0.0, 0.1, 1.0, 2.5] {
         let pendulum = undriven(gamma, 0.0);
@@ -47,7 +47,8 @@ fn small_swings_decay_as_the_linear_oscillator() {
 
 #[test]
 fn separatrix() {
-    // Without damping, th = 2 atan(sinh t) and th' = 2 / cosh t lead from 0 with velocity 2 to the top.
+    // Without damping, th = 2 atan(sinh t), th' = 2 / cosh t is the solution from 0 with velocity 2
+    // to the top.
     let pendulum = undriven(0.0, 0.0);
     for until in [0.5, 2.0, 5.0, 8.0_f64] {
         let [theta, velocity] = end(&run(&pendulum, [0.0, 2.0], until, 1e-13));
@@ -65,7 +66,7 @@ fn period_of_free_swings() {
         let pendulum = undriven(0.0, 0.0);
         let (period, quarter) = (number(&truth["T_tau"]), number(&truth["quarter"]));
         let [theta, velocity] = end(&run(&pendulum, start, quarter, 1e-13));
-        // There it passes through zero: the time left is theta over the speed.
+        // It passes through zero there: the remaining time is theta over the speed.
         let measured = 4.0 * (quarter - theta / velocity);
         assert!((measured / period - 1.0).abs() < 1e-13, "{amplitude}: {measured} for {period}");
         let back = end(&run(&pendulum, start, period, 1e-13));
@@ -87,8 +88,9 @@ fn energy_stays_without_damping_and_drive() {
             .zip(&run.velocity)
             .map(|(a, v)| (energy(*a, *v) - first).abs())
             .fold(0.0, f64::max);
-        // The tolerance is for five periods: a hundred have twenty times as much, and as the velocity
-        // is not above 3, an error of the state makes one of the energy that is three times as large.
+        // The tolerance is for five periods: a hundred allow twenty times as much, and as the
+        // velocity is at most 3, an error of the state gives one of the energy three times as
+        // large.
         assert!(worst < 60.0 * tol, "torque {torque}, {start:?}: {worst:e}");
     }
 }
@@ -99,7 +101,7 @@ fn reference_trajectories() {
         let pendulum = model(entry);
         let start = [number(&entry["theta0"]), number(&entry["v0"])];
         let (theta, velocity) = (numbers(&entry["theta"]), numbers(&entry["v"]));
-        // The last two are chaotic: what is 1e-14 at t = 10 is 1e-6 at t = 100.
+        // The last two are chaotic: an error of 1e-14 at t = 10 is 1e-6 at t = 100.
         let growth = if pendulum.drive.p > 1.0 { 0.2 } else { 0.0 };
         for (i, until) in numbers(&entry["times"]).into_iter().enumerate() {
             let run = run(&pendulum, start, until, 1e-11);
@@ -115,7 +117,7 @@ fn reference_trajectories() {
 
 #[test]
 fn asking_for_more_does_not_give_less() {
-    // A tolerance that rounding forbids costs neither accuracy nor a thousand times the steps.
+    // A tolerance below rounding costs neither accuracy nor a thousand times the steps.
     for entry in &list(&truths()["trajectories"])[2..] {
         let pendulum = model(entry);
         let start = [number(&entry["theta0"]), number(&entry["v0"])];
@@ -133,7 +135,7 @@ fn asking_for_more_does_not_give_less() {
 
 #[test]
 fn simulate_reports_its_error() {
-    // The error that it reports bounds the one against a run a thousand times as precise.
+    // The reported error bounds the difference from a run a thousand times as precise.
     let pendulum = driven(0.1, 1.0, 2.0);
     for tol in [1e-4, 1e-7, 1e-10] {
         let until = 5.0 * pendulum.period();

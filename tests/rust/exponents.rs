@@ -1,4 +1,4 @@
-//! Lyapunov exponents: against reference values, multipliers, and the exact derivatives through
+//! Lyapunov exponents against reference values, multipliers, and the exact derivatives through
 //! turns and sticks.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -97,7 +97,7 @@ fn a_chaotic_transient_has_the_exponent_of_what_captures_it() {
         longest = longest.max(transient);
     }
     assert!(longest > 300, "{longest}");
-    // While it lasts deviations grow as they do in chaos.
+    // During the transient deviations grow as in chaos.
     assert!(grown > 0.25 * lasted, "{grown} in {lasted} periods");
 }
 
@@ -143,7 +143,7 @@ fn exact_growth(map: &PoincareMap, start: State, periods: usize) -> (Vec<f64>, u
 
 #[test]
 fn tangents_grow_through_turns_and_sticks_as_exact_derivatives_say() {
-    // Little friction, much of it with long sticks, and one that depends on the load as well.
+    // Little friction, much with long sticks, and one that depends on the load as well.
     let models = [
         (driven(0.02, 1.0, 2.0), 0.05, 200),
         (driven(0.1, 1.5, 0.87), 0.2, 400),
@@ -170,8 +170,9 @@ fn tangents_grow_through_turns_and_sticks_as_exact_derivatives_say() {
             }
             compared += errors.len();
             errors.sort_by(f64::total_cmp);
-            // Shadows err by their distance times the bend of the map; where a shadow turns or stops
-            // and the trajectory does not, by as much as they like, which is as rare as they are near.
+            // The error of shadow trajectories is their distance times the curvature of the map,
+            // and unbounded if only one of the two turns or stops, which is as rare as they are
+            // close.
             let at = |share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
             assert!(at(0.9) < 1e-4, "{simd}, theta_r = {theta_r}: {:e}", at(0.9));
             assert!(at(0.98) < 2e-2, "{simd}, theta_r = {theta_r}: {:e}", at(0.98));

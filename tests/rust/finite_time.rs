@@ -29,7 +29,7 @@ fn turns_and_exponents_are_those_of_the_precise_map() {
         let exponent = tangent.norm().ln() / (3.0 * pendulum.period());
         assert!((f64::from(layers.exponent[i]) - exponent).abs() < 1e-6, "start {i}");
         let net = image.turns as f64 + (image.state[0] - start[0]) / TAU;
-        // Halves are rounded either way by rounding errors.
+        // Values at one half are rounded either way by rounding errors.
         let near = (net - net.round()).abs() < 0.499;
         assert!(!near || layers.turns[i] == net.round() as i32, "start {i}: {net}");
     }
@@ -45,13 +45,13 @@ fn without_drive_and_damping_energy_decides_rotation() {
     for i in 0..starts.len() {
         let [theta, velocity] = starts.get(i);
         let energy = 0.5 * velocity * velocity - theta.cos();
-        // Below the top it swings, and ends less than a turn away; above it goes round for ever.
+        // Below the threshold it swings and ends less than a turn away; above it rotates for ever.
         if energy < 1.0 {
             assert!(layers.turns[i].abs() <= 1, "start {i} swings");
         } else if energy > 1.01 {
             assert!(layers.turns[i] * velocity.signum() as i32 > 10, "start {i} turns");
         }
-        // Nothing here is chaotic: growth is that of a shear.
+        // There is no chaos here: growth is that of a shear.
         assert!(energy > 0.9 && energy < 1.1 || layers.exponent[i] < 0.08, "start {i}");
     }
 }
@@ -114,7 +114,7 @@ fn smooth_labels_are_reliable_and_fractal_ones_are_not() {
     assert!(found.half_step > 0.05 && mirror > 0.05, "{found:?}");
     assert!(found.either >= found.half_step.max(mirror));
     assert!(found.either <= found.half_step + mirror + 1e-12);
-    // Neighbours agree hardly better than chance.
+    // Neighbours agree little better than by chance.
     let texture = fractal.texture;
     assert!(texture.neighbours_agree < texture.chance + 0.1, "{texture:?}");
     assert!(texture.basin_entropy > 0.5, "{texture:?}");

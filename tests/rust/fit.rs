@@ -1,4 +1,4 @@
-//! Fits: the eliminated equations against the whole ones, parameters found again, intervals.
+//! Fits: the eliminated equations against the full ones, recovered parameters, intervals.
 
 use std::sync::atomic::AtomicBool;
 
@@ -14,11 +14,11 @@ use crate::fit_records::{TOLERANCE, everything, free, line, record, with};
 use crate::support::{driven, undriven};
 
 fn noise(k: usize) -> f64 {
-    // Not random, but like nothing in the model.
+    // Not random, but unlike any term of the model.
     ((k as f64 * 12.9898).sin() * 43_758.545_3).fract() - 0.5
 }
 
-/// Three records, one of them forced, and the wrong values to start from.
+/// Three records, one of them forced, and wrong starting values.
 fn several() -> (Problem, Vec<f64>) {
     let gain: (Kind, &[f64]) = (Kind::EncoderOffset, &[0.01]);
     let own = |p: f64| {
@@ -112,7 +112,7 @@ fn initial_states_are_eliminated_exactly() {
 
 #[test]
 fn chaotic_motion_takes_no_digits_from_the_covariance() {
-    // The state's part of the information is 1e10 times the rest of the parameters' part.
+    // The information of the state exceeds that of the parameters 1e10 times.
     let pendulum = driven(0.05, 1.7, 0.87).with_friction(0.02).expect("in range");
     let start = [1.0, 0.4];
     let record = record(pendulum, None, start, 45.0);
@@ -171,7 +171,7 @@ fn intervals_end_where_the_profile_exceeds_the_level() {
 
 #[test]
 fn a_stuck_pendulum_determines_only_its_angle() {
-    // At rest all along: angle and offset are one number, nothing is said about the rest.
+    // At rest throughout: angle and offset are degenerate, other parameters undetermined.
     let pendulum = with(undriven(0.1, 0.0), &[(Kind::EncoderOffset, &[0.0])]);
     let pendulum = pendulum.with_friction(0.2).expect("in range");
     let record = record(pendulum, None, [0.05, 0.0], 20.0);

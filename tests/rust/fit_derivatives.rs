@@ -16,8 +16,8 @@ use pendmap::model::{Kind, Pendulum, Recorded};
 use crate::fit_records::{TOLERANCE, every, everything, free, line, record, with};
 use crate::support::{driven, instruction_sets, undriven};
 
-/// The largest difference of the rows from finite differences, over the size of the column or 1, on any
-/// instruction set of this processor.
+/// The largest difference of the rows from finite differences, over the size of the column or 1, on
+/// all instruction sets of this processor.
 fn worst(record: Record, values: Option<Vec<f64>>, start: State) -> f64 {
     let (mut slots, mut own) = everything(&record.pendulum);
     if let Some(sensor) = record.rod_sensor {
@@ -65,7 +65,8 @@ fn worst_of(problem: &Problem, values: &[f64], window: Window) -> f64 {
 
 #[test]
 fn instruction_sets_agree_and_passes_have_the_same_motion() {
-    // Six directions, and more than one pass holds; turns, sticks and every stage of the formulas.
+    // Six directions, and more than one pass can compute; turns, sticks and every stage of the
+    // formulas.
     let pendulum = with(
         driven(0.02, 0.5, 2.1).with_friction(0.1).expect("in range"),
         &[
@@ -125,7 +126,7 @@ fn derivatives_hold_for_a_decay_to_rest() {
     let mut values = everything(&record.pendulum).1;
     let error = worst(record.clone(), None, start);
     assert!(error < 1e-6, "{error:e}");
-    // Away from its own frequency too.
+    // Also at other frequencies than its own.
     values[0] = 1.21;
     let error = worst(record, Some(values), start);
     assert!(error < 1e-6, "{error:e}");
@@ -140,7 +141,7 @@ fn derivatives_hold_for_sensors_on_the_rod() {
     let start = [2.0, -0.1];
     let mut record = record(pendulum, None, start, 90.0);
     record.angles = Some(record.readings.clone());
-    // At two thirds of the equivalent length, leaning and with gravity; without it; a gyroscope.
+    // At two thirds of the equivalent length, tilted and with gravity; without it; a gyroscope.
     for (rate, place, gravity) in [(0.0, 2.0 / 3.0, 1.0), (0.0, -1.0, 0.0), (1.1, 0.0, 0.0)] {
         let (bias, interval, tilt) = (0.01, 0.06, 0.03);
         record.rod_sensor = Some(RodSensor { rate, place, gravity, bias, interval, tilt });
@@ -153,11 +154,11 @@ fn derivatives_hold_for_sensors_on_the_rod() {
 fn derivatives_hold_where_a_contact_yields() {
     let dahl: (Kind, &[f64]) = (Kind::DahlFriction, &[0.05, 0.1]);
     let start = [1.2, -0.1];
-    // To swings far smaller than the contact yields.
+    // Down to swings far smaller than the yield of the contact.
     let decay = with(undriven(0.02, 0.0), &[dahl.clone(), (Kind::QuadraticDrag, &[0.01])]);
     let error = worst(record(decay, None, start, 60.0), None, start);
     assert!(error < 1e-6, "{error:e}");
-    // Held fast now and then, and seen by an accelerometer.
+    // With sticks, and measured by an accelerometer.
     let rubbing = with(driven(0.05, 0.9, 0.87).with_friction(0.1).expect("in range"), &[dahl]);
     let mut record = record(rubbing.clone(), None, start, 30.0);
     let ode = OdeProblem::new(&rubbing, true, TOLERANCE, |_, value| value);
@@ -189,9 +190,9 @@ fn derivatives_hold_where_the_pivot_gives_way() {
         assert!(error < 1e-6, "{error:e}");
     };
     let compliance: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.05, 5.3, 0.03]);
-    // Whirling, then swinging without friction.
+    // Rotating, then swinging without friction.
     check(with(undriven(0.1, 0.01), std::slice::from_ref(&compliance)), [0.4, 2.8], 25.0);
-    // Turns at which the acceleration jumps, to a rest on which the mode rings.
+    // Turns at which the acceleration jumps, before a rest on which the mode oscillates.
     let rubbing = with(
         undriven(0.02, 0.0).with_friction(0.06).expect("in range"),
         std::slice::from_ref(&compliance),
@@ -200,12 +201,12 @@ fn derivatives_hold_where_the_pivot_gives_way() {
     assert!(happens(&rubbing, start, 40.0, EventKind::Turn) > 4);
     assert_eq!(happens(&rubbing, start, 40.0, EventKind::StuckForEver), 1);
     check(rubbing, start, 40.0);
-    // Held fast now and then, and released by the drive.
+    // With sticks, released by the drive.
     let forced = driven(0.1, 1.5, 0.87).with_friction(0.2).expect("in range");
     let (held, start) = (with(forced, &[compliance]), [-0.43, 1.03]);
     assert!(happens(&held, start, 15.0, EventKind::Release) > 1);
     check(held, start, 15.0);
-    // Released by the mode that rings on.
+    // Released by the mode, which continues to oscillate.
     let ringing: (Kind, &[f64]) = (Kind::PivotCompliance, &[0.3, 3.23, 0.01]);
     let base = undriven(0.008, 0.0).with_friction(0.078).expect("in range");
     let (shaken, start) = (with(base, &[ringing]), [0.3, 1.29]);
@@ -242,7 +243,7 @@ fn derivatives_hold_for_an_accelerometer_where_the_pivot_gives_way() {
 
 #[test]
 fn derivatives_hold_where_a_sensor_has_play() {
-    // No sample is so near where the play is taken up that a difference passes it.
+    // No sample is so near the end of the backlash that a difference step crosses it.
     for (theta_r, until) in [(0.004, 40.0), (0.03, 60.0)] {
         let effects: [(Kind, &[f64]); 3] = [
             (Kind::EncoderGain, &[0.02]),
@@ -302,7 +303,7 @@ fn derivatives_hold_under_a_recorded_motion() {
 
 #[test]
 fn derivatives_hold_where_friction_is_negative() {
-    // A term missing in a model may lead there.
+    // A missing term of a model may lead there.
     let mut pendulum = with(undriven(0.05, 0.0), &[(Kind::QuadraticDrag, &[0.1])]);
     pendulum.set_parameter(1, -0.01);
     let start = [1.5, 0.0];
@@ -316,7 +317,7 @@ fn derivatives_hold_where_friction_is_negative() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Gravity `s` in a fixed unit of time is another unit of time.
+/// Gravity `s` in a fixed unit of time is equivalent to another unit of time.
 #[test]
 fn gravity_is_the_square_of_the_frequency() {
     let pendulum = with(

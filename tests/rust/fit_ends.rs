@@ -1,4 +1,4 @@
-//! How a descent ends: at its target or given up, and where a least sum of squares is not flat.
+//! Termination of the descent: at its target, abandoned, or at a kink of the sum of squares.
 
 use std::sync::atomic::AtomicBool;
 
@@ -34,7 +34,7 @@ fn searched(
     (point, outcome.expect("not cancelled"))
 }
 
-/// A decay with a drag that the model has not, in units of an error of 0.001.
+/// A decay with a drag that the model lacks, in units of an error of 0.001.
 fn with_drag() -> Record {
     let truth = with(pendulum(), &[(Kind::QuadraticDrag, &[0.05])]);
     let mut found = record(truth, None, [1.2, 0.0], 40.0);
@@ -51,7 +51,7 @@ fn a_descent_far_from_its_target_is_given_up() {
     let (point, outcome) = searched(vec![with_drag()], &[[1.2, 0.0]], 0.5 * least, 40);
     assert!(outcome.given_up && !outcome.converged, "{outcome:?}");
     assert!(outcome.steps < whole.steps, "{outcome:?} {whole:?}");
-    // Its sum of squares is then near the least possible: giving up was right.
+    // Its sum of squares is then near the minimum: abandoning was right.
     assert!(point.normal.chi2 < 1.05 * least, "{} {least}", point.normal.chi2);
     let (point, outcome) = searched(vec![with_drag()], &[[1.2, 0.0]], 1.01 * least, 40);
     assert!(outcome.converged && !outcome.given_up, "{outcome:?}");
@@ -60,8 +60,8 @@ fn a_descent_far_from_its_target_is_given_up() {
 
 #[test]
 fn a_window_at_a_kink_holds_nothing_up() {
-    // It rests where friction of the model just does not hold it: readings 0.02 rad beyond. From the
-    // edge on it slides back, on this side of it the sum of squares falls toward the edge.
+    // It rests just beyond the limit of the model's friction: readings differ by 0.02 rad. Beyond
+    // the limit the model slides back; within it the sum of squares falls toward the limit.
     let mut stuck = record(pendulum(), None, [0.01, 0.0], 20.0);
     stuck.readings.fill(FRICTION.asin() + 0.02);
     let decays = [1.2, 0.8].map(|theta| record(pendulum(), None, [theta, 0.0], 40.0));

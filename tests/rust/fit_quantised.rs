@@ -1,4 +1,4 @@
-//! Readings rounded to counts: their likelihood, and the equations that come from it.
+//! Readings rounded to counts: their likelihood, and the resulting equations.
 
 use pendmap::fit::levenberg_marquardt::Point;
 use pendmap::fit::quantised::{Likelihood, likelihood, surplus};
@@ -28,7 +28,7 @@ fn deviances_are_those_of_the_integral_over_a_count() {
             let apart = 0.025 * f64::from(k);
             let probability = between((apart - 0.5) / spread, (apart + 0.5) / spread);
             if probability < 1e-9 {
-                continue; // Simpson's rule has too few digits there
+                continue; // Simpson's rule has too few digits here
             }
             let own = likelihood(apart, 1.0, 1.0 / spread).deviance;
             let expected = -2.0 * probability.ln();
@@ -45,7 +45,7 @@ fn residual_and_weight_are_slope_and_curvature() {
             let Likelihood { deviance, residual, weight } = likelihood(apart, 1.0, sharpness);
             let step = 1e-3 / sharpness;
             let at = |x: f64| likelihood(x, 1.0, sharpness).deviance;
-            // The angle of the model grows as what is apart falls.
+            // The model's angle increases as the residual decreases.
             let slope = (at(apart + step) - at(apart - step)) / (4.0 * step);
             let bend = (at(apart + step) - 2.0 * deviance + at(apart - step)) / (2.0 * step * step);
             let scale = sharpness * sharpness;
@@ -71,7 +71,8 @@ fn far_from_its_count_a_reading_is_a_value() {
 
 #[test]
 fn counts_finer_than_the_noise_are_squares() {
-    // Then the deviance is the square over s^2 + q^2/12, and a constant that the surplus takes off.
+    // Then the deviance is the square over s^2 + q^2/12, plus a constant that the surplus
+    // subtracts.
     for apart in [0.0, 0.7, 2.0, 4.0] {
         let Likelihood { deviance, residual, weight } = likelihood(apart, 0.2, 1.0);
         let variance = 1.0 + 0.04 / 12.0;

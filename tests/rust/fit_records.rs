@@ -10,15 +10,15 @@ use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
 use pendmap::model::{Effect, Kind, Observation, Pendulum, Recorded};
 
-/// The error allowed to a step.
+/// Error tolerance of a step.
 pub const TOLERANCE: f64 = 1e-13;
 
-/// Times from 0 on.
+/// Times starting at 0.
 pub fn every(interval: f64, until: f64) -> Vec<f64> {
     (0..=(until / interval) as usize).map(|k| k as f64 * interval).collect()
 }
 
-/// With effects.
+/// A pendulum with effects.
 pub fn with(pendulum: Pendulum, effects: &[(Kind, &[f64])]) -> Pendulum {
     effects.iter().fold(pendulum, |pendulum, (kind, values)| {
         pendulum.with_effect(Effect::new(kind.clone(), values).expect("in range")).expect("once")
@@ -57,7 +57,7 @@ pub fn record(
     }
 }
 
-/// Parameters that are free, with one value, in all records.
+/// Free parameters with one value for all records.
 pub fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
     let all = |slot: &Slot| (0..records).map(|record| (record, *slot)).collect();
     slots.iter().zip(start).map(|(slot, start)| Free { places: all(slot), start: *start }).collect()
@@ -74,7 +74,7 @@ pub fn everything(pendulum: &Pendulum) -> (Vec<Slot>, Vec<f64>) {
     )
 }
 
-/// A window at these values.
+/// A window with these values.
 pub fn line(problem: &Problem, values: &[f64], window: &Window) -> Linear {
     let shaped = problem.shaped(window.record, values).expect("in range");
     linearise(problem, &shaped, &problem.columns(window.record), window)

@@ -1,4 +1,4 @@
-//! Steps in ratios: what is found along a bent valley, and what goes straight.
+//! Logarithmic steps: fits along a curved valley, and parameters with linear steps.
 
 use std::sync::atomic::AtomicBool;
 
@@ -12,10 +12,10 @@ use crate::fit_records::{TOLERANCE, free, record, with};
 use crate::support::undriven;
 
 const RELEASES: [f64; 3] = [2.6, 1.7, 1.1];
-/// Coulomb friction, then force, place and width of the rough spot.
+/// Coulomb friction, then strength, position and width of the rough spot.
 const PLACES: [usize; 4] = [1, 6, 7, 8];
 
-/// Free decays over a rough spot; friction and what is free of the spot begin elsewhere.
+/// Free decays over a rough spot; friction and the free parameters of the spot start elsewhere.
 fn rough(spot: [f64; 3], places: &[usize], start: &[f64]) -> Problem {
     let own = with(
         undriven(0.01, 0.0).with_friction(0.0025).expect("in range"),
@@ -26,7 +26,7 @@ fn rough(spot: [f64; 3], places: &[usize], start: &[f64]) -> Problem {
     Problem::new(records, free(&slots, 3, start), TOLERANCE).expect("a problem")
 }
 
-/// The search from the starts, with the true initial states.
+/// The fit from the starting values, with the true initial states.
 fn searched(problem: &Problem, steps: usize) -> (Point, Outcome) {
     let windows = RELEASES.iter().enumerate().map(|(record, theta)| Window {
         record,
@@ -80,7 +80,7 @@ fn both_scales_of_steps_agree_to_first_order() {
         assert!((scale.gone(2.0, 1e-6) - 2.000_001).abs() < 1e-12);
         assert!((scale.gone(2.0, 1e-6) - scale.gone(2.0, 0.0) - 1e-6).abs() < 1e-12);
     }
-    // A width stays positive, and goes no farther than e^2; a size may pass 0.
+    // A width remains positive, within a factor of e^2; a size may cross 0.
     assert!(StepScale::Width.gone(0.1, -5.0) > 0.0);
     assert!((StepScale::Width.part(0.1, 2.0) - 0.1).abs() < 1e-15);
     assert!((StepScale::Size.gone(0.1, -5.0) + 4.9).abs() < 1e-15);

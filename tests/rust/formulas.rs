@@ -1,4 +1,4 @@
-//! Effects that users write: against the library's, in every respect, and what is refused.
+//! User-defined effects: against the library's, in every respect, and refusals.
 
 use std::f64::consts::PI;
 
@@ -26,14 +26,14 @@ fn effect(spec: &Spec, values: &[f64]) -> Effect {
     Effect::new(Kind::Formula(formula), values).expect("in range")
 }
 
-/// Every effect that can be rewritten, and itself as a formula, in the same pendulum.
+/// Every effect that can be rewritten, and its formula, in the same pendulum.
 fn twins(base: &Pendulum) -> Vec<(Kind, Pendulum, Pendulum)> {
     let mut all = Vec::new();
     for kind in Kind::ALL {
-        // Each by itself: another effect in the library changes none of them.
+        // Each alone: another effect of the library changes none of them.
         let seed = kind.definition().name.bytes().map(u64::from).sum();
         let own = match kind {
-            // Below the friction of the tests: together they brake everywhere.
+            // Below the friction of the tests: their sum brakes everywhere.
             Kind::LoadDependentFriction => Effect::new(kind.clone(), &[0.02]).expect("in range"),
             _ => Draws(seed).effect(kind),
         };
@@ -65,7 +65,7 @@ fn a_formula_pushes_as_the_library_does() {
         assert_eq!(kept, mirrored, "{kind:?}");
         assert_eq!(library.check_mappable().is_ok(), own.check_mappable().is_ok(), "{kind:?}");
         assert_eq!(library.has_friction(), own.has_friction(), "{kind:?}");
-        // Only the library's viscous damping costs nothing.
+        // Only the library's viscous damping has no cost.
         let viscous = kind == Kind::ViscousDamping;
         assert!(viscous || library.route() == own.route(), "{kind:?}");
         assert_eq!(library.drifts(), own.drifts(), "{kind:?}");
@@ -99,7 +99,7 @@ fn a_formula_s_trajectories_are_the_library_s() {
                     [&library, &own].map(|p| advanced(&Strobe::new(p, 60, simd()), &starts, 3));
                 for ((a, b), start) in a.iter().zip(&b).zip(&starts) {
                     let apart = distance(*a, *b);
-                    // Without fused operations the two round differently, at corners too.
+                    // Without fused operations the two round differently, also at corners.
                     assert!(apart < 1e-11, "{kind:?} in lanes from {start:?}: {apart:e}");
                 }
             }
@@ -113,13 +113,13 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
         let base = driven(0.1, 0.6, 2.0).with_friction(theta_r).expect("in range");
         for (kind, library, own) in twins(&base) {
             if own.check_mappable().is_ok() {
-                // Where a corner moves the end of each rest, that is looked for step by step.
+                // If a corner moves the end of each rest, the release is searched step by step.
                 let side = if library.has_corner() && theta_r > 0.0 { 6 } else { 24 };
                 let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, side));
                 let (a, b) = (cell_names(&a), cell_names(&b));
                 let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();
-                // Effects that cost the library nothing take general steps as formulas: a cell within their
-                // error of a boundary may be on its other side.
+                // Effects with closed forms in the library take general steps as formulas: a cell
+                // within their error of a boundary may be on its other side.
                 let other = matches!(kind, Kind::ViscousDamping | Kind::BiasTorque);
                 let allowed = if other { a.len() / 200 } else { 0 };
                 assert!(apart <= allowed, "{kind:?}: {apart} cells");
@@ -165,7 +165,7 @@ fn derivatives_of_formulas_agree_with_differences() {
                     (plus - minus) / (2.0 * h)
                 };
                 let (coarse, fine) = (difference(2e-4), difference(1e-4));
-                // A kink lies between the four where they do not agree.
+                // A kink lies between the four points if they do not agree.
                 if (fine - coarse).abs() < 1e-5 {
                     let error = (exact[0].slope[index] - (4.0 * fine - coarse) / 3.0).abs();
                     assert!(error < 1e-8, "{} by {index} at {at:?}: {error:e}", term.0);
@@ -213,7 +213,7 @@ fn lanes_follow_formulas_as_the_reference_does() {
         });
         let error = far.fold(0.0, f64::max);
         println!("{error:e} {}", term.0);
-        // After a turn a broken power of the velocity grows as a power of time that is not whole.
+        // After a turn a non-integer power of the velocity grows as a non-integer power of time.
         let allowed = if term.0.contains("sqrt") { 1e-5 } else { 1e-8 };
         assert!(error < allowed, "{}: {error:e}", term.0);
     }
@@ -221,19 +221,20 @@ fn lanes_follow_formulas_as_the_reference_does() {
 
 #[test]
 fn a_jump_at_rest_is_dry_friction() {
-    // At rest it holds what does not exceed 0.2, in motion it is lopsided: 0.2 forth, 0.1 back.
+    // At rest it holds loads up to 0.2, in motion it is asymmetric: 0.2 forward, 0.1 backward.
     let spec = formula("lopsided", "-k*(0.75*sign(v) + 0.25)", &[("k", 2.0)]);
     let pendulum = has(undriven(0.0, 0.0), effect(&spec, &[0.2]));
     assert!(pendulum.has_friction() && pendulum.has_events());
     let slides = |velocity: f64| pendulum.acceleration(0.0, 0.0, velocity);
     assert!((slides(1.0) + 0.2).abs() < 1e-15 && (slides(-1.0) - 0.1).abs() < 1e-15);
     let flow = Flow::new(&pendulum);
-    // The load -sin(theta) - 0.05 against a hold of 0.15.
+    // The load -sin(theta) - 0.05 against a limit of 0.15.
     for (theta, sticks) in [(0.09_f64, true), (0.11, false), (-0.19, true), (-0.21, false)] {
         let arrival = flow.carry([theta, 0.0], 0.0, 1.0);
         assert_eq!(arrival.stuck_for_ever, sticks, "{theta}: {arrival:?}");
     }
-    // Sliding back, the lopsided friction is a constant torque of 0.1: energy with it is kept.
+    // In backward motion the friction is a constant torque of 0.1: energy including it is
+    // conserved.
     let energy = |theta: f64, v: f64| 0.5 * v * v - theta.cos() - 0.1 * theta;
     let end = flow.carry([0.2, 0.0], 0.0, 0.5).state;
     assert!((energy(end[0], end[1]) - energy(0.2, 0.0)).abs() < 1e-13, "{end:?}");
@@ -246,7 +247,7 @@ fn a_phase_drives_where_the_pivot_rests() {
     let pushed = has(pendulum, effect(&spec, &[1e-5]));
     assert!(!pushed.is_autonomous());
     assert!((pushed.period() - 2.0 * PI / 1.7).abs() < 1e-15);
-    // The forced oscillation of small size: theta = Re(k e^{i(omega t + phase)}/(1 - w^2 + i g w)).
+    // The small forced oscillation: theta = Re(k e^{i(omega t + phase)}/(1 - w^2 + i g w)).
     let start = [0.0, 0.0];
     let periods = 40.0;
     let end = Flow::new(&pushed).carry(start, 0.0, periods * pushed.period()).state;

@@ -1,4 +1,4 @@
-//! Free decays under viscous damping and Coulomb friction: peaks, their times, where they end.
+//! Free decays under viscous damping and Coulomb friction: peaks, their times, the rest position.
 
 use std::f64::consts::PI;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::truths::{list, number, numbers, truths};
 
-/// Turns and stick of a release at rest, the time in 1/w0.
+/// Turns and stick after a release from rest, with time in 1/w0.
 fn decay(gamma: f64, theta_r: f64, theta: f64) -> Vec<Event> {
     let pendulum = Pendulum::new(gamma, 0.0, 1.0, 0.0, 0.0).expect("in range");
     let pendulum = pendulum.with_friction(theta_r).expect("in range");
@@ -33,7 +33,7 @@ fn a_large_decay_has_the_known_peaks() {
         let (gamma, theta_r) = model(entry);
         let events = decay(gamma, theta_r, number(&entry["theta0"]));
         let (times, thetas) = (numbers(&entry["times"]), numbers(&entry["thetas"]));
-        // The release is no event; the last peak is a stick, and for ever.
+        // The release is no event; the last peak is a permanent stick.
         assert_eq!(events.len(), times.len());
         for ((event, time), theta) in events.iter().zip(&times[1..]).zip(&thetas[1..]) {
             assert!((event.tau / w0 - time).abs() < 1e-10, "{event:?} at {time}");
@@ -48,8 +48,8 @@ fn a_large_decay_has_the_known_peaks() {
 
 #[test]
 fn small_decays_obey_the_exact_law_of_half_cycles() {
-    // The law holds for th in place of sin th. Scaled down by s, angles and friction alike, the
-    // pendulum differs from that by a term in s^2, which two scales eliminate.
+    // The law is exact for th in place of sin th. With angles and friction scaled by s, the
+    // pendulum differs from it by a term in s^2, which two scales eliminate.
     let scales = [1.0 / 1024.0, 1.0 / 2048.0];
     for entry in list(&truths()["free_decay"]["linear"]) {
         let (gamma, theta_r) = model(entry);

@@ -38,7 +38,7 @@ fn sticks_and_slips_under_drive_end_where_they_should() {
     }
 }
 
-/// Starts that cover the plane, and the same after five periods by the reference integrator.
+/// Starts that cover the plane, and their states after five periods by the reference integrator.
 fn references(pendulum: &Pendulum, count: usize) -> (Vec<State>, Vec<State>) {
     let starts = spread(count, PI, 3.0);
     let flow = Flow::new(pendulum);
@@ -206,7 +206,7 @@ fn the_angle_at_which_it_stops_converges_with_the_order_of_the_method() {
 
 #[test]
 fn a_torque_as_great_as_the_friction_leaves_nothing_undecided() {
-    // The edge of being held for ever is then an equality, which rounding must not decide.
+    // The limit of permanent sticking is then an equality, which rounding must not decide.
     let pendulum = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.3)
         .and_then(|p| p.with_friction(0.3))
         .expect("in range");
@@ -225,8 +225,8 @@ fn events(pendulum: &Pendulum, start: State) -> usize {
 
 #[test]
 fn a_velocity_that_only_just_touches_zero_is_not_missed() {
-    // Between a start whose velocity passes zero and one whose velocity does not lies one that
-    // grazes it: on both sides, ever nearer, lanes must do what the reference does.
+    // Between a start whose velocity crosses zero and one whose velocity does not is one that
+    // grazes it: on both sides, at decreasing distances, lanes must agree with the reference.
     let pendulum = rubbing(0.02, 1.0, 2.0, 0.05);
     let flow = Flow::new(&pendulum);
     let strobe = Strobe::new(&pendulum, 60, simd());

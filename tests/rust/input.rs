@@ -1,4 +1,4 @@
-//! Invalid input and its messages: each names the quantity, the allowed values and the value given.
+//! Invalid input and its messages: each names the quantity, the allowed values and the given value.
 
 use std::sync::atomic::AtomicBool;
 
@@ -124,7 +124,7 @@ fn tolerances() {
     assert_eq!(range(-1e-6), "tol must be a number from 1e-13 to 1e-2, got -1e-6");
     assert_eq!(range(1e300), "tol must be a number from 1e-13 to 1e-2, got 1e300");
     assert_eq!(range(f64::NAN), "tol must be a number from 1e-13 to 1e-2, got NaN");
-    // Chaos makes more of rounding errors than 1e-13 within five periods.
+    // Chaos amplifies rounding errors beyond 1e-13 within five periods.
     let error = choose(&driven(0.0, 3.0, 0.4), &starts, 1e-13, simd()).expect_err("refused");
     let Error::Tolerance { tol, reached } = error else { panic!("{error}") };
     assert!(tol < 2e-13 && reached > tol && reached < 1e-6, "{reached:e}");
@@ -162,7 +162,7 @@ fn maps() {
     assert_eq!(Error::Interrupted.to_string(), "interrupted");
     let error = Error::Threads("no more".to_owned());
     assert_eq!(error.to_string(), "threads: no more");
-    // They are errors as the standard library has them.
+    // They implement the standard library's error trait.
     let boxed: Box<dyn std::error::Error> = Box::new(error);
     assert!(boxed.source().is_none());
 }

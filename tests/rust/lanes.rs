@@ -1,4 +1,4 @@
-//! Many trajectories side by side against one at a time, and instruction sets against one another.
+//! Trajectories in lanes against single ones, and instruction sets against one another.
 
 use std::f64::consts::PI;
 
@@ -47,7 +47,7 @@ fn lanes_equal_single_trajectories_bit_for_bit() {
     for simd in instruction_sets() {
         let width = dispatch::run(simd, Width);
         for pendulum in cases() {
-            // One step length on each side of the change between the sines.
+            // One step length on each side of the switch between the sines.
             for steps in [12, 60] {
                 let strobe = Strobe::new(&pendulum, steps, simd);
                 for count in [1, width - 1, width, width + 1, 2 * width + width / 2 + 1] {
@@ -63,7 +63,7 @@ fn lanes_equal_single_trajectories_bit_for_bit() {
 
 #[test]
 fn a_lane_does_not_see_its_neighbours() {
-    // A trajectory does not depend on its place in a bundle, beside failures either.
+    // A trajectory does not depend on its place in a bundle, even with failures in other lanes.
     for simd in instruction_sets() {
         let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 20, simd);
         let alone = advanced(&strobe, &[[1.0, 0.5]], 4)[0];

@@ -1,21 +1,23 @@
-//! The crate against what is known without it: exact solutions, symmetries, conserved quantities,
-//! and the reference values of `tests/truths.json`.
+//! The crate against independent knowledge: exact solutions, symmetries, conserved quantities, and
+//! the reference values of `tests/truths.json`.
 //!
 //! - [`exact`], [`convergence_order`]: solutions in closed form, energy, order of convergence
-//! - [`stick_slip`], [`free_decay`], [`edge_cases`]: friction, event by event, and where rounding could decide
+//! - [`stick_slip`], [`free_decay`], [`edge_cases`]: friction, event by event, and cases sensitive
+//!   to rounding
 //! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
-//! - [`effects`]: the library, each effect in every respect
-//! - [`formulas`]: effects that users write; [`effects_as_formulas`]: the library's as such
+//! - [`effects`]: the library, every property of each effect
+//! - [`formulas`]: user-defined effects; [`effects_as_formulas`]: the library's as formulas
 //! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_quantised`]: parameters from records; [`replay`]: ensembles
-//! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against one trajectory at a time
-//! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, closed orbits, where
-//!   they change
-//! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: where motions end
+//! - [`sine`], [`elementary`], [`lanes`]: the lane arithmetic, alone and against single
+//!   trajectories
+//! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, periodic orbits,
+//!   their bifurcations
+//! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: attractors
 //! - [`maps`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
-//! - [`exponents`]: how fast neighbouring motions part, through friction too
-//! - [`tongues`]: where rest is stable
-//! - [`properties`]: what holds for every pendulum
-//! - [`input`]: what is refused, and in which words
+//! - [`exponents`]: rates of divergence of neighbouring motions, also through friction
+//! - [`tongues`]: regions of stability of rest
+//! - [`properties`]: properties of every pendulum
+//! - [`input`]: refused input and its messages
 
 mod attractors;
 mod bifurcations;

@@ -1,4 +1,4 @@
-//! Whole planes: what must not change a map, and how its parts hang together.
+//! Whole planes: invariances of a map, and consistency of its parts.
 
 use std::sync::atomic::AtomicBool;
 
@@ -107,7 +107,7 @@ fn settling_times_and_turns_are_those_of_the_trajectory() {
         let attractor = &catalogue.attractors[labels.label[i] as usize - 1];
         let off = attractor.points.iter().map(|p| distance(*p, end)).fold(9.0, f64::min);
         assert!(off < 1.0, "start {i} has come to within {off} of {}", attractor.name);
-        // From there it goes to the attractor of its label.
+        // From there it converges to the attractor of its label.
         let map = PoincareMap::new(&pendulum);
         let settled = map.iterate(end, 200).state;
         assert!(attractor.points.iter().any(|p| distance(*p, settled) < 1e-8), "start {i}");
@@ -173,7 +173,7 @@ fn a_short_bound_leaves_starts_undecided() {
             let options = Options { max_periods: Some(bound), ..unchecked() };
             let map = basins(&driven(0.1, p, 2.0), &plane(40), &options, &Control::default());
             let map = map.expect("a map");
-            // Undecided is not chaotic: both planes have transients much longer than that.
+            // Undecided is not chaotic: both planes have transients much longer than the bound.
             for attractor in &map.attractors {
                 let name = &attractor.name;
                 assert!(!attractor.kind.is_chaotic(), "p = {p} within {bound} periods: {name}");

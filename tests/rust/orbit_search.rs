@@ -1,4 +1,4 @@
-//! All closed orbits of a box, stable and not, against the known ones.
+//! All periodic orbits of a box, stable and unstable, against known ones.
 
 use std::f64::consts::{PI, TAU};
 
@@ -47,7 +47,7 @@ fn every_known_attractor_is_among_them() {
 
 #[test]
 fn a_rotation_has_its_saddle_and_no_orbit_stands_twice() {
-    // Born in one fold, the two are all rotations of period 1 in one sense.
+    // Created at one fold, the two are all rotations of period 1 in one sense.
     let pendulum = driven(0.1, 1.0, 2.0);
     let found = all(&pendulum, 1, 1).closed;
     assert_eq!(found.len(), 2);
@@ -75,8 +75,8 @@ fn a_finer_grid_finds_no_more() {
 
 #[test]
 fn fixed_points_add_up() {
-    // On the cylinder the Lefschetz number of a map that every motion enters is 0: as many fixed
-    // points of index +1 as of index -1, all windings together.
+    // On the cylinder the Lefschetz number of a dissipative map is 0: as many fixed points of index
+    // +1 as of index -1, over all windings.
     for (gamma, p, omega) in [(0.1, 1.0, 2.0), (0.1, 1.7, 0.87), (0.2, 0.3, 1.4), (0.1, 2.0, 2.0)] {
         let pendulum = driven(gamma, p, omega);
         let mut sum = 0;
@@ -108,7 +108,7 @@ fn exponents_with_friction_are_the_reference_ones() {
             let at = [value("theta"), value("v")];
             let own = found.iter().find(|o| o.contains(at, 1e-8));
             assert!(own.is_some_and(PeriodicOrbit::is_stable), "{key}: {at:?} of {}", found.len());
-            // States that friction holds form a set, not an orbit.
+            // States held by friction form a set, not an orbit.
             let held = |o: &PeriodicOrbit| o.points.iter().all(|p| p[1] == 0.0);
             assert!(!found.iter().any(held));
         }
@@ -141,7 +141,7 @@ fn a_box_limits_where_they_are_looked_for() {
     let found = orbits(&pendulum, &small, &Control::default()).expect("a search").closed;
     assert_eq!(found.len(), 1);
     assert!(found[0].contains(only, 1e-10));
-    // A turn further on it is the same box.
+    // Shifted by a turn it is the same box.
     small.theta = Axis::new("theta", only[0] - 0.2 + TAU, only[0] + 0.2 + TAU, 20).expect("it");
     let again = orbits(&pendulum, &small, &Control::default()).expect("a search").closed;
     assert!(again.len() == 1 && distance(again[0].points[0], only) < 1e-9);
@@ -176,10 +176,10 @@ fn newton_alone_finds_no_orbit_that_the_search_has_not() {
     assert!(met > 20 && !known.is_empty());
 }
 
-/// How near to where orbits change they are looked at, in p.
+/// Distance in p from a bifurcation at which orbits are examined.
 const BESIDE: f64 = 1e-6;
 
-/// All orbits right before and right after the value `p`.
+/// All orbits just before and just after the value `p`.
 fn about(p: f64, omega: f64, n: usize, w: i64) -> [Vec<PeriodicOrbit>; 2] {
     [p - BESIDE, p + BESIDE].map(|p| all(&driven(0.1, p, omega), n, w).closed)
 }
@@ -226,7 +226,7 @@ fn the_subcritical_oscillation_has_a_fold_and_rest_an_onset() {
             rest.multipliers.0[0].re
         });
         assert!(-1.0 < rests[0] && rests[0] < -0.9 && rests[1] < -1.0, "{key}: {rests:?}");
-        // The small oscillation is there on one side alone: after the onset, or before.
+        // The small oscillation exists on one side alone: after the onset, or before.
         let small = about(p, omega, 2, 0).map(|orbits| near(&orbits, [0.0; 2]).len());
         let super_critical = entry["criticality"] == "supercritical";
         assert_eq!(small, if super_critical { [0, 1] } else { [1, 0] }, "{key}");
@@ -258,7 +258,7 @@ fn doublings_leave_an_orbit_of_twice_the_period() {
         let own = |orbits: &[PeriodicOrbit]| near(orbits, point(entry))[0].multipliers.0[0].re;
         let (stable, lost) = (own(&before), own(&after));
         assert!(-1.0 < stable && stable < -0.99 && lost < -1.0, "{name}: {stable}, {lost}");
-        // Of long periods there are many orbits elsewhere: only those here are asked for.
+        // There are many orbits of long periods elsewhere: only those here are requested.
         let [theta, velocity] = point(entry);
         let mut here = request(2 * n, 2 * w, 40);
         here.theta = Axis::new("theta", theta - 0.03, theta + 0.03, 40).expect("an axis");

@@ -1,4 +1,4 @@
-//! Periodic orbits by Newton's method, against the known ones.
+//! Periodic orbits by Newton's method, against known ones.
 
 use std::f64::consts::{PI, TAU};
 
@@ -27,7 +27,7 @@ fn every_known_attractor_is_found() {
             assert_eq!((orbit.n, orbit.w), (known.n, known.w));
             assert!(orbit.is_stable());
             assert!(orbit.residual < RESIDUAL, "{:e}", orbit.residual);
-            // The points come in the order of the motion, from the lowest angle on.
+            // The points are in the order of the motion, from the lowest angle on.
             let lowest = known.points.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
             assert!((orbit.points[0][0] - lowest).abs() < 1e-9);
             let offset =
@@ -48,7 +48,7 @@ fn multipliers_of_the_known_attractors() {
         let miss = |re: f64, im: f64, k: usize| {
             (re - known.multipliers[k][0]).hypot(im - known.multipliers[k][1])
         };
-        // A conjugate pair has no order.
+        // A conjugate pair is unordered.
         let error = (miss(a.re, a.im, 0).max(miss(b.re, b.im, 1)))
             .min(miss(a.re, a.im, 1).max(miss(b.re, b.im, 0)));
         assert!(
@@ -82,7 +82,7 @@ fn a_start_of_several_periods_is_reduced_to_the_true_one() {
 
 #[test]
 fn a_rotation_about_to_double_is_of_period_one() {
-    // Its multiplier of -0.964 looks like period 2 for hundreds of periods.
+    // Its multiplier of -0.964 resembles period 2 for hundreds of periods.
     for known in attractors_at(1.34).iter().filter(|k| k.n == 1) {
         let map = PoincareMap::new(&known.pendulum);
         let after = map.iterate(beside(known.points[0], 0.02), 40).state;
@@ -108,7 +108,7 @@ fn unstable_orbits_are_found_and_called_so() {
 
 #[test]
 fn nothing_is_made_up() {
-    // Whatever the start, what comes back closes and lies within reach.
+    // From any start, a converged orbit closes and lies within reach.
     let map = PoincareMap::new(&driven(0.1, 1.0, 2.0));
     let (mut found, mut refused) = (0, 0);
     for start in spread(150, PI, 3.0) {
@@ -139,7 +139,7 @@ fn an_orbit_is_the_same_a_turn_further_on() {
             assert!(orbit.points.iter().all(|p| p[0].abs() <= PI), "{:?}", orbit.points);
         }
     }
-    // At the top an angle may be on either side of pi by a rounding error: that is no turn.
+    // At the top an angle may be on either side of pi by a rounding error, which is no turn.
     for (p, omega) in [(0.5, 2.0), (1.0, 2.0), (30.0, 14.0)] {
         let map = PoincareMap::new(&driven(0.5, p, omega));
         for theta in [3.1, 3.15, -3.1, -3.15] {

@@ -11,7 +11,7 @@ use pendmap::model::Pendulum;
 use crate::support::{driven, plane};
 use crate::truths::{attractors_at, fractions_at, number, table, truths};
 
-/// Places in the list of parameters.
+/// Indices in the list of parameters.
 const P: usize = 3;
 const OMEGA: usize = 4;
 
@@ -51,7 +51,7 @@ fn diagram(base: &Pendulum, p: Vec<f64>) -> Diagram {
     bifurcation(base, &request, &Control::default()).expect("a diagram")
 }
 
-/// Period and winding of all that closes.
+/// Period and winding of all periodic attractors.
 fn closed(cell: &Cell) -> Vec<(usize, i64)> {
     let key = |a: &pendmap::attractor::Attractor| Some((a.n?, a.w?));
     let mut found: Vec<_> = cell.found.iter().filter_map(|f| key(&f.attractor)).collect();
@@ -143,7 +143,7 @@ fn the_points_of_figure_2_are_tumbling_chaos_and_nothing_else() {
 
 #[test]
 fn transients_however_long_are_no_chaos() {
-    // On the saddle the exponent is 0.15 and more; chaos of a cascade's end has less.
+    // On the saddle the exponent is at least 0.15; chaos at the end of a cascade has less.
     let transient = |cell: &Cell| {
         cell.found.iter().any(|f| f.attractor.kind.is_chaotic() && f.attractor.exponent > 0.1)
     };
@@ -174,7 +174,8 @@ fn bifurcations_of_the_diagram_are_at_their_places() {
         diagram.map.cells.iter().map(own).collect()
     };
     let base = driven(0.1, 1.0, 2.0);
-    // No start finds the rotation near its fold: it is followed there from where it is easily found.
+    // No start finds the rotation near its fold: it is continued there from a parameter at which it
+    // is found.
     let ahead = evenly(entry("rot_SN") - 10.5 * step, entry("rot_SN") + 189.5 * step, 201);
     let fold = count(&diagram(&base, ahead), (1, 1));
     assert_eq!(fold, [vec![0; 11], vec![1; 190]].concat());

@@ -13,7 +13,7 @@ use proptest::test_runner::RngSeed;
 
 use crate::support::{advanced, along, bits, instruction_sets};
 
-/// Pendulums in the range that maps are made of; rarely a corner of it.
+/// Pendulums in the usual range of maps; rarely at a corner of it.
 fn pendulums() -> impl Strategy<Value = Pendulum> {
     let gamma = prop_oneof![1 => Just(0.0), 6 => 0.0..1.5];
     let p = prop_oneof![1 => Just(0.0), 6 => -2.0..2.0];
@@ -67,13 +67,14 @@ proptest! {
 
     #[test]
     fn time_runs_backwards_without_damping(pendulum in pendulums(), state in states()) {
-        // At phase 0 the drive is even in time: reverse the velocity, and the way leads back.
+        // At phase 0 the drive is even in time: reversing the velocity retraces the motion.
         let drive = HarmonicDrive { phase: 0.0, ..pendulum.drive };
         let pendulum = Pendulum { gamma: 0.0, drive, ..pendulum };
         let map = PoincareMap::new(&pendulum);
         let image = map.once(state);
         let back = map.once([image.state[0], -image.state[1]]).state;
-        // Rounding is stretched on the way, and may have shrunk again in the derivative of the whole.
+        // Rounding errors are stretched on the way, and may have shrunk again in the total
+        // derivative.
         let stretched = 1e-11 * (1.0 + image.derivative.norm().powi(2));
         prop_assert!(distance(back, [state[0], -state[1]]) < stretched);
     }

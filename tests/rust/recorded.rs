@@ -90,7 +90,7 @@ fn distance(a: State, b: State) -> f64 {
 
 #[test]
 fn a_pivot_pushed_to_one_side_leaves_the_pendulum_behind() {
-    // In the frame of a pivot that accelerates by l toward positive theta gravity points to -atan l.
+    // In the frame of a pivot with acceleration l toward positive theta gravity points to -atan l.
     let times = times(0.0, 200.0, 400);
     let side = values(&times, |t| 0.5 * 0.4 * t * t);
     let samples = Samples { quantity: Quantity::Position, values: &side };
@@ -103,7 +103,7 @@ fn a_pivot_pushed_to_one_side_leaves_the_pendulum_behind() {
 
 #[test]
 fn a_recorded_push_frees_a_stuck_pendulum_when_it_is_strong_enough() {
-    // Sideways acceleration 0.01 t overcomes a friction of 0.3 at th = 0 at t = 30.
+    // The sideways acceleration 0.01 t exceeds a friction of 0.3 at th = 0 at t = 30.
     let times = times(0.0, 60.0, 300);
     let side = values(&times, |t| 0.01 * t);
     let samples = Samples { quantity: Quantity::Acceleration, values: &side };

@@ -1,4 +1,5 @@
-//! Ensembles of a record's pendulum: each member is a trajectory by itself, whatever the threads.
+//! Ensembles of a record's pendulum: each member is an independent trajectory, on any number of
+//! threads.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -62,7 +63,7 @@ fn a_recorded_pivot_drives_like_the_drive_that_it_is() {
 
 #[test]
 fn replay_begins_at_its_first_time_and_refuses_falling_times() {
-    // Half a period of the drive later the drive has turned round: only the phase tells.
+    // Half a period later the drive has the opposite sign: only the phase determines it.
     let one = record(driven(0.1, 1.0, 2.0), None, [1.0, 0.0], 9.0);
     let never = AtomicBool::new(false);
     let ran = |times: &[f64]| replay(&one, &[[1.0, 0.0]], times, 1e-12, &never, &|| ());

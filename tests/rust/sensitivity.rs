@@ -113,7 +113,7 @@ fn derivatives_hold_for_effects() {
 
 #[test]
 fn a_friction_of_zero_has_a_derivative() {
-    // From the side on which it exists; the sense of the motion must be known all along.
+    // From the side on which it exists; the sense of motion must be known throughout.
     let pendulum = driven(0.1, 0.6, 2.0);
     let (start, times) = ([1.0, 0.3], every(0.5, 12.0));
     let run = sensitivities(&pendulum, None, start, 0.0, &times, TOLERANCE);
@@ -134,7 +134,7 @@ fn a_friction_of_zero_has_a_derivative() {
 
 #[test]
 fn passes_agree_bit_for_bit() {
-    // Seventeen names take two passes and more: all have the values of the plain trajectory.
+    // Seventeen names take several passes: all have the values of the plain trajectory.
     let harmonics: [(Kind, &[f64]); 3] =
         [(); 3].map(|()| (Kind::BearingHarmonic, &[0.05, 3.0, 0.4][..]));
     let pendulum = with_effects(driven(0.1, 1.5, 0.87).with_friction(0.1).expect("ok"), &harmonics);

@@ -41,7 +41,7 @@ impl Function for Turns {
     }
 }
 
-/// Half turns all over [-limit, limit], and the neighbours of every quarter turn in it.
+/// Half turns over all of [-limit, limit], and the neighbours of every quarter turn in it.
 fn half_turns(limit: i32) -> Vec<f64> {
     let count = 100_000;
     let mut all: Vec<f64> = (0..=count)
@@ -58,8 +58,8 @@ fn half_turns(limit: i32) -> Vec<f64> {
     all
 }
 
-/// `sin(pi x)` by the C library: the reduction is exact, and what the product with pi rounds off is
-/// put back.
+/// `sin(pi x)` by the C library: the reduction is exact, and the rounding error of the product with
+/// pi is compensated.
 fn exact_sine(x: f64) -> f64 {
     let k = x.round();
     let r = x - k;
@@ -70,13 +70,13 @@ fn exact_sine(x: f64) -> f64 {
 }
 
 fn exact_cosine(x: f64) -> f64 {
-    // An eighth of a turn from where the cosine is flat, its own series is the better one.
+    // An eighth of a turn from the maximum of the cosine, the cosine series is more accurate.
     let (k, r) = (x.round(), x - x.round());
     let cosine = if r.abs() < 0.25 { (r * PI).cos() } else { exact_sine(0.5 - r.abs()) };
     if k.rem_euclid(2.0) == 0.0 { cosine } else { -cosine }
 }
 
-/// Largest difference, with the angle where it is.
+/// Largest difference, and its angle.
 fn worst(angles: &[f64], values: &[f64], exact: fn(f64) -> f64) -> (f64, f64) {
     angles
         .iter()
@@ -110,7 +110,7 @@ fn fine_sine_and_cosine_are_good_to_rounding() {
 #[test]
 fn coarse_sine_and_cosine_keep_their_bound() {
     check_accuracy::<Coarse>("coarse", 4e-16);
-    // The bound is the polynomial's own and not a generous one.
+    // The bound is that of the polynomial, without a margin.
     let angles = half_turns(1);
     let found =
         worst(&angles, &each::<Sine<Coarse>>(InstructionSet::Portable, &angles), exact_sine);
@@ -119,7 +119,7 @@ fn coarse_sine_and_cosine_keep_their_bound() {
 
 #[test]
 fn far_angles_are_as_good_as_near_ones() {
-    // A pendulum that has gone round a hundred thousand times.
+    // A pendulum after a hundred thousand rotations.
     let angles: Vec<f64> = (0..50_000).map(|i| 2e5 + f64::from(i) * 0.123_456_7).collect();
     for simd in instruction_sets() {
         let found = worst(&angles, &each::<Sine<Fine>>(simd, &angles), exact_sine);
@@ -147,8 +147,8 @@ fn the_equilibria_are_exact() {
     }
 }
 
-/// Whether two numbers are each other's opposite to the last bit. A zero is made by a difference
-/// and may have either sign.
+/// Whether two numbers are opposite to the last bit. A zero results from a difference and may have
+/// either sign.
 fn opposite(a: f64, b: f64) -> bool {
     (-a).to_bits() == b.to_bits() || (a == 0.0 && b == 0.0)
 }

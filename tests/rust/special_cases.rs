@@ -1,4 +1,4 @@
-//! Special cases: inverted rest, no damping, no drive, drive beside a running state.
+//! Special cases: inverted rest, no damping, no drive, drive with a running state.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
@@ -36,7 +36,7 @@ fn without_damping_there_are_no_attractors() {
     let layers = map.layers.expect("layers");
     assert_eq!(layers.turns.len(), 900);
     assert_eq!(map.labels.turns, layers.turns);
-    // Islands of regular motion beside a chaotic sea.
+    // Islands of regular motion in a chaotic sea.
     let growing = layers.exponent.iter().filter(|e| **e > 0.1).count();
     let quiet = layers.exponent.iter().filter(|e| **e < 0.08).count();
     assert!(growing > 20 && quiet > 100, "{growing} grow, {quiet} do not");
@@ -68,7 +68,7 @@ fn torque_without_drive_rests_or_runs() {
     assert!((running.multipliers[0].re - (-0.1 * period).exp()).abs() < 1e-12);
     assert!(running.exponent == 0.0, "along the motion nothing grows or shrinks");
 
-    // One turn later it is where it was, and the torque's work is what damping took.
+    // One turn later its state is the same, and the torque's work equals the damping loss.
     let start = running.points[0];
     let request = Request { start, until: period, tol: 1e-13, samples: 400, lyapunov: false };
     let run = simulate(&pendulum, &request, &AtomicBool::new(false)).expect("one turn");
@@ -99,7 +99,7 @@ fn the_shares_of_rest_and_running_are_the_published_ones() {
 #[test]
 fn running_states_exist_where_the_torque_keeps_them_up() {
     let running = |gamma: f64, torque: f64| running_states(&undriven(gamma, torque));
-    // The other sense runs the other way, exactly.
+    // The mirror image runs the other way, exactly.
     let (forward, backward) = (running(0.1, 0.5), running(0.1, -0.5));
     assert_eq!((forward.len(), backward.len()), (1, 1));
     assert_eq!((forward[0].sense, backward[0].sense), (1, -1));
@@ -126,11 +126,11 @@ fn a_weak_drive_makes_the_running_state_quasiperiodic() {
     assert_eq!(running.kind, Kind::QuasiperiodicRotation);
     assert_eq!((running.n, running.w, running.sense), (None, None, 1));
     assert!(running.multipliers.is_empty() && running.exponent == 0.0);
-    // Close to the running state without drive: its share, too.
+    // Close to the running state without drive, and so is its share.
     let still = basins_on_plane(&undriven(0.1, 0.5), 40);
     assert!((map.fractions[1] - still.fractions[1]).abs() < 0.03, "{:?}", map.fractions);
     assert!(map.share(0) == 0.0 && map.share(-1) == 0.0);
-    // Mirror the torque, and everything is mirrored.
+    // A mirrored torque mirrors all results.
     let opposite = Pendulum::new(0.1, 0.1, 2.0, 0.0, -0.5).expect("in range");
     let mirrored = basins_on_plane(&opposite, 40);
     assert_eq!(names(&mirrored), ["oscillation 1:0 (-)", "quasiperiodic rotation -"]);
@@ -139,13 +139,13 @@ fn a_weak_drive_makes_the_running_state_quasiperiodic() {
 
 #[test]
 fn a_start_on_an_orbit_that_does_not_attract_is_no_chaos() {
-    // Hanging rest does not attract here, yet a start exactly on it stays for want of a perturbation.
+    // Hanging rest does not attract here, yet a start exactly on it remains without a perturbation.
     let pendulum = driven(0.1, 1.0, 2.0);
     let alone = Starts::List(vec![[0.0, 0.0]]);
     let map = basins(&pendulum, &alone, &Options::default(), &Control::default()).expect("a map");
     assert!(map.attractors.is_empty(), "{:?}", names(&map));
     assert_eq!(map.labels.label, [0]);
-    // On a plane it is the one start that stays undecided.
+    // On a plane it is the only start that remains undecided.
     let map = basins_on_plane(&pendulum, 5);
     assert!(!map.attractors.iter().any(|a| a.kind.is_chaotic()), "{:?}", names(&map));
     let undecided = map.labels.label.iter().filter(|l| **l == 0).count();

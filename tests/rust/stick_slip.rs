@@ -1,4 +1,4 @@
-//! Friction with stick and slip, in one trajectory.
+//! Friction with stick and slip, in single trajectories.
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! Helpers of several modules: instruction sets, pendulums, starts that cover a plane, whole maps.
+//! Shared helpers: instruction sets, pendulums, starts that cover a plane, whole maps.
 
 use std::f64::consts::PI;
 use std::marker::PhantomData;
@@ -16,12 +16,12 @@ use pendmap::maps::label::{Labels, label};
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
 
-/// The instruction sets that this processor has, quickest first.
+/// The instruction sets of this processor, fastest first.
 pub fn instruction_sets() -> Vec<InstructionSet> {
     InstructionSet::ALL.into_iter().filter(|simd| simd.available()).collect()
 }
 
-/// The instruction set of a map: the quickest, or the one that `PENDMAP_SIMD` names.
+/// The instruction set of a map: the fastest, or the one named by `PENDMAP_SIMD`.
 pub fn simd() -> InstructionSet {
     InstructionSet::choose().expect("PENDMAP_SIMD names a simd of this processor")
 }
@@ -36,7 +36,7 @@ pub fn undriven(gamma: f64, torque: f64) -> Pendulum {
     Pendulum::new(gamma, 0.0, 1.0, 0.0, torque).expect("in range")
 }
 
-/// The map of `pendulum` with the fine sine whatever the step.
+/// The map of `pendulum` with the fine sine at any step.
 pub fn fine_strobe(pendulum: &Pendulum, steps: usize, simd: InstructionSet) -> Strobe {
     Strobe { fine: true, ..Strobe::new(pendulum, steps, simd) }
 }
@@ -91,7 +91,7 @@ pub fn labelled(
     (strobe, catalogue, labels)
 }
 
-/// Chaos beside other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
+/// Chaos coexisting with other attractors, on `plane(24)`: p = 1.52, omega = 1.1.
 pub fn chaos_among_others() -> &'static (Strobe, Catalogue, Labels) {
     static FOUND: OnceLock<(Strobe, Catalogue, Labels)> = OnceLock::new();
     FOUND.get_or_init(|| labelled(&driven(0.1, 1.52, 1.1), &plane(24), simd()))
@@ -117,7 +117,7 @@ pub fn cell_names(map: &BasinMap) -> Vec<&str> {
     map.labels.label.iter().map(name).collect()
 }
 
-/// Labels that agree in everything, bit for bit.
+/// Assert that labels are equal in every field, bit for bit.
 pub fn assert_same(a: &Labels, b: &Labels, what: &str) {
     assert_eq!(a.label, b.label, "labels: {what}");
     assert_eq!(a.settle, b.settle, "settling times: {what}");
@@ -129,7 +129,7 @@ pub fn assert_same(a: &Labels, b: &Labels, what: &str) {
     assert_eq!(a.work, b.work, "work: {what}");
 }
 
-/// States as the two arrays that the kernel takes.
+/// States as the two arrays of the kernel's arguments.
 pub fn columns(states: &[State]) -> (Vec<f64>, Vec<f64>) {
     states.iter().map(|s| (s[0], s[1])).unzip()
 }
@@ -142,14 +142,14 @@ pub fn advanced(strobe: &Strobe, states: &[State], periods: usize) -> Vec<State>
     theta.into_iter().zip(velocity).map(|(a, b)| [a, b]).collect()
 }
 
-/// One trajectory through a schedule; the angle comes back as it is, without wrapping.
+/// One trajectory through a schedule; the angle is not wrapped.
 pub fn along(schedule: &Schedule, [theta, velocity]: State) -> State {
     let mut moving = Moving::new(schedule, theta, velocity);
     moving.run::<Fine>(schedule);
     [moving.theta(), moving.velocity(schedule)]
 }
 
-/// The bits of numbers, to compare them without tolerance.
+/// The bits of numbers, for comparison without tolerance.
 pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
@@ -181,7 +181,7 @@ impl<F: Function> Job for Each<'_, F> {
     }
 }
 
-/// `F` of many numbers on `simd`; lanes and single numbers must agree bit for bit.
+/// `F` of many numbers on `simd`; asserts that lanes and single numbers agree bit for bit.
 pub fn each<F: Function>(simd: InstructionSet, numbers: &[f64]) -> Vec<f64> {
     let [lanes, singles] = dispatch::run(simd, Each::<F>(numbers, PhantomData));
     assert!(bits(&lanes) == bits(&singles), "lanes and single numbers differ on {simd}");

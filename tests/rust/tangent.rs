@@ -35,7 +35,7 @@ fn the_variational_equations_give_the_derivative() {
                 let image = map.iterate(state, n);
                 let scale = image.derivative.norm();
                 for (column, direction) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-                    // Richardson's combination of two steps leaves errors of the fourth order.
+                    // Richardson extrapolation from two steps leaves errors of the fourth order.
                     let h = 1e-4 / scale.max(1.0);
                     let [coarse, fine] =
                         [h, 0.5 * h].map(|h| difference(&map, state, direction, n, h));
@@ -98,7 +98,7 @@ fn stretch_is_the_growth_of_a_tangent() {
             let mut turns = vec![0.0; count];
             let mut tangents = (vec![part; count], vec![part; count]);
             let mut growth = vec![0.0; count];
-            // Two calls: growth adds up, tangents go on.
+            // In two calls: growth is added, tangents continue.
             for periods in [1, 3] {
                 strobe
                     .stretch(

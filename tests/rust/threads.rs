@@ -1,4 +1,4 @@
-//! Threads, progress and cancellation: what must not show, and what must show at once.
+//! Threads, progress and cancellation: equality of results, and immediate response.
 
 use std::time::{Duration, Instant};
 
@@ -87,7 +87,7 @@ fn a_cancelled_map_stops() {
 
 #[test]
 fn cancelling_works_while_a_map_is_made() {
-    // Seconds of work each: the search, what it watches, labels, layers.
+    // Stages of seconds each: the search, the watched starts, labels, layers.
     for (p, omega, size, milliseconds) in [
         (1.8, 2.0, 2000, 100),
         (1.8, 2.0, 2000, 400),

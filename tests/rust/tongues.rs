@@ -1,4 +1,4 @@
-//! Critical amplitudes of rest, against the known ones.
+//! Critical amplitudes of rest, against known ones.
 
 use pendmap::error::Error;
 use pendmap::maps::control::Control;

@@ -1,4 +1,4 @@
-//! Traps: whatever starts inside one ends on its attractor.
+//! Trapping regions: every start inside one ends on its attractor.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -14,7 +14,7 @@ use pendmap::model::Pendulum;
 
 use crate::support::{advanced, driven, fine_strobe, plane, searched, simd, undriven};
 
-/// States inside an ellipse: spread over its area, and close to its edge all round.
+/// States inside an ellipse: spread over its area, and close to its whole boundary.
 fn inside(ellipse: &Ellipse) -> Vec<State> {
     let [a, b, c] = ellipse.shape;
     let at = |radius: f64, angle: f64| {
@@ -78,7 +78,7 @@ fn within_four_returns_the_height_has_fallen() {
                 states
                     .iter()
                     .map(|s| {
-                        // The ellipse may stand one turn beside the wrapped angle.
+                        // The ellipse may be one turn from the wrapped angle.
                         [-TAU, 0.0, TAU]
                             .into_iter()
                             .map(|turn| ellipse.height([s[0] + turn, s[1]]))
@@ -113,7 +113,7 @@ fn ellipses_are_centred_on_the_points_of_their_attractors() {
                 assert!(own.iter().all(|e| distance(e.centre, *point) < 1e-9));
             }
         }
-        // A useful trap is not tiny: the aim is to stop long before convergence.
+        // A useful trap is large: it stops an integration long before convergence.
         let widest = catalogue.traps.ellipses.iter().map(|e| 1.0 / e.shape[0]).fold(0.0, f64::max);
         assert!(widest > 0.005, "{pendulum:?}: {widest}");
     }
@@ -121,7 +121,7 @@ fn ellipses_are_centred_on_the_points_of_their_attractors() {
 
 #[test]
 fn capture_agrees_with_waiting() {
-    // Labels by traps against where trajectories are after 3000 periods, at a smooth point.
+    // Labels by traps against the states of trajectories after 3000 periods, at a smooth point.
     let pendulum = driven(0.1, 0.6, 2.0);
     let (strobe, catalogue) = searched(&pendulum, &plane(100), simd());
     let starts: Vec<State> = (0..1600).map(|i| plane(40).get(i)).collect();
@@ -164,7 +164,7 @@ fn a_band_holds_the_running_state() {
         assert!(states.iter().all(|s| band.contains(*s)));
         let fine = fine_strobe(&pendulum, 3 * strobe.steps(), simd());
         for (start, end) in states.iter().zip(advanced(&fine, &states, 60)) {
-            // Interpolation of the tabulated curve limits how close one can see it come.
+            // Interpolation of the tabulated curve limits the resolved distance.
             let off = (end[1] - band.at(end[0])).abs();
             assert!(off < 5e-3, "{pendulum:?}: {start:?} to {end:?}, {off:e} off");
         }

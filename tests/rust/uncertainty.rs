@@ -1,4 +1,4 @@
-//! How many starts are uncertain, in planes whose boundary is known.
+//! Shares of uncertain starts, in planes with a known boundary.
 
 use std::f64::consts::PI;
 
@@ -31,7 +31,7 @@ fn measured(side: usize, seed: u64, of: impl Fn(f64, f64) -> i16) -> Uncertainty
     .expect("labels")
 }
 
-/// How far each count is from what a share says, in standard deviations.
+/// Difference of each count from the expected share, in standard deviations.
 fn deviations(found: &Uncertainty, share: impl Fn(f64) -> f64) -> Vec<f64> {
     let all = found.eps.iter().zip(&found.uncertain).zip(&found.tried);
     all.map(|((eps, uncertain), tried)| {
@@ -70,7 +70,7 @@ fn exponent(found: &Uncertainty) -> f64 {
     mean(&|p| (p[1] - x) * (p[2] - y)) / mean(&|p| (p[1] - x).powi(2))
 }
 
-/// The level of the gap of Cantor's set of thirds that `x` lies in, even or odd.
+/// The level of the gap of the middle-thirds Cantor set that contains `x`, even or odd.
 fn thirds(mut x: f64) -> i16 {
     for level in 0..40 {
         x *= 3.0;
@@ -92,7 +92,7 @@ fn exponents_that_are_known_are_found_on_maps_of_any_size() {
         (1.0 - 2_f64.ln() / 3_f64.ln(), |x, y| thirds((x + 0.013 * y).fract())),
     ];
     for (known, of) in planes {
-        // Maps of few cells have few labels to spend: the widths are three standard errors.
+        // Maps of few cells have few labels: the widths are three standard errors.
         for (side, seed, width) in [(100, 1, 0.12), (400, 2, 0.06), (1000, 3, 0.04)] {
             let found = measured(side, seed, of);
             let value = exponent(&found);
@@ -115,7 +115,7 @@ fn random_labels_are_uncertain_at_any_distance() {
 
 #[test]
 fn starts_with_unknown_ends_are_left_out() {
-    // Half of the plane is unknown: beside the line in the other half all is as before.
+    // Half of the plane is unknown: at the line in the other half results are unchanged.
     let half = |x: f64, y: f64| if y < 0.5 { 0 } else { 1 + i16::from(x > 0.4) };
     let found = measured(1000, 1, half);
     for (k, deviation) in deviations(&found, |eps| 4.0 * eps / PI).into_iter().enumerate() {

@@ -22,7 +22,7 @@ const WITH_EVENTS: usize = 6144;
 /// where there is no corner.
 pub(super) type Scratch = [[f64; MAX_WIDTH]; 11];
 
-/// A lane that is held fast.
+/// A lane held by friction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held {
     pub lane: usize,
@@ -38,14 +38,14 @@ pub struct Block {
     pub half_turns: Vec<f64>,
     /// Velocities times the schedule's `kick`.
     pub kick: Vec<f64>,
-    /// Whole turns taken off.
+    /// Whole turns removed.
     pub turns: Vec<f64>,
     /// Angles over pi at which friction has held a trajectory during the last period; NaN where it
     /// has not.
     pub held_at: Vec<f64>,
     pub(super) held: Vec<Held>,
     pub(super) queue: Vec<EventSearch>,
-    /// Values handed from lanes to the queue.
+    /// Values transferred from lanes to the queue.
     pub(super) scratch: Box<Scratch>,
 }
 
@@ -87,7 +87,7 @@ impl Block {
         }
     }
 
-    /// Holds the held lanes through the step, and lets go those whose time has come.
+    /// Keeps the held lanes at rest through the step, and releases those whose time has come.
     #[inline(never)]
     pub(super) fn let_go(&mut self, time: [f64; 2]) {
         let Self { half_turns, kick, held, queue, .. } = self;
@@ -118,7 +118,7 @@ impl Strobe {
         }
     }
 
-    /// One forcing period on; the block is [`Strobe::block_width`] wide.
+    /// Advances by one forcing period; the block is [`Strobe::block_width`] wide.
     pub fn period(&self, block: &mut Block) {
         dispatch::run(self.simd, Steps { strobe: self, block, range: 0..self.steps() });
     }

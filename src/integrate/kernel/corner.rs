@@ -1,4 +1,4 @@
-//! Corners of the equation of motion: where the switching function of an effect passes zero.
+//! Corners of the equation of motion, at which the switching function of an effect passes zero.
 //!
 //! Over a step its sign is held, so that the step is of order 8 however far the function goes to the
 //! other side; a step in which it passes zero ends there, and the rest goes on with the other sign.
@@ -10,9 +10,9 @@ use crate::lanes::{Lane, Real};
 use crate::model::Equation;
 use crate::model::equation::Forcing;
 
-/// The function may pass zero within a step where a straight line from either end does so in this part
-/// of it: a parabola that touches zero does so from one end in less than half of it, cubics a little
-/// later.
+/// The function may pass zero within a step if a straight line from either end does so in this part
+/// of it: for a parabola that touches zero one end's line does so in less than half of it, for
+/// cubics a little later.
 pub const REACH: f64 = 0.4;
 
 /// The equation over numbers that carry the derivatives of the switching function along the motion.
@@ -64,7 +64,7 @@ impl<L: Lane> Corner<L> {
 }
 
 impl<L: Lane> Switch<L> {
-    /// The side on which it is, 1 or -1, or `held` where that is not 0.
+    /// The side of the function, 1 or -1, or `held` if that is not 0.
     #[inline(always)]
     pub fn side(&self, held: L) -> L {
         held.scale_add(f64::MAX, self.value).sign()

@@ -1,5 +1,5 @@
-//! One step of the Runge-Kutta method of order 8 for any number type: for torques that depend on the
-//! velocity, and for steps of a length that each trajectory has for itself.
+//! One step of the Runge-Kutta method of order 8 for any number type: for torques that depend on
+//! the velocity, and for steps of individual lengths.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use crate::lanes::{Real, Work};
 use crate::model::Pendulum;
 use crate::model::equation::{Equation, Forcing};
 
-/// When the stages of a step are, and what the drive then does.
+/// The times of the stages of a step, and the drive at them.
 pub trait Clock<R> {
     /// The drive at `stage`; `STAGES` is the end of the step.
     fn forcing(&self, equation: &Equation<R>, stage: usize) -> Forcing<R>;
@@ -16,7 +16,7 @@ pub trait Clock<R> {
     fn length(&self) -> R;
 }
 
-/// Every trajectory at the same time.
+/// All trajectories at the same time.
 #[derive(Clone, Copy, Debug)]
 pub struct Shared<'a, R> {
     /// The drive at the stages and at the end.
@@ -39,9 +39,9 @@ impl<R: Real> Clock<R> for Shared<'_, R> {
 /// Each trajectory at its own time.
 #[derive(Clone, Copy, Debug)]
 pub struct Own<R> {
-    /// When the step begins.
+    /// The start of the step.
     pub begin: R,
-    /// How long it is.
+    /// Its length.
     pub length: R,
 }
 
@@ -66,9 +66,9 @@ pub struct Running<R> {
     pub velocity: R,
 }
 
-/// All of a step but the acceleration at its end.
+/// All of a step except the acceleration at its end.
 pub const STEP: Range<usize> = 0..STAGES;
-/// That, too.
+/// All of a step, including it.
 pub const WHOLE: Range<usize> = 0..STAGES + 1;
 
 /// One step, or a part of it.
@@ -84,9 +84,9 @@ pub struct Stepping<'a, R, K> {
     pub part: Range<usize>,
     /// The state at the begin, and then at the end.
     pub state: &'a mut Running<R>,
-    /// Takes the accelerations at begin and end.
+    /// Receives the accelerations at both ends.
     pub ends: &'a mut [R; 2],
-    /// Takes velocities and accelerations at the stages.
+    /// Buffer for velocities and accelerations at the stages.
     pub stages: &'a mut Stages<R>,
 }
 
@@ -155,7 +155,7 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
             accelerations[i] = acceleration;
             i += 1;
             if i == STAGES {
-                // The thirteenth row are the weights.
+                // The thirteenth row contains the weights.
                 row!(12: 5 6 7 8 9 10 11);
                 *state = Running { theta, velocity };
                 ends[0] = accelerations[0];

@@ -1,4 +1,4 @@
-//! Everything about a run of equal steps that does not depend on the trajectory.
+//! The part of a run of equal steps that is independent of the trajectory.
 //!
 //! Viscous damping is folded into the time of each step. With `s` the time since the step's start,
 //! `u = (1 - exp(-gamma s)) / gamma` and `w = th' exp(gamma s)`,

@@ -18,13 +18,13 @@ pub struct Moving<R> {
     pub kick: R,
 }
 
-/// The load besides gravity, drive, constant torque and viscous damping.
+/// The load in addition to gravity, drive, constant torque and viscous damping.
 pub trait Extra<R> {
     /// `load` with it added, at a stage.
     fn on(&self, loads: &StageLoads, stage: usize, load: R) -> R;
 }
 
-/// Nothing more.
+/// No further load.
 #[derive(Clone, Copy, Debug)]
 pub struct Nothing;
 
@@ -77,8 +77,8 @@ impl<R: Real> Moving<R> {
         self.step_with::<D, Nothing>(loads, decay, &Nothing);
     }
 
-    /// One step with `extra` besides; the first and the last stage's load times `factor`: those at
-    /// the step's ends.
+    /// One step with the load `extra` added; the first and the last stage's load times `factor`:
+    /// those at the step's ends.
     #[inline(always)]
     pub fn step_with<D: Degree, X: Extra<R>>(
         &mut self,
@@ -88,8 +88,8 @@ impl<R: Real> Moving<R> {
     ) -> [R; 2] {
         let Self { half_turns, kick } = *self;
         let mut k = [half_turns; STAGES];
-        // Written out by a macro: as a loop over the stages the compiler keeps it a loop, looks the
-        // coefficients up and branches on their zeros.
+        // Written out by a macro: the compiler keeps a loop over the stages, looks the coefficients
+        // up and branches on their zeros.
         macro_rules! stage {
             ($i:literal: $($j:literal)*) => {
                 let at = if C[$i] == 0.0 { half_turns } else { kick.scale_add(C[$i], half_turns) };
@@ -119,8 +119,8 @@ impl<R: Real> Moving<R> {
         [k[0], k[STAGES - 1]]
     }
 
-    /// One step under all that acts, if none of it depends on the velocity but for its sense, 1 or
-    /// -1, which is held. Returns what [`Moving::step_with`] does.
+    /// One step under all loads, if none depends on the velocity except on its sense, 1 or -1,
+    /// which is held. Returns the result of [`Moving::step_with`].
     ///
     /// A loop over the stages, so that the effects' formulas are compiled once.
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Tangents beside states: how fast neighbouring trajectories part.
+//! Tangent vectors of states: the rate at which neighbouring trajectories diverge.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,7 @@ use crate::model::pendulum::Route;
 const SHADOW: f64 = 1e-7;
 
 impl Strobe {
-    /// [`Strobe::advance`] with one tangent vector beside each state.
+    /// [`Strobe::advance`] with one tangent vector for each state.
     ///
     /// Adds to `growth` the natural logarithm of the factor by which the vector has grown: over the
     /// time it is the finite-time Lyapunov exponent. The vectors come back with length 1.
@@ -73,7 +73,7 @@ impl Strobe {
                 let gain = velocity[count + i] - velocity[i];
                 let length = way.hypot(gain) / SHADOW;
                 growth[i] += length.ln();
-                // Where friction has brought both to one state nothing grows any more.
+                // If friction has brought both to one state the growth is zero from then on.
                 if length > 0.0 {
                     tangents.0[i] = way / (SHADOW * length);
                     tangents.1[i] = gain / (SHADOW * length);

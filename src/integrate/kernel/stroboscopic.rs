@@ -14,12 +14,12 @@ use crate::model::{Angle, Equation, Pendulum};
 /// Angle and velocity, `[theta, th']`.
 pub type State = [f64; 2];
 
-/// Length of steps, in units of `1/sqrt(1 + |p|)`, from which the method errs about as much as the
-/// coarse sine does, or more: measured from p = 0 to 30, where both grow with the stretching.
+/// Length of steps, in units of `1/sqrt(1 + |p|)`, above which the method's error is at least about
+/// that of the coarse sine: measured from p = 0 to 30, where both grow with the stretching.
 const COARSE_SINE_FROM: f64 = 0.28;
 
 /// The stroboscopic map of one pendulum at a chosen accuracy, on a chosen instruction set.
-#[allow(clippy::struct_excessive_bools)] // facts that do not depend on one another
+#[allow(clippy::struct_excessive_bools)] // independent facts
 #[derive(Clone, Debug)]
 pub struct Strobe {
     /// The model.
@@ -30,18 +30,18 @@ pub struct Strobe {
     pub simd: InstructionSet,
     /// Whether the sine of degree 15 is used.
     pub fine: bool,
-    /// Which way through the kernel the model takes.
+    /// The route of the model through the kernel.
     pub route: Route,
     /// Whether the model changes with the sign of the velocity.
     pub events: bool,
-    /// Whether friction can hold the pendulum fast.
+    /// Whether friction can hold the pendulum.
     pub friction: bool,
-    /// Whether something of angle and time acts besides gravity, the constant torque and Coulomb
-    /// friction.
+    /// Whether a torque of angle and time acts in addition to gravity, the constant torque and
+    /// Coulomb friction.
     pub extra: bool,
     /// The drive at the stages of the general method; empty on other routes.
     pub timetable: Timetable,
-    /// Where its angle lives.
+    /// Topology of its angle.
     pub angle: Angle,
     /// The equation, time in the laboratory held.
     pub equation: Equation<f64>,
@@ -85,7 +85,8 @@ impl Strobe {
 
     /// Advances every state by `periods` forcing periods, in place.
     ///
-    /// Angles on the circle come back in [-pi, pi]; the whole turns taken off are added to `turns`.
+    /// Angles on the circle are returned in [-pi, pi]; the whole turns removed are added to
+    /// `turns`.
     ///
     /// # Errors
     /// [`Error::Lengths`] if the three slices differ in length.

@@ -5,7 +5,7 @@
 //! `k_i = f(t + c_i h, q + c_i h v + h^2 sum_j a_ij k_j)`, `q += h v + h^2 sum_i b_i k_i`,
 //! `v += h sum_i bp_i k_i`. The ninth stage, at the new point, has no weight in this solution.
 
-/// Stages that carry weight.
+/// Number of stages with nonzero weight.
 pub const STAGES: usize = 8;
 /// Order of convergence.
 pub const ORDER: i32 = 8;
@@ -14,7 +14,7 @@ pub const ORDER: i32 = 8;
 pub const C: [f64; STAGES] =
     [0.0, 1.0 / 20.0, 1.0 / 10.0, 3.0 / 10.0, 1.0 / 2.0, 7.0 / 10.0, 9.0 / 10.0, 1.0];
 
-/// Row `i`: how the stages before `i` enter its position.
+/// Row `i`: weights of the stages before `i` in its position.
 pub const A: [[f64; STAGES - 1]; STAGES] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [1.0 / 800.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],

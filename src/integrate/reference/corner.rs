@@ -4,15 +4,15 @@ use super::dense::DenseStep;
 use super::problem::OdeProblem;
 use crate::integrate::tangent::Number;
 
-/// Parts of a step at which the switching function is evaluated.
+/// Number of parts of a step at which the switching function is evaluated.
 const LOOKS: usize = 16;
-/// A parabola through three looks counts as touching zero below this part of their fall.
+/// A parabola through three samples touches zero if its minimum is below this part of their fall.
 const MARGIN: f64 = 0.25;
 /// Halvings and sections of a bracket.
 const HALVINGS: usize = 60;
 const SECTIONS: usize = 40;
 
-/// The length of the step to the first corner within `dense`; none where there is none. `since` says
+/// The length of the step to the first corner within `dense`; none if there is none. `since` states
 /// that the step starts from one. Derivatives are left out.
 pub fn first<N: Number>(ode: &OdeProblem<N>, dense: &DenseStep<N>, since: bool) -> Option<f64> {
     let (field, mut step) = (ode.plain(), dense.values());
@@ -23,7 +23,7 @@ pub fn first<N: Number>(ode: &OdeProblem<N>, dense: &DenseStep<N>, since: bool) 
         side * ode.switch(tau, curve.at(tau))
     };
     let part = first_below_zero(&value, since)?;
-    // One correction for the error of the curve.
+    // One correction for the error of the interpolant.
     step.shorten(field, part * length);
     let rest = side * ode.switch(start + part * length, step.end);
     let by = 1e-3_f64.min(0.5 * part);
@@ -33,8 +33,8 @@ pub fn first<N: Number>(ode: &OdeProblem<N>, dense: &DenseStep<N>, since: bool) 
     Some(if better { next } else { part } * length)
 }
 
-/// The first part of a step from which on the function is negative. Where it starts `since` a zero,
-/// that one does not count.
+/// The first part of a step from which on the function is negative. If the step starts at a zero
+/// (`since`), that zero is ignored.
 fn first_below_zero(value: &impl Fn(f64) -> f64, since: bool) -> Option<f64> {
     let place = |k: usize| k as f64 / LOOKS as f64;
     let all: [f64; LOOKS + 1] = std::array::from_fn(|k| value(place(k)));
@@ -42,7 +42,7 @@ fn first_below_zero(value: &impl Fn(f64) -> f64, since: bool) -> Option<f64> {
         if all[k] < 0.0 {
             let mut low = place(k - 1);
             if k == 1 && (since || all[0] <= 0.0) {
-                // It rises from the zero first, or not at all.
+                // It rises from the zero first, or has no other zero.
                 low = lowest(&|x| -value(x), [0.0, place(1)], true);
                 if value(low) <= 0.0 {
                     return Some(0.0);
@@ -63,8 +63,7 @@ fn first_below_zero(value: &impl Fn(f64) -> f64, since: bool) -> Option<f64> {
     None
 }
 
-/// Where the function is least between two parts, by the golden section; with `any` wherever it is
-/// found negative first.
+/// The minimum between two parts, by the golden section; with `any` the first point found negative.
 fn lowest(value: &impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], any: bool) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
@@ -86,7 +85,7 @@ fn lowest(value: &impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], any: bool)
     if values[0] < values[1] { inner[0] } else { inner[1] }
 }
 
-/// Where it passes from above to below zero.
+/// The zero at which it falls.
 fn passage(value: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);

@@ -1,4 +1,4 @@
-//! One step of the Runge-Kutta method of order 8, its error and the curve between its ends.
+//! One step of the Runge-Kutta method of order 8, its error and its interpolant.
 //!
 //! Hairer, Norsett & Wanner (1993), Solving Ordinary Differential Equations I, section II.10;
 //! coefficients in [`crate::integrate::dop853`].
@@ -15,9 +15,9 @@ use crate::lanes::Work;
 /// the equation is analytic even where the velocity or the switching function passes zero.
 #[derive(Clone, Debug)]
 pub struct DenseStep<N> {
-    /// Where it starts.
+    /// Time of its start.
     pub tau: f64,
-    /// How long it is.
+    /// Its length.
     pub length: f64,
     /// The sense and the side held: 1 or -1.
     pub signs: [f64; 2],
@@ -29,7 +29,7 @@ pub struct DenseStep<N> {
     pub end: [N; 2],
     velocity: [N; ALL_STAGES],
     acceleration: [N; ALL_STAGES],
-    /// The mode of the rig, where one moves with the pendulum.
+    /// The mode of the rig, if the model has one.
     pub sway: Option<Box<Sway<N>>>,
 }
 
@@ -83,7 +83,7 @@ impl<N: Number> DenseStep<N> {
     /// Becomes the step from the same start with another length.
     pub fn shorten(&mut self, field: &Field<N>, length: f64) {
         self.length = length;
-        // The thirteenth stage stands at the new point.
+        // The thirteenth stage is at the new point.
         self.fill(field, 1..STAGES + 1);
     }
 
@@ -103,7 +103,7 @@ impl<N: Number> DenseStep<N> {
         }
     }
 
-    /// Fills stages: the one place where the formulas stand in a loop.
+    /// Evaluates stages: the only loop that contains the formulas.
     #[inline(never)]
     fn fill(&mut self, field: &Field<N>, stages: Range<usize>) {
         self.start[0].aside(Filling { dense: self, field, stages });
@@ -150,8 +150,8 @@ impl<N: Number> DenseStep<N> {
         self.acceleration[0]
     }
 
-    /// The error estimated, over what `tolerance` allows: that much in the angle, and in the
-    /// velocity that much times the speed where it is above 1.
+    /// The estimated error over the tolerance, which applies to the angle, and to the velocity
+    /// times the speed if that is above 1.
     #[must_use]
     pub fn error(&self, tolerance: f64) -> f64 {
         let speed = self.start[1].value().abs().max(self.end[1].value().abs());
@@ -159,7 +159,7 @@ impl<N: Number> DenseStep<N> {
         let mut squares = [0.0; 2];
         for (weights, square) in [E5, E3].iter().zip(&mut squares) {
             let own = [&self.velocity, &self.acceleration].into_iter();
-            // Of a mode of the rig alike: what it does to the angle is no more.
+            // For a mode of the rig alike: its effect on the angle is no larger.
             let all = own.chain(self.sway.iter().flat_map(|sway| &sway.slopes));
             for (slopes, allowed) in all.zip(allowed.into_iter().cycle()) {
                 let sum: f64 = weights.iter().zip(slopes).map(|(w, k)| w * k.value()).sum();
@@ -178,12 +178,12 @@ impl<N: Number> DenseStep<N> {
     pub fn surely_keeps_sense(&self) -> bool {
         let greatest =
             self.acceleration[..=STAGES].iter().fold(0_f64, |most, a| most.max(a.value().abs()));
-        // From either end the velocity falls no faster than that.
+        // From either end the velocity falls no faster than this.
         let ends = self.signs[0] * (self.start[1].value() + self.end[1].value());
         ends > 1.2 * self.length * greatest
     }
 
-    /// The curve between the ends, of order 7.
+    /// The interpolant, of order 7.
     #[must_use]
     pub fn curve(&mut self, field: &Field<N>) -> Curve<N> {
         let mut curve = Curve::none(self.start);
@@ -191,7 +191,7 @@ impl<N: Number> DenseStep<N> {
         curve
     }
 
-    /// The curve of the step, written into `curve`.
+    /// The interpolant of the step, written into `curve`.
     pub fn trace(&mut self, field: &Field<N>, curve: &mut Curve<N>) {
         (curve.tau, curve.length) = (self.tau, self.length);
         (curve.theta[0], curve.velocity[0]) = (self.start[0], self.start[1]);
@@ -204,7 +204,7 @@ impl<N: Number> DenseStep<N> {
     }
 }
 
-/// The coefficients of a curve that gains so much over a step of that length.
+/// The coefficients of an interpolant with this increase over a step of that length.
 #[inline(always)]
 fn coefficients<N: Number>(gain: N, length: f64, slopes: &[N; ALL_STAGES], all: &mut [N; 8]) {
     let (first, last) = (slopes[0].scale(length), slopes[STAGES].scale(length));
@@ -280,7 +280,7 @@ pub struct Curve<N> {
 }
 
 impl<N: Number> Curve<N> {
-    /// No curve yet.
+    /// No interpolant yet.
     #[must_use]
     pub fn none([theta, velocity]: [N; 2]) -> Self {
         let (theta, velocity) = ([theta; 8], [velocity; 8]);
@@ -307,7 +307,7 @@ impl<N: Number> Curve<N> {
     }
 }
 
-/// The values of two curves at a part of their step.
+/// The values of two interpolants at a part of their step.
 struct Summing<'a, N> {
     of: [&'a [N; 8]; 2],
     part: f64,

@@ -1,10 +1,11 @@
 //! One trajectory: steps of the right length, turns, sticks and releases.
 //!
-//! Between events the sense of the motion is held, so the equation is analytic. At a velocity 0 the
-//! pendulum goes on in the sense in which the load exceeds the friction, or sticks until it does.
-//! Derivatives stay right: at a turn the velocity's are multiplied by the ratio of the accelerations
-//! after and before it, at a stick they vanish, at a release nothing jumps (saltation; di Bernardo,
-//! Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems, section 2.5).
+//! Between events the sense of the motion is fixed, so the equation is analytic. At a velocity 0
+//! the pendulum continues in the sense in which the load exceeds the friction, or sticks until it
+//! does. Derivatives are corrected: at a turn the velocity's are multiplied by the ratio of the
+//! accelerations after and before it, at a stick they vanish, at a release nothing jumps
+//! (saltation; di Bernardo, Budd, Champneys & Kowalczyk (2008), Piecewise-smooth Dynamical Systems,
+//! section 2.5).
 
 use super::corner;
 use super::dense::DenseStep;
@@ -15,19 +16,19 @@ use super::turning::{self, Turning};
 use crate::integrate::tangent::Number;
 use crate::model::rest::Release;
 
-/// A step is at most so much longer than the one before it, and at least so much shorter.
+/// Smallest and largest ratio of successive step lengths.
 const CHANGE: [f64; 2] = [1.0 / 3.0, 6.0];
 /// The part of the step that the error would allow.
 const SAFETY: f64 = 0.9;
 /// The first step over the longest one.
 const FIRST_STEP: f64 = 0.5;
-/// Steps shorter than this part of the time leave no trace in it.
+/// Steps below this part of the time are lost in its rounding.
 const SHORTEST: f64 = 1e-15;
-/// Below this part of the longest step a curve is as good as rounding lets it be.
+/// Below this part of the longest step an interpolant is accurate to rounding.
 const FINE: f64 = 1e-4;
-/// Turns closer than this, so often in a row, are a state on the edge that rounding decides.
+/// Distance and number of successive turns that indicate a state at the limit of the stick.
 const CROWDED: (f64, u32) = (1e-10, 20);
-/// The rest given to such a state; it doubles each time.
+/// The duration of the rest imposed on such a state; it doubles each time.
 const PAUSE: f64 = 1e-9;
 
 /// A piece of a trajectory.
@@ -41,11 +42,11 @@ pub enum Piece {
 
 #[derive(Clone, Copy, Debug)]
 enum Mode<N> {
-    /// In this sense and on this side of a corner, with this acceleration now.
+    /// Moving: sense of motion and side of a corner, with the present acceleration.
     Moving([f64; 2], N),
-    /// Until this release.
+    /// At rest until this release.
     Stuck(Release),
-    /// Out of the range of numbers.
+    /// Beyond the range of numbers.
     Lost,
 }
 
@@ -129,14 +130,14 @@ impl<'a, N: Number> Driver<'a, N> {
         }
     }
 
-    /// Whether it will never move again.
+    /// Whether it remains at rest for ever.
     #[must_use]
     pub fn is_stuck_for_ever(&self) -> bool {
         matches!(self.mode, Mode::Stuck(Release::Never))
     }
 
-    /// One piece on; `None` at the end, and where the state leaves the range of numbers, which
-    /// [`Driver::is_lost`] tells.
+    /// Advances by one piece; `None` at the end, and if the state leaves the range of numbers, see
+    /// [`Driver::is_lost`].
     pub fn advance(&mut self) -> Option<Piece> {
         if self.tau >= self.until {
             return None;
@@ -148,7 +149,7 @@ impl<'a, N: Number> Driver<'a, N> {
         }
     }
 
-    /// To the end, calling `visit` for each piece.
+    /// Advances to the end, calling `visit` for each piece.
     pub fn finish(&mut self, mut visit: impl FnMut(&mut Piece)) {
         while let Some(mut piece) = self.advance() {
             visit(&mut piece);
@@ -161,7 +162,7 @@ impl<'a, N: Number> Driver<'a, N> {
         matches!(self.mode, Mode::Lost)
     }
 
-    /// Multiplies the derivatives, which is allowed where they are by the start alone.
+    /// Multiplies the derivatives, which is allowed if they are by the start alone.
     pub fn scale_derivatives(&mut self, factor: f64) {
         let scaled = |x: N| x.reset(x.value(), factor);
         self.state = self.state.map(scaled);
@@ -194,7 +195,7 @@ impl<'a, N: Number> Driver<'a, N> {
         let mut growth = CHANGE[1];
         loop {
             let rest = self.until - self.tau;
-            // No crumb is left for the step after this one.
+            // No tiny remainder is left for the next step.
             let length = if self.step > 0.99 * rest { rest } else { self.step };
             if length < shortest && length < rest {
                 self.lose();
@@ -220,7 +221,7 @@ impl<'a, N: Number> Driver<'a, N> {
                 (self.step, growth) = (0.5 * length, 1.0);
                 continue;
             }
-            // A step that the end cut short says little about the next one.
+            // The length of a step cut short by the end does not limit the next one.
             self.step = if length < self.step { self.step.max(next) } else { next };
             let turns = if let Turning::At(length) = turning {
                 self.dense.shorten(ode.field(), length);
@@ -264,7 +265,7 @@ impl<'a, N: Number> Driver<'a, N> {
         self.state = state;
     }
 
-    /// At a velocity 0, reached in the sense `sense` with the acceleration `before`.
+    /// Continues from a velocity 0, reached in the sense `sense` with the acceleration `before`.
     fn turn(&mut self, sense: f64, before: f64) {
         self.past = self.ode.turned(self.state[0], sense, self.past);
         let theta = self.state[0].value();
@@ -293,7 +294,7 @@ impl<'a, N: Number> Driver<'a, N> {
         self.set_out(next);
     }
 
-    /// `wait`, but a pause where turns crowd.
+    /// `wait`, or a pause if turns accumulate.
     fn uncrowded(&mut self, wait: Release) -> Release {
         let (last, count) = self.crowd;
         let close = self.tau - last < CROWDED.0;
@@ -312,7 +313,7 @@ impl<'a, N: Number> Driver<'a, N> {
         self.go_on(self.signs(sense));
     }
 
-    /// To the other side of a corner: nothing jumps, but derivatives of the acceleration.
+    /// Continues on the other side of a corner, where only derivatives of the acceleration jump.
     fn cross(&mut self, [sense, side]: [f64; 2]) {
         self.since_corner = true;
         self.go_on([sense, -side]);

@@ -14,7 +14,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The words for it.
+    /// The name of the kind.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {

@@ -7,10 +7,10 @@ use crate::integrate::tangent::Tangent;
 use crate::model::Pendulum;
 use crate::model::pendulum::Route;
 
-/// The error of a step that maps of orbits ask for.
+/// Error tolerance of a step in the maps of orbits.
 const PRECISE: f64 = 3e-15;
 
-/// A model ready to carry states from one time to another, with derivatives by the first state.
+/// A model that advances states from one time to another, with derivatives by the initial state.
 ///
 /// Time in the laboratory is held, as in all maps.
 #[derive(Clone, Debug)]
@@ -20,7 +20,7 @@ pub struct Flow {
     contracts_evenly: bool,
 }
 
-/// Where a state has been carried.
+/// The result of an integration.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrival {
     /// Angle, not wrapped, and velocity; not numbers if the motion left their range.
@@ -33,7 +33,7 @@ pub struct Arrival {
     pub product: Option<f64>,
     /// Whether friction holds the pendulum at the end.
     pub stuck: bool,
-    /// Whether it will hold it for ever.
+    /// Whether it holds it for ever.
     pub stuck_for_ever: bool,
 }
 

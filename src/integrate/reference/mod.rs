@@ -5,8 +5,8 @@
 //! - [`driver`]: the loop over steps and events
 //! - [`turning`]: zeros of the velocity within a step
 //! - [`corner`]: corners within a step, where the formula of an effect changes
-//! - [`event`]: what a trajectory reports of its turns, sticks and releases
-//! - [`rig_mode`]: a mode of the rig beside the pendulum
+//! - [`event`]: the reported turns, sticks and releases of a trajectory
+//! - [`rig_mode`]: a mode of the rig coupled to the pendulum
 //! - [`sample`], [`sensitivity`]: a trajectory at given times, with derivatives by parameters and start
 //! - [`flow`]: the stroboscopic map with its derivative
 

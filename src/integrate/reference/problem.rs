@@ -11,17 +11,17 @@ use crate::model::recorded::Recorded;
 use crate::model::{Equation, Pendulum};
 
 /// The longest step is this times a power of the tolerance, over the greatest rate of small motions
-/// or of the drive. At fine tolerances that is what the error of a linear oscillator allows: a state
-/// at rest would else be crossed in steps too long for its derivatives. At coarse ones it is less,
-/// and motions smaller than the tolerance keep seven digits, so that their turns are
-/// turns. It falls with the tolerance all along, so that tightening always tells.
+/// or of the drive. At fine tolerances it is that allowed by the error of a linear oscillator:
+/// otherwise steps at rest would be too long for its derivatives. At coarse ones it is smaller, and
+/// motions smaller than the tolerance keep seven digits, so that their turns are resolved. It
+/// decreases with the tolerance everywhere, so that tightening always has an effect.
 const LONGEST_STEP: (f64, f64) = (1.6, 1.0 / 14.0);
-/// Part of the rate of a mode that limits the longest step: the mode moves little beside the pendulum,
-/// and the error of each step includes it.
+/// Part of the rate of a mode that limits the longest step: the mode moves little compared to the
+/// pendulum, and the error of each step includes it.
 const MODE: f64 = 0.25;
-/// The smallest error of a step that rounding allows to be estimated.
+/// Least error of a step that can be estimated despite rounding.
 pub const FINEST: f64 = 1e-15;
-/// Angles, and times of a drive's period, at which the rate is looked for.
+/// Number of angles, and of times in a drive's period, at which the rate is evaluated.
 const LOOKS: [usize; 2] = [32, 8];
 
 /// State besides angle and velocity: the angle of the last turn, the memories of an effect and of the
@@ -82,7 +82,7 @@ impl<N: Number> OdeProblem<N> {
         let mut plain = pendulum.equation();
         plain.ages = ages;
         let changes = ages && pendulum.drifts();
-        // Negative friction, which a fit may pass through, holds nothing, but jumps all the same.
+        // Negative friction, which a fit may pass through, never holds, but jumps all the same.
         let jumps = pendulum.has_friction() || pendulum.theta_r < 0.0;
         let tolerance = tolerance.max(FINEST);
         let harmonic = plain.has_closed_release() && !plain.keeps()[0];
@@ -187,7 +187,7 @@ impl<N: Number> OdeProblem<N> {
         self.field.equation.kept(1, &at).map_or(theta, |apart| theta + apart)
     }
 
-    /// The switching function of an effect with a corner; 1 where there is none.
+    /// The switching function of an effect with a corner; 1 if there is none.
     #[must_use]
     pub fn switch(&self, tau: f64, [theta, velocity]: [f64; 2]) -> f64 {
         let past = [theta, 1.0, 0.0, 0.0, 0.0];
@@ -201,7 +201,7 @@ impl<N: Number> OdeProblem<N> {
         self.plain.equation.has_corner()
     }
 
-    /// Whether the equation changes where the velocity passes zero, or turns are wanted anyhow.
+    /// Whether the equation changes at zeros of the velocity, or turns are requested anyway.
     #[must_use]
     pub fn watches(&self) -> bool {
         self.watches
@@ -214,19 +214,20 @@ impl<N: Number> OdeProblem<N> {
         self.jumps
     }
 
-    /// Whether what loads a pendulum at rest is known in closed form, but for a mode of the rig.
+    /// Whether the load of a pendulum at rest is known in closed form, except for a mode of the
+    /// rig.
     #[must_use]
     pub fn is_harmonic(&self) -> bool {
         self.harmonic
     }
 
-    /// The time after which that load repeats; `None` if it does not.
+    /// The period of that load; `None` if it is not periodic.
     #[must_use]
     pub fn period(&self) -> Option<f64> {
         self.period
     }
 
-    /// The time scale on which it changes.
+    /// The time scale of its changes.
     #[must_use]
     pub fn look(&self) -> f64 {
         self.look
@@ -285,7 +286,7 @@ impl<N: Number> Field<N> {
         (forcing, Point { past: [past[0], past[1]], sway: [past[3], past[4]], ..at })
     }
 
-    /// Where the formulas are evaluated, of single states.
+    /// The point for evaluating the formulas, of single states.
     #[inline(never)]
     fn place(&self, tau: f64, state: [N; 2], signs: [f64; 2], past: Past<N>) -> Point<N> {
         let mut at = Point::nowhere(state[0]);
@@ -300,7 +301,7 @@ impl<N: Number> Field<N> {
         self.equation.sways()
     }
 
-    /// The rates of that mode's displacement and momentum; 0 where there is none.
+    /// The rates of that mode's displacement and momentum; 0 if there is none.
     #[inline(never)]
     #[must_use]
     pub fn sway(&self, state: [N; 2], past: Past<N>) -> [N; 2] {

@@ -1,4 +1,4 @@
-//! A mode of the rig beside the pendulum: within a step, and while friction holds the pendulum.
+//! A mode of the rig coupled to the pendulum: within a step, and while friction holds the pendulum.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use crate::model::{Equation, effects::Point};
 /// Terms of an exponential's series, whose argument is at most [`SHORT`].
 const TERMS: usize = 15;
 const SHORT: f64 = 0.5;
-/// A pull below this part of what holds the pendulum is none.
+/// Pulls below this part of the holding friction are neglected.
 const FAINT: f64 = 1e-10;
 /// The envelope of a decay over what its start shows, at most.
 const ENVELOPE: f64 = 10.0;
@@ -75,7 +75,7 @@ pub struct Ring<N> {
 }
 
 impl<N: Number> Ring<N> {
-    /// With the pendulum at `theta`; none where no mode moves with it.
+    /// The mode with the pendulum held at `theta`; none if the model has no mode.
     #[must_use]
     pub fn at(field: &Field<N>, theta: N) -> Option<Self> {
         if !field.sways() {
@@ -118,7 +118,7 @@ impl<N: Number> Ring<N> {
         square.abs().sqrt().max(2.0 * half.abs())
     }
 
-    /// The time after which it pulls by less than `least`; infinite where it does not fade.
+    /// The time after which it pulls by less than `least`; infinite if it does not decay.
     fn fades(&self, sway: [f64; 2], least: f64) -> f64 {
         let [half, square] = self.invariants();
         let decay = -half - (half * half - square).max(0.0).sqrt();
@@ -137,7 +137,7 @@ fn product<N: Number>(a: &[[N; 2]; 2], b: &[[N; 2]; 2]) -> [[N; 2]; 2] {
     [0, 1].map(|i| [0, 1].map(|j| a[i][0].mul_add(b[0][j], a[i][1] * b[1][j])))
 }
 
-/// The pendulum at rest: what an effect keeps there, and a mode that rings on from its
+/// The pendulum at rest: the memory of an effect, and a mode that oscillates freely from its
 /// displacement and momentum at a time.
 #[derive(Debug)]
 pub struct Resting<'a, N> {
@@ -147,7 +147,7 @@ pub struct Resting<'a, N> {
 }
 
 impl<'a, N> Resting<'a, N> {
-    /// Without a mode, or when it rings no more.
+    /// Whether there is no mode, or it has decayed.
     #[must_use]
     pub fn still(ode: &'a OdeProblem<N>, kept: f64) -> Self {
         Self { ode, kept, ring: None }
@@ -181,8 +181,8 @@ impl<N: Number> Load for Resting<'_, N> {
     }
 }
 
-/// When a pendulum that came to rest at `theta` at time `tau` moves; looked for until `until` where the
-/// equation does not repeat.
+/// The time at which a pendulum that came to rest at `theta` at time `tau` moves; sought up to
+/// `until` if the equation is not periodic.
 pub fn let_go<N: Number>(
     ode: &OdeProblem<N>,
     tau: f64,

@@ -6,7 +6,7 @@ use super::event::Event;
 use super::problem::{OdeProblem, Past};
 use crate::integrate::tangent::Number;
 
-/// States at chosen times, and what happened in between.
+/// States at chosen times, and the events between them.
 #[derive(Clone, Debug)]
 pub struct Sampled<N> {
     /// Angle, not wrapped, and velocity at each time; not numbers after the motion left their range.
@@ -24,7 +24,7 @@ pub struct Sampled<N> {
 }
 
 impl<N: Number> Sampled<N> {
-    /// The past at the time of that place; that of a motion's start where nothing depends on it.
+    /// The memories at the time of that index; those of the start if nothing depends on them.
     #[must_use]
     pub fn past(&self, place: usize) -> Past<N> {
         let [theta, _] = self.states[place];
@@ -36,7 +36,7 @@ impl<N: Number> Sampled<N> {
     #[must_use]
     pub fn given(&self, ode: &OdeProblem<N>, place: usize) -> N {
         let ([theta, _], past) = (self.states[place], self.past(place));
-        // At rest the play is what the last turn left: either sense may be next.
+        // At rest the backlash is as left by the last turn: either sense may follow.
         self.signs[place]
             .map_or_else(|| theta + past[2], |[sense, _]| ode.played(theta, sense, past))
     }

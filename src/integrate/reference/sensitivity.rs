@@ -1,4 +1,4 @@
-//! How a trajectory depends on its parameters and its start.
+//! Derivatives of a trajectory by its parameters and its start.
 //!
 //! The trajectory runs over numbers with derivatives, in as many passes as that takes. The values
 //! alone choose the steps, so all passes take the same ones, and the values agree bit for bit.
@@ -12,7 +12,7 @@ use crate::integrate::kernel::stroboscopic::State;
 use crate::integrate::tangent::Tangent;
 use crate::model::{Pendulum, Recorded};
 
-/// The most derivatives that one pass carries.
+/// Largest number of derivatives in one pass.
 const WIDEST: usize = 16;
 
 /// A trajectory at chosen times, with derivatives.
@@ -56,7 +56,7 @@ pub fn sensitivities(
     let count = all.names.len();
     let mut first = 0;
     while first < count {
-        // The narrowest numbers that hold the remaining derivatives.
+        // The smallest number type that holds the remaining derivatives.
         first += match count - first {
             ..=8 => pass.run::<8>(first, &mut all),
             _ => pass.run::<WIDEST>(first, &mut all),
@@ -75,7 +75,7 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
-    /// The derivatives by `N` names from `first` on; returns how many that were.
+    /// The derivatives by `N` names from `first` on; returns their number.
     fn run<const N: usize>(&self, first: usize, all: &mut Sensitivities) -> usize {
         let parameters = all.names.len() - 2;
         // A name of another pass has no direction in this one.

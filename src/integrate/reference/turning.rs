@@ -1,4 +1,4 @@
-//! Where the velocity passes zero within a step.
+//! Zeros of the velocity within a step.
 //!
 //! The velocity's polynomial is written in Bernstein's basis: if all its coefficients have one sign
 //! it has no zero, if they change sign once it has one, and otherwise it is halved. So the first
@@ -13,7 +13,7 @@ use crate::integrate::tangent::Number;
 const DEGREE: usize = 7;
 /// Rounding error of a coefficient, over the sum of the polynomial's coefficients.
 const ROUNDING: f64 = 1e-15;
-/// A velocity smaller than this part of those of the step is zero: a contact, if not a passage.
+/// A velocity smaller than this part of those of the step is zero: a contact or a passage.
 const CLOSE: f64 = 1e-12;
 const MOST_HALVINGS: i32 = 50;
 /// Newton's steps; two are common.
@@ -41,11 +41,11 @@ type Bernstein = [f64; DEGREE + 1];
 /// Zeros of the velocity within a step.
 #[derive(Debug)]
 pub enum Turning {
-    /// The velocity keeps its sense.
+    /// The velocity keeps its sign.
     None,
     /// The velocity passes zero at the end of a step of this length, where it is 0 to rounding.
     At(f64),
-    /// The curve has a zero that the motion has not: the step is too long for its curve.
+    /// The interpolant has a zero that the motion lacks: the step is too long for its interpolant.
     Unclear,
 }
 
@@ -90,7 +90,7 @@ fn forward(curve: &Curve<f64>, sense: f64) -> Bernstein {
     all
 }
 
-/// The first point of `[0, 1]` from which the polynomial is negative by more than rounding makes.
+/// The first point of `[0, 1]` from which the polynomial is negative beyond rounding.
 fn first_below_zero(whole: &Bernstein) -> Option<f64> {
     let limit = -ROUNDING * whole.iter().map(|c| c.abs()).sum::<f64>();
     if whole.iter().all(|c| *c >= limit) {

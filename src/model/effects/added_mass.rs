@@ -1,10 +1,10 @@
 //! Fluid that moves along with the pendulum: it has inertia, also against the pivot's motion, but no
 //! weight.
 //!
-//! `(1 + e) th'' = ... - (1 + (1 + e) a) sin th`. A constant `e` makes all else that much smaller, which
-//! gravity, damping and friction per inertia as they are measured have in them already; what is left is
-//! the pivot's pull on a mass that weighs nothing. A free decay shows nothing of it, and under a drive it
-//! is an error of the drive's amplitude.
+//! `(1 + e) th'' = ... - (1 + (1 + e) a) sin th`. A constant `e` scales all other terms, which
+//! measured gravity, damping and friction per inertia already include; the remainder is the pivot's
+//! force on a mass without weight. A free decay does not depend on it, and under a drive it is
+//! equivalent to an error of the drive's amplitude.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

@@ -1,8 +1,10 @@
-//! Dry friction that differs between the two senses of rotation: `theta_r + d` forth, `theta_r - d` back.
+//! Dry friction that differs between the two senses of rotation: `theta_r + d` forward, `theta_r -
+//! d` backward.
 //!
 //! `-(theta_r + d sign v) sign v = -theta_r sign v - d`, and a load `L` at rest is held while
-//! `-(theta_r - d) <= L <= theta_r + d`, which is `|L - d| <= theta_r`: sliding and held alike it is the
-//! constant torque `-d`, for as long as `|d| <= theta_r`. No record of one rig tells it from a bias torque.
+//! `-(theta_r - d) <= L <= theta_r + d`, which is `|L - d| <= theta_r`: in motion and at rest it
+//! equals the constant torque `-d`, as long as `|d| <= theta_r`. No record of one rig distinguishes
+//! it from a bias torque.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

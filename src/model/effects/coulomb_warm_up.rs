@@ -1,7 +1,7 @@
 //! Coulomb friction that falls to a new level as the bearing warms up.
 //!
-//! Heat flows in at a steady rate and out in proportion to what has gathered: the temperature, and
-//! what depends on it, comes to its end exponentially (Newton's law of cooling).
+//! The heat flow in is constant and the flow out proportional to the stored heat: the temperature,
+//! and all that depends on it, approaches its limit exponentially (Newton's law of cooling).
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

@@ -1,4 +1,4 @@
-//! A drive whose frequency creeps.
+//! A drive whose frequency drifts.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

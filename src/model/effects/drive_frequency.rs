@@ -1,4 +1,4 @@
-//! A drive whose frequency is not what it was set to.
+//! A drive whose frequency differs from its stated value.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

@@ -1,4 +1,4 @@
-//! A drive whose phase is not what it was taken for; the same as a trigger that comes late.
+//! A drive whose phase differs from its stated value; equivalent to a late trigger.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

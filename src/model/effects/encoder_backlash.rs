@@ -1,8 +1,9 @@
-//! Play between shaft and sensor: at a turn the reading stands still until the play is taken up.
+//! Backlash between shaft and sensor: after a turn the reading is constant until the play is taken
+//! up.
 //!
-//! The reading lags behind the angle by half the play. While the sense `s` of the motion is held, what
-//! it reads less `theta` is `s max(s k, -b/2)`, where `k` is what the last turn left, less the way
-//! since. A motion begins in the middle of the play.
+//! The reading lags behind the angle by half the play. While the sense `s` of the motion is held,
+//! the reading less `theta` is `s max(s k, -b/2)`, where `k` is its value at the last turn, less
+//! the angle covered since. A motion begins in the middle of the play.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

@@ -1,4 +1,4 @@
-//! A sensor whose zero is not where the pendulum hangs; in one free decay equal to a tilt of the rig.
+//! A sensor with a zero error; in one free decay equivalent to a tilt of the rig.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

@@ -1,4 +1,4 @@
-//! A knock against the pendulum or its stand.
+//! An impulse on the pendulum or its stand.
 //!
 //! The force rises and falls as a Gaussian of the width 0.05 over `w0`: short for the pendulum, and long
 //! for a step of the integrator. The velocity changes by `J`.

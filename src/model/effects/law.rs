@@ -7,16 +7,17 @@ use crate::lanes::Real;
 use crate::lanes::sine::Fine;
 use crate::model::drive::Motion;
 
-/// No effect has more parameters.
+/// Largest number of parameters of an effect.
 pub const MOST_PARAMETERS: usize = 3;
 
-/// Why a map cannot have a torque that differs from turn to turn, unless another one counts turns.
+/// Reason for which a map cannot have a torque that differs between turns, unless another one
+/// counts turns.
 pub const NOT_PERIODIC: &str = "it does not repeat every turn, and nothing bounds the angle";
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
-    /// Takes energy out of the motion.
+    /// Removes energy from the motion.
     Damping,
     /// A torque that does not.
     Torque,
@@ -27,7 +28,7 @@ pub enum Group {
 }
 
 impl Group {
-    /// The word for it.
+    /// The name of the action.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -57,7 +58,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// The words for it.
+    /// The name of the family.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -78,7 +79,8 @@ pub enum Action {
     Position,
     /// A torque of the angle and of how the pivot moves.
     Driven,
-    /// A torque of the angle that changes with the time in the laboratory, beside the drive.
+    /// A torque of the angle that changes with the time in the laboratory, in addition to the
+    /// drive.
     Timed,
     /// An inertia of the angle, with the torque that comes of it.
     Inertia,
@@ -95,7 +97,7 @@ pub enum Action {
     LoadedFriction,
     /// Another amplitude, phase or frequency of the harmonic drive.
     Drive,
-    /// The pivot moves in another way besides.
+    /// An additional motion of the pivot.
     FurtherDrive,
     /// Another reading; no torque.
     Reading,
@@ -110,12 +112,12 @@ pub enum Mappable {
     Yes,
     /// With time in the laboratory held at a stated value.
     Frozen,
-    /// Maps cannot have it, by the reason of [`Law::bars_maps`].
+    /// Maps cannot have it, for the reason given by [`Law::bars_maps`].
     No,
 }
 
 impl Mappable {
-    /// The word for it.
+    /// The name of the variant.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -147,7 +149,7 @@ pub struct Definition<'a> {
     pub mappable: Mappable,
 }
 
-/// Where a formula is evaluated.
+/// A point at which formulas are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<R> {
     /// Angle, rad, not wrapped.
@@ -166,7 +168,7 @@ pub struct Point<R> {
     pub per_gravity: R,
     /// Time in the laboratory.
     pub lab: R,
-    /// Phase of the harmonic drive, rad; it is 0 where no formula asks for it.
+    /// Phase of the harmonic drive, rad; 0 if no formula uses it.
     pub phase: R,
     /// The angle at which the motion last turned or began, and the effect's [`Law::kept`] there.
     pub past: [R; 2],
@@ -175,7 +177,7 @@ pub struct Point<R> {
 }
 
 impl<R: Real> Point<R> {
-    /// All of it 0: for what a formula has, whatever its value.
+    /// All zero: to determine properties of a formula that do not depend on values.
     #[must_use]
     pub fn nowhere(zero: R) -> Self {
         Self {
@@ -219,7 +221,7 @@ impl<R: Real> Point<R> {
     #[inline(always)]
     #[must_use]
     pub fn hidden(&self) -> Self {
-        // Adding -0 changes no number; what a formula does not use costs nothing.
+        // Adding -0 changes no number; values unused by a formula cost nothing.
         let nothing = self.theta.like(black_box(-0.0));
         Self { theta: self.theta + nothing, velocity: self.velocity + nothing, ..*self }
     }
@@ -241,7 +243,7 @@ pub trait Law {
     /// Name, formula, parameters and the rest.
     const DEFINITION: Definition<'static>;
 
-    /// The parameters as the formulas below take them: what takes its time, like a reciprocal, is
+    /// The parameters as the formulas below take them: expensive operations, like a reciprocal, are
     /// done once.
     #[must_use]
     fn ready<R: Real>(parameters: [R; MOST_PARAMETERS]) -> [R; MOST_PARAMETERS] {
@@ -273,8 +275,8 @@ pub trait Law {
         None
     }
 
-    /// The memory of the effect, 0 where a motion begins; none where it has none. The formulas
-    /// take it, as it was at the last turn, from [`Point::past`]. Of a torque it is [`Point::sense`]
+    /// The memory of the effect, 0 at the start of a motion; none if it has no memory. The formulas
+    /// take its value at the last turn from [`Point::past`]. Of a torque it is [`Point::sense`]
     /// without a motion before, and no map can have it; one effect of a model may have a memory. Of
     /// [`Action::Play`] it is the reading less the angle.
     #[inline(always)]
@@ -310,7 +312,7 @@ pub trait Law {
         at.constant(0.0)
     }
 
-    /// Whether it multiplies a reading, so that it acts on a velocity or a force as on an angle.
+    /// Whether it multiplies a reading, so that it acts on a velocity or a force like on an angle.
     const SCALES: bool = false;
 
     /// The reading of a sensor at the angle `theta` and velocity `velocity`, at the laboratory's time
@@ -333,8 +335,8 @@ pub trait Law {
         false
     }
 
-    /// Why a map over initial conditions cannot have the effect with these parameters; nothing
-    /// where it can.
+    /// Reason for which a map over initial conditions cannot have the effect with these parameters;
+    /// none if it can.
     #[must_use]
     fn bars_maps(_: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
         None

@@ -1,4 +1,4 @@
-//! Friction that grows with what the bearing carries: weight, drive and centrifugal force.
+//! Friction proportional to the bearing's load: weight, drive and centrifugal force.
 //!
 //! That is the rod's force over the weight, `|(1 + a) cos th + v^2|` (in SI `v^2/w0^2`), without what
 //! a sideways drive adds. Hanging at rest it is 1, which Coulomb friction has already. Where it

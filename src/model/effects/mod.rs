@@ -1,8 +1,8 @@
 //! The library of effects: one file each, and the list of them.
 //!
-//! [`law`] says what an effect is. A new one is one file with a [`Law`] and one line in the list
-//! below; Python, the command line, model files, maps and fits read it from here. A user's own
-//! effect needs neither: it is a [`Formula`].
+//! [`law`] defines an effect. A new one is one file with a [`Law`] and one line in the list below;
+//! Python, the command line, model files, maps and fits read it from here. A user's own effect
+//! needs neither: it is a [`Formula`].
 
 pub mod law;
 pub mod parameter;
@@ -23,7 +23,7 @@ macro_rules! library {
     ($($module:ident :: $law:ident,)*) => {
         $(mod $module;)*
 
-        /// An effect of the library, or one of a user's own.
+        /// An effect of the library, or a formula of a user.
         #[derive(Clone, Debug, PartialEq, Eq)]
         pub enum Kind {
             $(
@@ -35,7 +35,7 @@ macro_rules! library {
         }
 
         impl Kind {
-            /// The whole library, in the order in which it is shown.
+            /// The whole library, in display order.
             pub const ALL: &[Self] = &[$(Self::$law,)*];
 
             /// Name, formula, parameters and the rest.
@@ -303,8 +303,8 @@ impl Effect {
         &self.parameters[..self.kind.definition().parameters.count()]
     }
 
-    /// Its parameters as its formulas take them, in numbers of another kind: `number` makes one of
-    /// each value.
+    /// Its parameters as its formulas take them, in numbers of another kind: `number` converts each
+    /// value.
     pub fn lift<R: Real>(&self, number: impl FnMut(f64) -> R) -> [R; MOST_PARAMETERS] {
         let values: Vec<R> = self.values().iter().copied().map(number).collect();
         let none = values[0].like(0.0);
@@ -317,7 +317,7 @@ impl Effect {
         actions.contains(&self.kind.definition().action)
     }
 
-    /// Whether it is a friction that can hold the pendulum fast.
+    /// Whether it is a friction that can hold the pendulum.
     #[must_use]
     pub fn rubs(&self) -> bool {
         self.is(&[Action::Friction, Action::SlidingFriction, Action::LoadedFriction])

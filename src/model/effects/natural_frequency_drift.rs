@@ -1,4 +1,4 @@
-//! A natural frequency that changes as the rod's length does with the temperature, or a mass creeps.
+//! A natural frequency that drifts, as the rod's length changes with temperature, or a mass creeps.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

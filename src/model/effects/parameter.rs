@@ -14,26 +14,26 @@ pub enum Power {
     TwoMinus(usize),
 }
 
-/// The role of a parameter in its effect. A search asks for the role, never for a name.
+/// The role of a parameter in its effect. A search depends on the role, never on a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// How strong the effect is: at 0 there is none.
+    /// Strength of the effect: at 0 there is none.
     Size,
-    /// How far it reaches, in angle or velocity.
+    /// Width, in angle or velocity.
     Width,
     /// The angle at which it acts, on either side of the rest.
     Place,
     /// An exponent.
     Power,
-    /// How many times it repeats in a turn: a whole number.
+    /// Number of repetitions in a turn, an integer.
     Order,
-    /// How long it takes.
+    /// Duration or time constant.
     Time,
-    /// An angle that may be anything within a turn.
+    /// An angle with any value within a turn.
     Phase,
-    /// How often it repeats: records tell frequencies apart that differ by less than one in their span.
+    /// Frequency: records resolve differences of one cycle in their span.
     Frequency,
-    /// When it happens.
+    /// Instant.
     Instant,
     /// The frequency of a mode of the rig, or its damping ratio.
     Mode,
@@ -54,7 +54,7 @@ impl Role {
         Self::Mode,
     ];
 
-    /// The words for it.
+    /// The name of the role.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -83,9 +83,9 @@ pub struct Parameter<'a> {
     pub unit: &'a str,
     /// How it scales with `w0`.
     pub power: Power,
-    /// The least and the greatest value that make sense, without dimensions.
+    /// Bounds of meaningful values, without dimensions.
     pub range: [f64; 2],
-    /// Smallest and largest value of interest: where a search looks.
+    /// Typical range, in which a search begins.
     pub typical: [f64; 2],
     /// Its meaning, in words.
     pub meaning: &'a str,
@@ -101,7 +101,7 @@ pub enum Parameters<'a> {
 }
 
 impl<'a> Parameters<'a> {
-    /// How many there are.
+    /// Number of parameters.
     #[must_use]
     pub const fn count(self) -> usize {
         match self {
@@ -110,10 +110,10 @@ impl<'a> Parameters<'a> {
         }
     }
 
-    /// The parameter at a place.
+    /// The parameter at an index.
     ///
     /// # Panics
-    /// If there is no such place.
+    /// If there is no such index.
     #[must_use]
     pub fn at(self, place: usize) -> Parameter<'a> {
         match self {

@@ -1,4 +1,4 @@
-//! A pivot that gives way sideways, with its own mode.
+//! A pivot with horizontal compliance, and its own mode.
 //!
 //! With the pivot's displacement `x` over the pendulum's length, Lagrange's equations are
 //! `th'' + x'' cos th = all else` and `x'' + 2 z wx x' + wx^2 x = -mu (th'' cos th - v^2 sin th)`. With
@@ -7,9 +7,9 @@
 //! `(1 - mu cos^2 th) th'' = all else + cos th (2 z wx x' + wx^2 x - mu v^2 sin th)`. Where friction
 //! makes `th''` jump, `x''` does, but neither `y` nor its rate.
 //!
-//! A motion begins with `x' = 0` and with `x` as far aside as the rod pulls the pivot,
-//! `mu sin th (w0^2 (1 + a) cos th + v^2)/wx^2`. While friction holds the pendulum fast the mode rings on and
-//! pulls at it, and may so release it.
+//! A motion begins with `x' = 0` and with `x` at its equilibrium under the rod's force, `mu sin th
+//! (w0^2 (1 + a) cos th + v^2)/wx^2`. While friction holds the pendulum the mode continues to
+//! oscillate, and its force may release the pendulum.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

@@ -1,8 +1,8 @@
 //! Drag with any power of the velocity, between laminar and turbulent.
 //!
-//! `|v|^n sign v` is `v (v^2 + e^2)^((n - 1)/2)` with `e = 1e-6`, far below what a sensor sees: so
-//! the derivatives by velocity and power are finite at rest too. Powers below 1/2 are refused: they
-//! are dry friction in all but name, too abrupt for steps without events.
+//! `|v|^n sign v` is `v (v^2 + e^2)^((n - 1)/2)` with `e = 1e-6`, far below the resolution of a
+//! sensor: so the derivatives by velocity and power are finite at rest too. Powers below 1/2 are
+//! refused: they are practically dry friction, too abrupt for steps without events.
 
 use super::law::{
     Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Point, Power, Role,

@@ -1,4 +1,4 @@
-//! A rig that leans: gravity pulls at an angle to the line of the drive and to the sensor's zero.
+//! A tilted rig: gravity is at an angle to the line of the drive and to the sensor's zero.
 //!
 //! In a free decay equal to an offset of the encoder: `theta + d` then obeys the equation of `theta`.
 

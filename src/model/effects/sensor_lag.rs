@@ -1,7 +1,9 @@
-//! A sensor that is late: a filter of first order, `tau y' = theta - y`, much quicker than the swing.
+//! A sensor with a delay: a filter of first order, `tau y' = theta - y`, much faster than the
+//! swing.
 //!
-//! The term of first order in `tau` is kept; the next, `tau^2 th''`, is smaller by `tau w0`. A free decay
-//! that is read late equals one that began late: only a drive, which has its own clock, shows the lag.
+//! The term of first order in `tau` is kept; the next, `tau^2 th''`, is smaller by `tau w0`. A free
+//! decay that is read late equals one that began late: only a drive, with its own clock, reveals
+//! the delay.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

@@ -1,4 +1,4 @@
-//! Friction that is greater at rest and falls off as the motion gets under way.
+//! Friction that is greater at rest and decreases with the velocity.
 //!
 //! The Gaussian form of Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30, 1083.
 

@@ -1,7 +1,8 @@
 //! A record whose clock runs fast or slow.
 //!
-//! Its seconds are what all rates are counted in, `w0` and damping too: only the drive, which has a clock
-//! of its own, has another frequency in them. That is an error of the drive's frequency, exactly.
+//! All rates, `w0` and damping included, are in the record's seconds: only the frequency of the
+//! drive, which has its own clock, differs. That is equivalent to an error of the drive's
+//! frequency, exactly.
 
 use super::law::{Action, Definition, Family, Group, Law, MOST_PARAMETERS, Mappable, Parameter, Parameters, Power, Role};
 use crate::lanes::Real;

@@ -5,7 +5,8 @@ use crate::lanes::Real;
 use crate::model::drive::Motion;
 
 impl Equation<f64> {
-    /// The acceleration `th''` at time `tau`, moving in the sense of `velocity` since long.
+    /// The acceleration `th''` at time `tau`, with the sense of `velocity` unchanged for a long
+    /// time.
     #[must_use]
     pub fn acceleration_at(&self, tau: f64, theta: f64, velocity: f64) -> f64 {
         let forcing = self.forcing(tau);
@@ -72,7 +73,7 @@ impl Equation<f64> {
         equation
     }
 
-    /// Whether nothing changes with the drive's phase: the pivot rests.
+    /// Whether nothing changes with the drive's phase: the pivot is at rest.
     #[must_use]
     pub fn is_autonomous(&self) -> bool {
         self.motion.p == 0.0 && !self.asks_for_phase()

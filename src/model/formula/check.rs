@@ -1,4 +1,4 @@
-//! Names and terms of a formula that are refused, with what is allowed.
+//! Checks of a formula's names and terms, with messages that state what is allowed.
 
 use super::tree::{Function, Tree, Variable};
 use super::{Spec, parse, probe};
@@ -112,7 +112,7 @@ pub(super) fn term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> 
     })
 }
 
-/// Marks the parameters that a tree names.
+/// Marks the parameters that occur in a tree.
 fn mark(tree: &Tree, used: &mut [bool]) {
     match tree {
         Tree::Variable(Variable::Parameter(place)) => used[*place] = true,

@@ -1,8 +1,8 @@
-//! An effect that its user writes as a formula: a torque per inertia as text.
+//! An effect defined by its user as a formula: a torque per inertia as text.
 //!
 //! - `check`: names and terms that are refused
 //! - `parse`: from text to a `tree`
-//! - `probe`: what the term does, by its values
+//! - `probe`: properties of the term, by its values
 //! - `program`: the tree as operations over lanes, single numbers and numbers with derivatives
 //!
 //! A term that jumps where the velocity passes zero is dry friction: of `T`, held at either sense of
@@ -30,31 +30,31 @@ use super::effects::{
 use crate::error::Error;
 use crate::lanes::Real;
 
-/// Why a map cannot have a torque that differs from period to period.
+/// Reason for which a map cannot have a torque that differs between periods.
 const NOT_IN_STEP: &str =
     "it does not repeat every period of the drive, and a map takes whole periods";
 
-/// A formula as its user gives it.
+/// A formula as given by its user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spec {
     /// Its name.
     pub name: String,
     /// The torque per inertia, over `theta`, `v`, `phase`, `t`, `w0`, `a` and the parameters.
     pub term: String,
-    /// Which data show it; nothing where that is to follow from the term.
+    /// Data that show it; if not given, they follow from the term.
     pub revealed_by: String,
     /// The parameters, in order.
     pub parameters: Vec<ParameterSpec>,
 }
 
-/// A parameter of a formula as its user gives it.
+/// A parameter of a formula as given by its user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSpec {
     /// Its name.
     pub name: String,
     /// Its power of `w0`.
     pub power: f64,
-    /// The place of the parameter whose value is taken off the power.
+    /// The index of the parameter whose value is subtracted from the power.
     pub less: Option<usize>,
     /// Its unit in SI.
     pub unit: String,
@@ -64,7 +64,7 @@ pub struct ParameterSpec {
     pub typical: [f64; 2],
     /// Its meaning, in words.
     pub meaning: String,
-    /// Its role; by default the one that the term shows.
+    /// Its role; by default inferred from the term.
     pub role: Option<Role>,
 }
 
@@ -85,10 +85,10 @@ pub struct Formula {
     driven: bool,
 }
 
-/// How many formulas are remembered.
+/// Number of formulas in the cache.
 const MOST_RECENT: usize = 64;
 
-/// The formulas read last: a model that comes again is not checked again.
+/// The most recent formulas: a repeated model is not checked again.
 static RECENT: Mutex<VecDeque<(Spec, Arc<Formula>)>> = Mutex::new(VecDeque::new());
 
 impl PartialEq for Formula {
@@ -223,13 +223,13 @@ impl Formula {
         self.loose.as_ref().unwrap_or(self).clone()
     }
 
-    /// All of it, in the sense of the motion that is held.
+    /// Its whole torque, in the sense of the motion that is held.
     #[inline(always)]
     pub fn whole<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         self.program.run(parameters, at)
     }
 
-    /// The magnitude of its friction: half of what it loses where the sense changes.
+    /// The magnitude of its friction: half of its decrease as the sense changes.
     pub fn friction<R: Real>(&self, parameters: &[R; MOST_PARAMETERS], at: &Point<R>) -> R {
         if !self.rubs() {
             return at.constant(0.0);
@@ -271,7 +271,7 @@ impl Formula {
         probe::pulls_back(&self.tree, parameters)
     }
 
-    /// Why a map cannot have it with these parameters.
+    /// Reason for which a map cannot have it with these parameters.
     #[must_use]
     pub fn bars_maps(&self, parameters: &[f64; MOST_PARAMETERS]) -> Option<&'static str> {
         bar(&self.tree, parameters)
@@ -324,7 +324,7 @@ fn is_odd(program: &Program, parameters: &[Parameter]) -> bool {
     })
 }
 
-/// Which route of the kernel runs.
+/// The route through the kernel.
 fn action(tree: &Tree, jumps: bool, only_rubs: bool, loaded: bool) -> Action {
     let mut speeds = false;
     let mut beside = false;

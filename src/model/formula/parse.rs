@@ -9,7 +9,7 @@ use super::tree::{Function, Operator, Tree, Variable};
 const LONGEST: usize = 1000;
 /// The deepest nesting of brackets; what is in one and its sign are a level each.
 const DEEPEST: usize = 60;
-/// The largest tree: `min` and `max` take each of their arguments twice.
+/// The largest tree: `min` and `max` use each of their arguments twice.
 const LARGEST: usize = 4000;
 
 const VARIABLES: [(&str, Variable); 6] = [
@@ -41,7 +41,7 @@ pub fn is_taken(name: &str) -> bool {
     variable || function || name == CONSTANT || OF_TWO.contains(&name)
 }
 
-/// The tree of `text`, in which the names `parameters` are known besides.
+/// The tree of `text`, with `parameters` as further names.
 ///
 /// # Errors
 /// A message: the error, its place (in characters from 1), and the text expected there.

@@ -1,15 +1,15 @@
-//! Properties of a term, found by evaluating it: whether its units balance, whether it jumps at rest,
-//! repeats every turn, keeps mirror images.
+//! Properties of a term, found by evaluating it: balance of units, jumps at rest, periodicity in
+//! the angle, symmetry.
 //!
-//! Terms are made of analytic functions, so that an identity which holds at several places drawn
-//! without pattern holds everywhere.
+//! Terms are made of analytic functions, so that an identity which holds at several arbitrary
+//! points holds everywhere.
 
 use std::f64::consts::TAU;
 
 use super::tree::{Place, Tree};
 use crate::model::effects::{Parameter, Power, Role};
 
-/// A place, where none matters.
+/// An arbitrary point, for values that do not depend on it.
 pub const NOWHERE: Place = Place {
     theta: 0.0,
     velocity: 0.0,
@@ -20,19 +20,19 @@ pub const NOWHERE: Place = Place {
     pivot: 0.0,
 };
 
-/// Values count as equal within this part of them.
+/// Relative difference within which values are equal.
 const CLOSE: f64 = 1e-9;
-/// The unit of time is changed by this much to see whether units balance.
+/// Change of the unit of time that tests the balance of units.
 const UNIT: f64 = 1.37;
-/// An angle that many turns lead to.
+/// An angle many turns away.
 const FAR: f64 = 1e6;
-/// Where in their typical ranges parameters are tried.
+/// Positions in their typical ranges at which parameters are tested.
 const PARTS: [f64; 3] = [0.23, 0.51, 0.87];
 
-/// Places all over the plane, and times.
+/// Points all over the plane, and times.
 fn places() -> impl Iterator<Item = Place> {
     (0..12).map(|k| {
-        // Multiples of irrational numbers: as good as drawn.
+        // Multiples of irrational numbers, as good as random.
         let part = |step: f64| (f64::from(k) * step + 0.37).fract();
         let velocity = 5.0 * part(0.414_213_562) - 2.5;
         Place {
@@ -59,14 +59,14 @@ fn alike(a: f64, b: f64) -> bool {
     (a - b).abs() <= CLOSE * (a.abs() + b.abs()) + f64::MIN_POSITIVE
 }
 
-/// Whether `other` is what the term is, wherever it is looked at.
+/// Whether `other` equals the term at all test points.
 fn always(term: &Tree, values: &[f64], other: impl Fn(&Place) -> f64) -> bool {
-    // Against the size of the term, which may pass zero.
+    // Relative to the size of the term, which may pass zero.
     let size = places().map(|at| term.value(values, &at).abs()).fold(0.0, f64::max);
     places().all(|at| (term.value(values, &at) - other(&at)).abs() <= CLOSE * size)
 }
 
-/// Whether the term is the same one turn on.
+/// Whether the term is periodic in the angle.
 pub fn repeats_every_turn(term: &Tree, values: &[f64]) -> bool {
     always(term, values, |at| term.value(values, &Place { theta: at.theta + TAU, ..*at }))
 }
@@ -77,12 +77,12 @@ pub fn pulls_back(term: &Tree, values: &[f64]) -> bool {
     places().all(|at| [-FAR, FAR].iter().all(|theta| pull(*theta, at) < -1.0))
 }
 
-/// Whether the term is the same one period of the drive on.
+/// Whether the term is periodic with the drive.
 pub fn repeats_every_period(term: &Tree, values: &[f64]) -> bool {
     always(term, values, |at| term.value(values, &Place { phase: at.phase + TAU, ..*at }))
 }
 
-/// Whether the mirrored motion is pushed the other way so much of the drive's phase later.
+/// Whether the term is antisymmetric under reflection and this shift of the drive's phase.
 pub fn mirrors(term: &Tree, values: &[f64], later: f64) -> bool {
     always(term, values, |at| {
         let (theta, velocity, sense) = (-at.theta, -at.velocity, -at.sense);
@@ -141,7 +141,7 @@ pub fn role(term: &Tree, parameters: &[Parameter], place: usize) -> Role {
     }
 }
 
-/// A place at which the term is no number.
+/// A point at which the term is not a number.
 pub fn gap(term: &Tree, parameters: &[Parameter]) -> Option<(Place, Vec<f64>)> {
     let still = places().map(|at| Place { velocity: 0.0, ..at });
     let bottom = places().map(|at| Place { theta: 0.0, ..at });

@@ -18,10 +18,10 @@ pub const SLOTS: usize = 8;
 /// derivatives are finite where `x` is 0, as for the power laws of the library.
 const FLOOR: f64 = 1e-12;
 
-/// How absolute values and signs are taken.
+/// Treatment of absolute values and signs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinks<'a> {
-    /// The argument whose sign is [`Point::side`]; others are looked at where they stand.
+    /// The argument whose sign is [`Point::side`]; others are evaluated at each point.
     pub corner: Option<&'a Tree>,
     /// Whether the sign of the velocity passes steeply, not abruptly, through zero: where its jump
     /// at rest is nothing.
@@ -52,7 +52,7 @@ enum Operation {
     Sign,
 }
 
-/// Where an operand is.
+/// Location of an operand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Source {
     Theta,
@@ -84,7 +84,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// The program of a tree; none where it takes more than [`SLOTS`] intermediate values.
+    /// The program of a tree; none if it needs more than [`SLOTS`] intermediate values.
     pub fn new(tree: &Tree, kinks: Kinks<'_>) -> Option<Self> {
         let build = |shares: bool| {
             let mut builder = Builder { kinks, steps: Vec::new(), shares };
@@ -109,7 +109,7 @@ impl Program {
     }
 }
 
-/// A program under way.
+/// A program under construction.
 struct Running<'a, R> {
     program: &'a Program,
     parameters: &'a [R; MOST_PARAMETERS],
@@ -188,7 +188,7 @@ fn whole_power<R: Real>(x: R, power: i32) -> R {
     product
 }
 
-/// A number, or where one is.
+/// A number, or its location.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Value {
     Number(f64),
@@ -401,10 +401,10 @@ impl Builder<'_> {
         self.joined(Operator::Power, of, exponent)
     }
 
-    /// The program, each result in a slot that nothing later needs.
+    /// The program, with each result in a slot that is free from then on.
     fn allocated(self, result: usize) -> Option<Program> {
         let steps = &self.steps;
-        // From the last one back: what nothing uses is left out.
+        // From the last one back: unused results are left out.
         let mut last_use = vec![0; steps.len()];
         last_use[result] = steps.len();
         for (k, step) in steps.iter().enumerate().rev() {
@@ -436,7 +436,7 @@ impl Builder<'_> {
     }
 }
 
-/// How many intermediate values a tree takes.
+/// Number of intermediate values of a tree.
 fn need(tree: &Tree) -> usize {
     match tree {
         Tree::Number(_) | Tree::Variable(_) => 0,

@@ -1,4 +1,4 @@
-//! A term as a tree: what it depends on, its value, and what replaces kinks.
+//! A term as a tree: its dependences, its value, and the replacement of kinks.
 
 /// The variables of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,14 +70,14 @@ pub enum Tree {
     Join(Operator, Box<Self>, Box<Self>),
 }
 
-/// Where a term has a value.
+/// A point at which a term is evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// Angle, rad.
     pub theta: f64,
     /// Velocity.
     pub velocity: f64,
-    /// The sign of the velocity where that is 0.
+    /// The sign of the velocity, used if it is 0.
     pub sense: f64,
     /// Phase of the drive, rad.
     pub phase: f64,
@@ -122,7 +122,7 @@ impl Tree {
         }
     }
 
-    /// Whether it names what `is` says.
+    /// Whether it contains a name for which `is` holds.
     pub fn names(&self, is: fn(Variable) -> bool) -> bool {
         match self {
             Self::Number(_) => false,
@@ -137,7 +137,8 @@ impl Tree {
         self.names(|variable| !matches!(variable, Variable::Parameter(_) | Variable::Frequency))
     }
 
-    /// Whether it names the velocity elsewhere than as all of an absolute value or a sign.
+    /// Whether it contains the velocity other than as the whole argument of an absolute value or a
+    /// sign.
     pub fn names_velocity_plainly(&self) -> bool {
         match self {
             Self::Number(_) => false,

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: branches, sweeps, figures, files, the command; physics is in Rust's."""
+"""Bifurcation diagrams: branches, sweeps, figures, files, command; Rust tests cover the physics."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_branches_end_where_their_orbits_do(diagram: xr.Dataset, truths: dict[st
     first = diagram["branch_first"].values[doubled].min()
     assert abs(first - float(known["rot_PD1"]["p"])) < step
     twins = np.flatnonzero(kinds == "oscillation period 2")
-    assert len(twins) == 2  # one goes on through the symmetry breaking, its twin begins there
+    assert len(twins) == 2  # one continues through the symmetry breaking, its twin begins there
     begun = np.sort(diagram["branch_first"].values[twins])
     assert abs(begun[1] - float(known["osc_SB"]["p"])) < step
 
@@ -106,7 +106,7 @@ def test_the_recording(diagram: xr.Dataset, tmp_path: Path) -> None:
     assert {"/bifurcation/data/0/points", "/exponent/data/0/points", "/legend"} <= back.static
 
 
-def test_it_comes_back_from_its_file(diagram: xr.Dataset, tmp_path: Path) -> None:
+def test_a_diagram_is_read_back_from_its_file(diagram: xr.Dataset, tmp_path: Path) -> None:
     back = pendmap.load(pendmap.save(diagram, tmp_path / "b.nc"))
     assert back.equals(diagram)
     assert render.draw(back, tmp_path / "b.svg").stat().st_size > 0
@@ -140,7 +140,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
         assert wanted in refused.stderr
 
 
-def test_chaos_is_named_however_rare(diagram: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chaos_in_few_cells_is_named(diagram: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     count = [one.points[:, 0] for one in drawn.families(diagram) if "chaos" in one.name]
     assert min(np.unique(values).size for values in count) < 12
     monkeypatch.setattr(drawn, "MOST", 4)
@@ -153,8 +153,8 @@ def test_chaos_is_named_however_rare(diagram: xr.Dataset, monkeypatch: pytest.Mo
     assert all(one.colour == palette.UNNAMED for one in every[drawn.MOST :])
 
 
-def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_known() -> None:
-    # Rest at asin(torque) is there up to torque = 1; the sweep down runs until damping stops it.
+def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_found() -> None:
+    # Rest at asin(torque) exists up to torque = 1; the sweep down runs until damping stops it.
     found = pendmap.bifurcation(Pendulum(p=0.0), {"torque": (0.0, 1.19, 25)})
     torque = found["torque"].values
     kinds = found["kind"].values[found["entry_kind"].values]
@@ -163,7 +163,7 @@ def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_kn
     rest = found["entry_theta"].values[kinds == "rest"]
     assert np.allclose(rest, np.arcsin(torque[cells[kinds == "rest"]]), atol=1e-9)
     up, down = (found[sweep].values for sweep in ("up", "down"))
-    # The last step is too wide for it.
+    # The last step is too large to follow it.
     assert (kinds[up[torque < 0.95]] == "rest").all()
     assert (kinds[down[torque > 0.2]] == "rotation 1:1").all()
     assert (kinds[down[torque < 0.1]] == "rest").all()

@@ -1,4 +1,4 @@
-"""Models drawn from a covariance, and basins over them, against what is known of both."""
+"""Models drawn from a covariance, and basins over them, against known distributions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SEED = 3
 
 
 def noted(names: Sequence[str], matrix: Any, **more: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Notes with a covariance, as a model file has them."""
+    """Return notes with a covariance, as in a model file."""
     return {"covariance": {"names": [*names], "matrix": np.asarray(matrix).tolist(), **more}}
 
 
@@ -98,7 +98,7 @@ def test_typed_parameters_are_not_drawn(tmp_path: Any) -> None:  # noqa: ANN401
 
 
 def boundary(gamma: float, torque: float, velocity: float) -> float:
-    """The angle at which starts with this velocity begin to turn for ever, by scipy."""
+    """Return the angle at which starts with this velocity begin to rotate for ever, by scipy."""
 
     def turns(theta: float) -> float:
         def equation(_: float, state: np.ndarray) -> list[float]:
@@ -110,8 +110,8 @@ def boundary(gamma: float, torque: float, velocity: float) -> float:
     return float(brentq(turns, 1.0, 2.7, xtol=1e-9))
 
 
-def test_a_boundary_that_moves_with_a_parameter_makes_its_distribution_function() -> None:
-    """A tilt by d moves the plane of an undriven pendulum by -d, and the boundary with it."""
+def test_a_boundary_that_shifts_with_a_normal_parameter_has_a_normal_distribution() -> None:
+    """A tilt by d shifts the plane of an undriven pendulum, and the boundary in it, by -d."""
     gamma, torque, velocity, sigma, count = 0.3, 0.6, 0.4, 0.04, 60
     edge = boundary(gamma, torque, velocity)
     tilt = Effect("rig_tilt", {"d": 0.0})
@@ -124,16 +124,16 @@ def test_a_boundary_that_moves_with_a_parameter_makes_its_distribution_function(
     assert names == ["rest", "rotation 1:+1"]
     rests = result.probability.values[0, 0]
     theta, tilts = result.theta.values, result.drawn.values[:, 0]
-    # Draw by draw.
+    # For each draw:
     exact = np.array([(x + tilts < edge).mean() for x in theta])
     near = np.abs(theta[:, None] + tilts - edge).min(axis=1) < 1e-5
     assert np.array_equal(rests[~near], exact[~near].astype(np.float32))
-    # The law: the normal distribution function, within four standard errors.
+    # The normal distribution function, within four standard errors.
     law = norm.cdf((edge - theta) / sigma)
     assert np.abs(rests - law).max() < 4 * 0.5 / math.sqrt(count)
     assert np.abs(rests - law).max() > 0
     assert result.certainty.values[0] == pytest.approx(np.maximum(rests, 1 - rests))
-    # The share is the boundary's place over the window: its interval is slope times standard error.
+    # The share is the boundary's position over the window; its interval is slope times stderr.
     low, high = float(result.share_low[0]), float(result.share_high[0])
     assert high - low == pytest.approx(2 * 1.96 * sigma / (2 * half), rel=0.25)
     assert float(result.share_mean[0]) == pytest.approx(0.5, abs=4 * sigma / 0.4 / math.sqrt(60))
@@ -141,7 +141,7 @@ def test_a_boundary_that_moves_with_a_parameter_makes_its_distribution_function(
 
 
 def painted(label: np.ndarray, names: Sequence[str]) -> xr.Dataset:
-    """A map with these labels."""
+    """Return a map with the given labels."""
     rows, columns = label.shape
     count = len(names)
     return xr.Dataset(
@@ -170,7 +170,7 @@ def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
     return basins_over(maps[0], draws, lambda model, **_: own[model], None)
 
 
-def test_fractal_boundaries_and_parameters_cause_separate_doubt() -> None:
+def test_doubt_from_fractal_boundaries_and_from_parameters_is_separate() -> None:
     random = np.random.default_rng(SEED)
     still = np.where(np.arange(50) < 23, 1, 2)[None].repeat(50, axis=0)
     names = ["rest", "rotation 1:+1"]
@@ -181,12 +181,12 @@ def test_fractal_boundaries_and_parameters_cause_separate_doubt() -> None:
     assert fixed.attrs["doubt_parameters"] == pytest.approx(0, abs=1e-12)
     assert fixed.attrs["sure_cells"] == 1
     assert float(fixed.label_entropy.max()) == 0
-    # All starts end alike, here or there as the draw says.
+    # All starts of a draw end on one attractor; the draw decides which.
     flips = gathered([painted(np.full((50, 50), 1 + k % 2), names) for k in range(8)])
     assert flips.attrs["doubt_start"] == 0
     assert flips.attrs["doubt_parameters"] == pytest.approx(math.log(2))
     assert flips.label_entropy.values == pytest.approx(math.log(2))
-    # Every cell changes from draw to draw, and from cell to cell: a draw tells nothing of a box.
+    # Every cell varies between draws and between cells: a draw does not determine a box's labels.
     mixed = [random.integers(1, 3, (50, 50)) for _ in range(200)]
     fractal = gathered([painted(label, names) for label in mixed])
     each = np.mean([pendmap.basin_entropy(label).value for label in mixed])
@@ -195,7 +195,7 @@ def test_fractal_boundaries_and_parameters_cause_separate_doubt() -> None:
     assert fractal.attrs["sure_cells"] == 0
 
 
-def test_attractors_are_found_again_by_name_whatever_their_numbers() -> None:
+def test_attractors_of_draws_are_matched_by_name_and_not_by_number() -> None:
     left = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
     one = painted(left, ["rest", "rotation 1:+1"])
     other = painted(3 - left, ["rotation 1:+1", "oscillation 2:0"])
@@ -207,7 +207,7 @@ def test_attractors_are_found_again_by_name_whatever_their_numbers() -> None:
     assert found.probability.values.sum(axis=0) == pytest.approx(1)
 
 
-def test_two_attractors_of_one_name_are_told_apart_by_their_places() -> None:
+def test_two_attractors_of_one_name_are_distinguished_by_position() -> None:
     label = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
     names = ["oscillation 2:0 at +0.1000", "oscillation 2:0 at +0.9000"]
     own = painted(label, names)

@@ -38,13 +38,13 @@ noise = 0.001
 
 
 def damped(p: float, spread: float) -> Pendulum:
-    """A driven pendulum whose damping is known to a spread."""
+    """Return a driven pendulum whose damping has the given standard error."""
     notes = {"covariance": {"names": ["gamma"], "matrix": [[spread**2]]}}
     return Pendulum(gamma=0.1, p=p, omega=2.0, notes=notes)
 
 
 def growth(gamma: float, p: float, omega: float = 2.0) -> float:
-    """The largest multiplier of hanging rest, in size, by scipy."""
+    """Return the largest modulus of the multipliers of hanging rest, by scipy."""
 
     def equation(tau: float, x: np.ndarray) -> list[float]:
         pull = 1 + p * math.cos(omega * tau)
@@ -56,8 +56,8 @@ def growth(gamma: float, p: float, omega: float = 2.0) -> float:
     return float(np.abs(np.linalg.eigvals(run.y[:, -1].reshape(2, 2))).max())
 
 
-def test_the_probability_of_a_regime_is_the_share_of_the_draws_that_have_it() -> None:
-    """Hanging rest attracts where its multipliers, by scipy, lie within the unit circle."""
+def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
+    """Hanging rest attracts if its multipliers, by scipy, lie within the unit circle."""
     model = damped(0.2, 0.02)
     ranges = {"p": (0.14, 0.26, 7), "omega": (2.0, 2.0, 1)}
     result = pendmap.parameter_map(model, ranges, draws=16, seed=SEED)
@@ -90,19 +90,19 @@ def test_orbits_over_draws_have_the_multipliers_of_each_draw() -> None:
     assert result.multipliers_spread.values[rest, :, 0] == pytest.approx(spread, rel=1e-6)
 
 
-def test_an_orbit_is_missing_where_a_draw_lies_beyond_its_fold() -> None:
-    """Above p = 0.2 the oscillation of period 2 is there; below its birth nothing is."""
+def test_an_orbit_is_missing_for_draws_beyond_its_bifurcation() -> None:
+    """The oscillation of period 2 exists only if rest is unstable, here above p = 0.2."""
     result = pendmap.orbit(damped(0.21, 0.02), 2, 0, draws=20, seed=SEED)
     assert result.sizes["orbit"] == 1
     gammas = result.drawn.values[:, 0]
-    # At omega = 2 rest is left toward larger p: the oscillation is there where rest is unstable.
+    # At omega = 2 rest loses stability toward larger p: the oscillation exists if rest is unstable.
     there = np.array([growth(g, 0.21) > 1 for g in gammas])
     assert 0 < there.mean() < 1
     assert float(result.exists[0]) == pytest.approx(there.mean())
     assert np.array_equal(np.isfinite(result.drawn_theta.values[0]), there)
 
 
-def test_the_band_of_a_critical_curve_is_that_of_the_draws() -> None:
+def test_the_band_of_a_critical_curve_has_the_quantiles_of_the_draws() -> None:
     result = pendmap.tongues(damped(0.2, 0.02), [1.9, 2.0, 2.2], 1.0, draws=12, seed=SEED)
     gammas = result.drawn.values[:, 0]
     k = int(np.flatnonzero(result.critical_omega.values == 2.0)[0])
@@ -206,7 +206,7 @@ def test_a_record_counts_as_missed_from_one_and_a_half_times_the_noise() -> None
         assert ("misses its record" in run.attrs["summary"]) == (said is not None)
 
 
-def test_identify_writes_what_its_model_leaves_and_the_noise(tmp_path: Path) -> None:
+def test_identify_writes_the_residual_of_its_model_and_the_noise(tmp_path: Path) -> None:
     assert "rms" not in provenance({}, "")
     assert provenance({}, "", rms=2.0, noise=1.0).items() >= {"rms": 2.0, "noise": 1.0}.items()
     time = np.arange(0, 40, 0.01)

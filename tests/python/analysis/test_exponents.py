@@ -1,4 +1,4 @@
-"""Lyapunov exponents: against reference values and scipy, in files, figures and recordings."""
+"""Lyapunov exponents against reference values and scipy; in files, figures and recordings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def chaos() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def settled() -> xr.Dataset:
-    """A start that is chaotic for some time."""
+    """Return a start that is chaotic for some time."""
     return pendmap.lyapunov(Pendulum(gamma=0.1, p=1.8, omega=2.0), 0.6, 0.2)
 
 
@@ -52,7 +52,7 @@ def test_the_error_is_that_of_independent_trajectories(chaos: xr.Dataset) -> Non
     each = chaos["finite_time_exponent"].values.mean(axis=1)
     assert chaos.attrs["exponent"] == pytest.approx(each.mean(), rel=1e-9)
     assert chaos.attrs["stderr"] == pytest.approx(each.std(ddof=1) / math.sqrt(each.size))
-    # Blocks of a trajectory scatter as independent ones would: nothing remembers for so long.
+    # Blocks of one trajectory scatter as independent ones: correlations are shorter than a block.
     blocks = chaos["finite_time_exponent"].values[:, :200].reshape(each.size, 10, -1).mean(axis=2)
     within = blocks.std(axis=1, ddof=1).mean() / math.sqrt(10)
     assert within == pytest.approx(blocks.mean(axis=1).std(ddof=1), rel=0.25)
@@ -80,7 +80,9 @@ def test_growth_along_the_start_is_the_tangents_of_scipy(settled: xr.Dataset) ->
     assert np.allclose(settled["growth"].values[: periods + 1], expected, atol=2e-3)
 
 
-def test_transient_chaos_has_the_exponent_of_what_captures_it(settled: xr.Dataset) -> None:
+def test_transient_chaos_has_the_exponent_of_the_attractor_that_captures_it(
+    settled: xr.Dataset,
+) -> None:
     a = settled.attrs
     assert a["end"] == "captured"
     assert a["transient_periods"] > 30
@@ -96,7 +98,7 @@ def test_the_transient_agrees_with_the_growth_of_its_trajectory(settled: xr.Data
     a, growth = settled.attrs, settled["growth"].values
     at = a["transient_periods"]
     assert growth.size == at + 101
-    # From the capture on deviations shrink at the attractor's own rate; before it they grow.
+    # After the capture deviations shrink at the attractor's rate; before it they grow.
     assert (growth[-1] - growth[at + 16]) / 84 == pytest.approx(a["per_period"], abs=0.05)
     assert growth[at] > growth[: at // 2].max() > 10
     near = pendmap.lyapunov(Pendulum(p=0.6), 0.3, 0.0)
@@ -104,7 +106,7 @@ def test_the_transient_agrees_with_the_growth_of_its_trajectory(settled: xr.Data
 
 
 def test_regular_motion_without_damping_has_the_growth_of_tau_and_no_error() -> None:
-    # A free pendulum: neighbours part in proportion to time.
+    # In a free pendulum the distance of neighbours grows in proportion to time.
     a = pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 2.0).attrs
     assert a["exponent"] == pytest.approx(a["regular"], rel=0.1)
     assert math.isnan(a["stderr"])
@@ -144,7 +146,7 @@ def test_a_cycle_with_turns_under_friction_has_the_sum_of_its_turns() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.0, omega=0.87, theta_r=0.01))
     a = found.attrs
     assert str(found["kind"].values[0]) == "oscillation"
-    # Each turn shrinks phase area on top of what viscous damping does.
+    # Each turning point shrinks phase area in addition to viscous damping.
     assert -0.12 < a["exponent_sum"] < -0.101
 
 
@@ -237,7 +239,7 @@ def test_files_hold_the_result(chaos: xr.Dataset, settled: xr.Dataset, tmp_path:
 
 
 def test_a_model_in_si_with_an_effect_has_a_figure(tmp_path: Path) -> None:
-    """Its parameters are long: on two lines."""
+    """The title of a model with long parameters is on two lines."""
     drag = Effect("quadratic_drag", {"q": 0.01})
     rig = Rig(w0=6.2, c_over_m=0.05, Tr=0.08, p=0.29, Omega=11.9381, effects=(drag,))
     found = pendmap.lyapunov(rig, 1.0, 0.0)

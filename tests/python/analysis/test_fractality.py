@@ -1,4 +1,4 @@
-"""Basin entropies and uncertainty exponents of planes and maps whose values are known."""
+"""Basin entropies and uncertainty exponents of planes and maps with known values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def entropy(part: float) -> float:
 
 
 def test_a_vertical_line_leaves_known_shares_in_its_boxes() -> None:
-    """A boundary after k columns of a box: S = H(k / 5) in each of 20 boxes of 400."""
+    """For a boundary after k columns of a box, S = H(k / 5) in each of 20 boxes of 400."""
     for k in range(5):
         labels = np.where(np.arange(100) < 50 + k, 1, 2)[None, :].repeat(100, axis=0)
         found = pendmap.basin_entropy(labels)
@@ -39,7 +39,7 @@ def test_a_vertical_line_leaves_known_shares_in_its_boxes() -> None:
 
 
 def test_a_diagonal_has_the_entropy_of_its_triangles() -> None:
-    """Cells on and below the diagonal of a box: 15 of 25; all other boxes are whole."""
+    """Of a diagonal box 15 of 25 cells are on or below the diagonal; other boxes have one label."""
     found = pendmap.basin_entropy(np.tri(200, dtype=int) + 1)
     assert (found.boxes, found.boundary_boxes) == (1600, 40)
     assert found.boundary == pytest.approx(entropy(15 / 25), abs=1e-12)
@@ -47,7 +47,7 @@ def test_a_diagonal_has_the_entropy_of_its_triangles() -> None:
 
 
 def test_random_labels_have_the_logarithm_of_their_number() -> None:
-    """Up to what 25 cells a box make of it: the mean over all ways to fill a box."""
+    """The expected value is the mean entropy over all labellings of a box of 25 cells."""
     for labels in (2, 3):
         counts = [c for c in itertools.product(range(26), repeat=labels - 1) if sum(c) <= 25]
         expected = 0.0
@@ -73,7 +73,7 @@ def test_unknown_ends_and_broken_boxes_are_left_out() -> None:
     holes[10:25, 20:40] = 0
     holes[0, 0] = -1
     assert pendmap.basin_entropy(holes).boxes == whole.boxes - 12
-    # A box of one basin with holes stays a box of one basin.
+    # A box with one basin and failed cells is a box of one basin.
     assert pendmap.basin_entropy(np.array([[3, 0, 3], [-1, 3, 3]])).boundary_boxes == 0
     assert pendmap.basin_entropy(labels * 1000) == whole
 
@@ -98,7 +98,7 @@ PLANES = {
 
 @pytest.mark.parametrize("which", PLANES)
 def test_the_interval_of_a_grid_holds_the_known_exponent(which: str) -> None:
-    """In 40 places each: fewer than 34 are one chance in 700 for an interval of 95 %."""
+    """Of 40 intervals of 95 %, fewer than 34 contain the true value with probability 1/700."""
     make, known = PLANES[which]
     found = [pendmap.uncertainty_exponent(make(300, seed)) for seed in range(40)]
     held = sum(f.ci95[0] <= known <= f.ci95[1] for f in found)
@@ -108,7 +108,7 @@ def test_the_interval_of_a_grid_holds_the_known_exponent(which: str) -> None:
     assert found[0].dimension == 2 - found[0].value
 
 
-def test_the_fit_of_binomial_counts_has_intervals_that_hold() -> None:
+def test_intervals_of_the_fit_to_binomial_counts_have_their_coverage() -> None:
     rng = np.random.default_rng(8)
     eps, tried = 2.0 ** -np.arange(4, 20), np.full(16, 1500)
     for alpha, share in ((1.0, 0.3), (0.37, 0.5), (0.05, 0.7)):
@@ -124,7 +124,7 @@ def test_the_fit_of_binomial_counts_has_intervals_that_hold() -> None:
         assert np.mean([run.stderr for run in known]) == pytest.approx(scatter, rel=0.25)
 
 
-def test_a_law_that_ends_is_fitted_below_its_end() -> None:
+def test_a_power_law_with_a_cutoff_is_fitted_below_the_cutoff() -> None:
     eps, tried = 2.0 ** -np.arange(2, 20), np.full(18, 100_000)
     share = np.minimum(0.4 * (eps / 2**-6) ** 0.5, 0.4)
     found = fitted(eps, np.round(share * tried), tried)
@@ -139,8 +139,8 @@ def test_without_a_boundary_there_is_no_exponent() -> None:
     assert fitted([0.1, 0.01], [5, 2], [100, 100]) is None
 
 
-def test_a_row_beyond_the_last_is_the_first_where_angles_are() -> None:
-    """Two halves: where the axis is periodic they meet twice."""
+def test_a_periodic_axis_continues_at_its_other_end() -> None:
+    """Of two halves, there are two boundaries on a periodic axis and one on an open axis."""
     labels = np.where(np.arange(200) < 100, 1, 2)[:, None].repeat(200, axis=1)
     open_, closed = (
         pendmap.uncertainty_exponent(labels, periodic=(way, False)) for way in (False, True)
@@ -151,7 +151,7 @@ def test_a_row_beyond_the_last_is_the_first_where_angles_are() -> None:
 
 
 def test_below_the_homoclinic_tangency_the_boundary_is_smooth_and_above_fractal() -> None:
-    """p_M = 0.787 at gamma = 0.1, omega = 3 (Melnikov): dimension 1 below, above 1 above it."""
+    """The Melnikov threshold at gamma = 0.1, omega = 3 is 0.787: dimension 1 below, more above."""
     threshold = 4 * 0.1 * math.sinh(math.pi * 3 / 2) / (math.pi * 9)
     below, above = (pendmap.basins(Pendulum(p=p, omega=3.0), Grid.square(600)) for p in (0.7, 1.2))
     assert 0.7 < threshold < 1.2
@@ -163,7 +163,7 @@ def test_below_the_homoclinic_tangency_the_boundary_is_smooth_and_above_fractal(
     fractal = pendmap.uncertainty_exponent(above)
     assert fractal.ci95[1] < 0.3
     assert fractal.ci95[0] > 0.05
-    # Two ways that share no start: anew for each distance, and the grid's own labels.
+    # Two estimates without a common start: new starts for each distance, and the grid's labels.
     grid = pendmap.uncertainty_exponent(above.label.values, periodic=(False, True))
     assert abs(grid.value - fractal.value) < 3 * math.hypot(grid.stderr, fractal.stderr)
 

@@ -22,7 +22,7 @@ STEP = 0.05
 
 
 class Happening(NamedTuple):
-    """A turn, a stick or a release."""
+    """A turning point, a stick or a release."""
 
     time: float
     kind: str
@@ -34,7 +34,7 @@ def load(x: Pendulum, time: float, theta: float) -> float:
 
 
 def released(x: Pendulum, time: float, theta: float) -> tuple[float, float] | None:
-    """When a stuck pendulum moves, and in which sense: the first zero on a fine grid."""
+    """Return when and in which sense a stuck pendulum moves: the first zero on a fine grid."""
     grid = np.arange(time, min(UNTIL, time + x.period) + 1e-3, 1e-3)
     loads = np.array([load(x, t, theta) for t in grid])
     moving = np.flatnonzero(np.abs(loads) > x.theta_r)
@@ -47,7 +47,7 @@ def released(x: Pendulum, time: float, theta: float) -> tuple[float, float] | No
 
 
 def scipy_run(x: Pendulum, theta: float, velocity: float) -> tuple[list[Happening], list[float]]:
-    """Integrate piece by piece, the sign of the velocity held in each."""
+    """Integrate between events, with the sign of the velocity held fixed in each piece."""
     happened: list[Happening] = []
     time, state, sense = 0.0, [theta, velocity], math.copysign(1, velocity)
     while time < UNTIL:
@@ -116,7 +116,7 @@ def test_random_frictions_against_scipy(pendulum: Pendulum, theta: float, veloci
         assert found.pop()[:2] == (found[-1][0], "stuck for ever")
         assert run.attrs["stuck"] == 1
     assert [kind for _, kind, _ in found] == [event.kind for event in expected]
-    # Starts near a saddle amplify what either leaves.
+    # Near a saddle the motion amplifies the error of either integrator.
     for (time, _, angle), event in zip(found, expected, strict=True):
         assert time == pytest.approx(event.time, abs=1e-7)
         assert angle == pytest.approx(event.theta, abs=1e-8)
@@ -137,15 +137,15 @@ def test_events_are_stored(tmp_path: Path) -> None:
     assert free.attrs["stuck"] == 0
 
 
-def test_the_same_with_friction_as_without_it_where_nothing_turns() -> None:
-    """Friction alone, without a turn, acts as a torque against the motion."""
+def test_friction_without_a_turning_point_is_a_constant_torque() -> None:
+    """Without a turning point friction is a constant torque against the motion."""
     rubbing = pendmap.simulate(Pendulum(theta_r=0.05), 0, 7, 5, tol=1e-12)
     pushed = pendmap.simulate(Pendulum(torque=-0.05), 0, 7, 5, tol=1e-12)
     assert (rubbing.velocity.values > 0).all()
     assert rubbing.theta.values == pytest.approx(pushed.theta.values, abs=1e-12)
 
 
-def test_what_is_held_for_ever_has_no_exponent() -> None:
+def test_a_pendulum_held_for_ever_has_no_exponent() -> None:
     run = pendmap.simulate(
         pendmap.Pendulum(p=1.5, omega=0.87, theta_r=0.2), 1.0, 0.0, 100.0, lyapunov=True
     )
@@ -153,7 +153,7 @@ def test_what_is_held_for_ever_has_no_exponent() -> None:
     assert "exponent" not in run.attrs
 
 
-def test_a_motion_that_an_effect_feeds_is_refused_in_one_line() -> None:
+def test_a_motion_that_an_effect_drives_to_infinity_is_refused_in_one_line() -> None:
     fed = pendmap.Pendulum(effects=(pendmap.Effect("quadratic_drag", {"q": -1.0}),))
     with pytest.raises(pendmap.InputError, match="leaves the range of numbers"):
         pendmap.simulate(fed, 1.0, 2.0, 30.0)

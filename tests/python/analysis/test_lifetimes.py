@@ -1,4 +1,4 @@
-"""Lifetimes of transient chaos: the statistics on drawn times, reference values, files, figures."""
+"""Lifetimes of transient chaos: statistics of drawn times, reference values, files, figures."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ BOUND = 4000
 
 
 def drawn(seed: int, mean: float, count: int = 20_000) -> Any:  # noqa: ANN401
-    """Whole times of an exponential tail after a settling that is not exponential."""
+    """Draw whole times with an exponential tail after a non-exponential settling."""
     draw = np.random.default_rng(seed)
     return np.ceil(draw.exponential(mean, count) + draw.gamma(4.0, mean / 40, count)).astype(int)
 
 
 def test_the_mean_of_drawn_times_is_found_and_its_error_holds() -> None:
     off = []
-    exact = 1 / (1 - math.exp(-1 / 60))  # of whole periods
+    exact = 1 / (1 - math.exp(-1 / 60))  # for whole periods
     for seed in range(40):
         times = drawn(seed, 60.0)
         tail = survival.begin(times, 0, BOUND)
@@ -62,7 +62,7 @@ def test_other_distributions_are_rejected(seed: int) -> None:
     for times in (draw.uniform(0, 300, 20_000), 50 * draw.weibull(2.0, 20_000)):
         whole = np.ceil(times).astype(int)
         assert not survival.tail(whole, 0, BOUND, 5).is_exponential
-    # Both tests call chance what is chance, about one time in ten.
+    # Each of both tests rejects exponential times with probability about one tenth.
     called = [
         survival.tail(np.ceil(draw.exponential(80.0, 2000)).astype(int), 0, BOUND, 0)
         for _ in range(60)
@@ -133,12 +133,12 @@ def test_chaos_that_persists() -> None:
     assert (a["persistent"], a["captured"]) == (1, 0)
     assert a["exponent"] == pytest.approx(0.1454, abs=0.003)
     assert a["summary"].startswith("Persistent: tumbling chaos")
-    # Two chaotic attractors, one the mirror image of the other, and nothing else.
+    # The only attractors are two chaotic ones, mirror images of one another.
     pair = pendmap.lifetime(Pendulum(p=1.808), starts=1000)
     assert (pair.attrs["persistent"], pair.sizes["attractor"]) == (1, 2)
     assert "rotating chaos -" in pair.attrs["summary"]
     assert made(pair).axes
-    # Beside other attractors the starts that end on it are left out.
+    # If there are other attractors, the starts that end on the chaotic one are left out.
     beside = pendmap.lifetime(Pendulum(p=1.52, omega=1.1), starts=4000).attrs
     assert beside["persistent"] == 0
     assert 0.02 < beside["chaotic_share"] < 0.06
@@ -162,7 +162,7 @@ def test_in_si_the_time_is_in_seconds() -> None:
     bare = pendmap.lifetime(Pendulum(gamma=0.1, p=1.2, omega=2.0), starts=4000).attrs
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.2, Omega=10.0)
     si = pendmap.lifetime(rig, starts=4000).attrs
-    # One in a thousand starts is chaotic enough that rounding of the velocities moves it.
+    # About one start in a thousand is so chaotic that rounding of the velocities changes its time.
     assert si["mean_periods"] == pytest.approx(bare["mean_periods"], rel=0.1)
     assert si["mean_time"] == pytest.approx(si["mean_periods"] * 2 * math.pi / 10)
     assert " s)" in si["summary"]

@@ -1,4 +1,4 @@
-"""Basin maps as datasets, against integrations that share no code with them."""
+"""Basin maps as datasets, against integrations that share no code with the package."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pendmap import Axis, Grid, InputError, Pendulum, cli
 
 
 def independent_labels(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Turns in 2 periods after 80 periods, by scipy's DOP853: 0 oscillation, +-2 rotation."""
+    """Return the turns in 2 periods after 80, by scipy's DOP853: 0 oscillation, +-2 rotation."""
     count = theta.size
 
     def equation(tau: float, state: np.ndarray) -> np.ndarray:
@@ -50,11 +50,11 @@ def test_labels_equal_those_of_scipy_cell_for_cell() -> None:
 
 @pytest.fixture(scope="module")
 def smooth() -> Any:  # noqa: ANN401 (a Dataset)
-    """A small map with three attractors."""
+    """Return a small map with three attractors."""
     return pendmap.basins(Pendulum(p=0.6), Grid.square(60))
 
 
-def test_a_map_says_all_about_itself(smooth: Any) -> None:  # noqa: ANN401
+def test_a_map_has_its_model_numerics_and_summary_in_its_attributes(smooth: Any) -> None:  # noqa: ANN401
     assert smooth.label.dims == ("velocity", "theta")
     assert smooth.theta.attrs["units"] == "rad"
     assert smooth.theta.values[0] == pytest.approx(-math.pi + math.pi / 60)
@@ -82,7 +82,7 @@ def test_multipliers_multiply_to_the_damping(smooth: Any) -> None:  # noqa: ANN4
 
 
 def test_settled_trajectories_are_near_their_attractor(smooth: Any) -> None:  # noqa: ANN401
-    """From each cell, the settling time and 60 periods more lead to a point of its attractor."""
+    """The settling time of a cell plus 60 periods leads to a point of its attractor."""
     picks = np.linspace(0, 3599, 200).astype(int)
     theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
     starts = theta.ravel()[picks], velocity.ravel()[picks]
@@ -147,7 +147,7 @@ def test_without_drive_the_running_state_has_its_own_period() -> None:
     assert [str(name) for name in result.attractor.values] == ["rest", "rotation 1:+1"]
     assert float(result.theta_point[0]) == pytest.approx(math.asin(0.5), abs=1e-12)
     period = float(result.period[1])
-    # One multiplier, that of the angle section; damping alone makes it.
+    # There is one multiplier, that of the section in angle; it follows from damping alone.
     assert float(result.multipliers[1, 0, 0]) == pytest.approx(math.exp(-0.1 * period), rel=1e-9)
     assert np.isnan(result.multipliers.values[1, 1, 0])
     run = pendmap.simulate(Pendulum(p=0, torque=0.5), 0, float(result.velocity_point[1]), period)
@@ -156,7 +156,7 @@ def test_without_drive_the_running_state_has_its_own_period() -> None:
 
 
 def test_shares_of_the_pendulum_with_torque() -> None:
-    """Random starts of a public comparison: fixed point 0.152, running state 0.848."""
+    """A published comparison with random starts gives fixed point 0.152, running state 0.848."""
     rng = np.random.default_rng(5)
     theta = rng.uniform(-math.pi + math.asin(0.5), math.pi + math.asin(0.5), 40_000)
     result = pendmap.basins_of(Pendulum(p=0, torque=0.5), theta, rng.uniform(-10, 10, 40_000))
@@ -212,7 +212,7 @@ def test_other_threads_run_and_progress_is_reported() -> None:
     stop.set()
     other.join()
     during = [t for t in ticks if began < t < ended]
-    # Held all the time, the lock would let next to none through.
+    # If the lock were held all the time, almost none would run.
     assert len(during) > (ended - began) / 0.005 / 10
     assert told
     assert all(0 <= done <= total for done, total in told)
@@ -227,7 +227,7 @@ def test_an_error_in_the_callers_progress_ends_the_map() -> None:
 
 
 def test_ctrl_c_raises_keyboard_interrupt() -> None:
-    # Progress is told once the map is under way: nothing is being imported any more.
+    # Progress is reported once the map has begun: all imports are complete by then.
     code = (
         "import pendmap, sys\n"
         "under_way = lambda *_: print('go', flush=True)\n"
@@ -245,7 +245,7 @@ def test_ctrl_c_raises_keyboard_interrupt() -> None:
 
 
 def available_paths() -> list[str]:
-    """Instruction sets of this processor."""
+    """Return the instruction sets of this processor."""
     from pendmap import _core  # noqa: PLC0415 (only here)
 
     return _core.simd_available()
@@ -318,13 +318,13 @@ def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) 
     [
         # Strong damping: area shrinks by 1e-55 a period.
         ({"gamma": 20.0, "p": 2.0, "omega": 1.0}, "rest"),
-        # Cycles in less than 1 % of the plane, strongly stretched before they shrink.
+        # Cycles in less than 1 % of the plane, strongly stretched before they contract.
         (
             {"gamma": 0.5, "p": 2.68962157, "omega": 2.30547203, "torque": 0.1},
             "oscillation 7:0 (+)",
         ),
         ({"gamma": 0.02, "p": 1.23286585, "omega": 0.94662087}, "oscillation 4:0 (+)"),
-        # A running state next to the resonance 17/5: it takes long to fill its curve.
+        # A running state near the resonance 17/5, which fills its curve slowly.
         (
             {"gamma": 0.2, "p": 2.1744, "omega": 1.7613, "torque": 1.2},
             "quasiperiodic rotation +",
@@ -340,7 +340,7 @@ def test_hard_attractors_are_found(parameters: dict[str, float], name: str) -> N
 @pytest.mark.thorough
 @pytest.mark.parametrize("p", [0.0, 0.05])
 def test_slow_settling_is_not_called_chaos(p: float) -> None:
-    """Nearly without damping nothing settles within the bound, and shear stretches tangents."""
+    """With almost no damping no start settles within the bound, and shear stretches tangents."""
     result = pendmap.basins(
         Pendulum(gamma=1e-6, p=p, torque=0.1), Grid.square(24), max_periods=1000
     )

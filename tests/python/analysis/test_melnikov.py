@@ -38,7 +38,7 @@ def test_the_reference_values_to_1e_9(truths: dict[str, Any]) -> None:
 
 
 def test_the_true_tangency_is_near(truths: dict[str, Any]) -> None:
-    # Computed with manifolds: they differ at the second order in gamma.
+    # Computed from the manifolds: they differ at second order in gamma.
     for row, omega in zip(truths["melnikov"]["tangency"].values(), (0.87, 2.0), strict=True):
         found = pendmap.melnikov(Pendulum(gamma=0.1, omega=omega), [1.0]).attrs["p_melnikov"]
         assert abs(found / row["p_c"] - 1) < 0.01
@@ -89,8 +89,8 @@ def test_the_formula_by_quadrature_of_the_integral() -> None:
     assert abs(own.attrs["p_melnikov"] - by_quadrature) < 1e-9
 
 
-def test_drag_takes_what_its_work_along_the_separatrix_is() -> None:
-    # The integral of |th'|^3 over sech: 8 * pi/2.
+def test_drag_loses_its_work_along_the_separatrix() -> None:
+    # The integral of |th'|^3 along the separatrix is 8 * pi/2.
     plain, drag = 0.1, 0.02
     model = Pendulum(gamma=plain, omega=1.0, effects=(Effect("quadratic_drag", {"q": drag}),))
     found = pendmap.melnikov(model, [1.0]).attrs["p_melnikov"]
@@ -100,11 +100,11 @@ def test_drag_takes_what_its_work_along_the_separatrix_is() -> None:
 
 
 def loop_by_scipy(gamma: float, omega: float, theta_r: float, torque: float) -> tuple[float, float]:
-    """Return the loop's threshold, and how far it goes, from upright rest's unstable manifold."""
+    """Return the loop's threshold and its extent, from the unstable manifold of upright rest."""
     c = math.sqrt(1 - torque**2)
 
     def slope(t: float, y: NDArray[np.float64]) -> list[float]:
-        # The distance u from upright rest, its rate, and the integrals up to here.
+        # The distance u from upright rest, its rate, and the integrals up to the present time.
         u, rate = y[:2]
         power = -(torque * math.cos(u) + c * math.sin(u)) * rate
         push = c * math.sin(u) - 2 * torque * math.sin(u / 2) ** 2
@@ -119,7 +119,7 @@ def loop_by_scipy(gamma: float, omega: float, theta_r: float, torque: float) -> 
     start = [1e-13, 1e-13 * math.sqrt(c), 0, 0, 0, 0]
     run = solve_ivp(slope, (0, 400), start, "DOP853", None, events=turned, rtol=1e-13, atol=1e-22)
     end, (far, _, action, way, even, odd) = run.t[-1], run.y[:, -1]
-    # Of the drive's phases the work is greatest where it is odd about the turning point.
+    # The work is greatest for the phase at which the drive is odd about the turning point.
     work = math.cos(omega * end) * odd - math.sin(omega * end) * even
     return (gamma * 2 * action + theta_r * 2 * way) / abs(2 * work), far
 
@@ -137,13 +137,13 @@ def test_the_loop_agrees_with_scipy(seed: int) -> None:
     assert found.attrs["p_melnikov"] == found.attrs["p_loop"]
     orbit = loop(torque)
     assert abs(np.ptp(orbit.theta) - far) < 1e-8
-    # Its energy is that of the saddle all along.
+    # Its energy equals that of the saddle everywhere.
     energy = orbit.speed**2 / 2 - np.cos(orbit.theta) - torque * orbit.theta
     assert np.ptp(energy) < 1e-13
 
 
 def test_the_loop_by_an_integral_over_the_angle() -> None:
-    # What viscous damping takes is the action, the area inside the loop.
+    # The loss to viscous damping is proportional to the action, the area inside the loop.
     for torque in (1e-9, 1e-3, 0.4, 0.9, 0.9999):
         orbit = loop(torque)
         low, high = orbit.theta.min(), orbit.theta.max()
@@ -157,7 +157,7 @@ def test_the_loop_by_an_integral_over_the_angle() -> None:
 
 
 def gap_of_manifolds(p: float, gamma: float, omega: float, torque: float) -> float:
-    """Return how far the unstable manifold of the upright orbit passes the stable one, at most."""
+    """Return the largest signed distance between the unstable and stable manifolds upright."""
     period = math.tau / omega
 
     def slope(t: float, y: NDArray[np.float64]) -> list[float]:
@@ -196,7 +196,7 @@ def gap_of_manifolds(p: float, gamma: float, omega: float, torque: float) -> flo
                 return float(y[0] - math.asin(torque))
 
             bottom.terminal = True  # type: ignore[attr-defined]
-            # Both pass the bottom of the well in the positive sense on their way to the saddle.
+            # Both cross the bottom of the well in the positive sense on the way to the saddle.
             bottom.direction = 1 if growing else -1  # type: ignore[attr-defined]
             span = (t, t + (60 if growing else -60))
             end = solve_ivp(
@@ -218,17 +218,17 @@ def test_the_manifolds_touch_at_the_computed_threshold() -> None:
     assert found.attrs["p_melnikov"] == pytest.approx(touching, rel=2e-3)
 
 
-def test_a_torque_that_keeps_up_the_rotation_tilts_the_potential() -> None:
+def test_a_torque_that_sustains_rotation_tilts_the_potential() -> None:
     found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=0.2), [2.0])
     assert found["branch"].values.tolist() == ["loop", "forward", "backward"]
     assert abs(found.attrs["p_melnikov"] - 0.34596) < 1e-5
-    # Forward manifolds of neighbours touch at 0.2142, by integration with scipy.
+    # Forward manifolds of neighbouring saddles touch at 0.2142, by integration with scipy.
     assert abs(found.attrs["p_forward"] / 0.2142 - 1) < 0.03
     assert "keeps up the rotation forward" in found.attrs["summary"]
     assert "heteroclinic" in found.attrs["summary"]
 
 
-def test_a_bias_torque_is_a_torque_and_a_weak_one_a_perturbation() -> None:
+def test_a_bias_torque_equals_the_model_s_torque_and_a_weak_one_is_a_perturbation() -> None:
     bias = (Effect("bias_torque", {"torque": 0.2}),)
     own, other = (
         pendmap.melnikov(model, [1.0]).attrs
@@ -241,7 +241,7 @@ def test_a_bias_torque_is_a_torque_and_a_weak_one_a_perturbation() -> None:
         for effects in (drag, ())
     )
     assert tilted > damped
-    # As the torque goes to 0 under damping what is known without it comes back.
+    # As the torque tends to 0 with damping, the threshold tends to that without torque.
     for torque in (1e-3, 1e-6, 1e-9):
         found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=torque), [1.0])
         assert found.attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0), rel=10 * torque)
@@ -260,7 +260,7 @@ def test_a_weak_torque_has_both_thresholds(seed: int) -> None:
     assert "perturbation" in found.attrs["summary"]
 
 
-def test_losses_that_a_torque_makes_up_for_are_losses_still() -> None:
+def test_losses_that_a_torque_compensates_remain_losses() -> None:
     made_up = Pendulum(gamma=0.1, omega=2.0, torque=0.4 / math.pi)
     said = pendmap.melnikov(made_up, [2.0]).attrs
     assert said["p_melnikov"] == pytest.approx(0.0, abs=1e-12)
@@ -271,7 +271,7 @@ def test_losses_that_a_torque_makes_up_for_are_losses_still() -> None:
 
 
 def test_the_figure_names_its_curves() -> None:
-    # Heteroclinic thresholds lie above what is shown.
+    # Heteroclinic thresholds are above the range shown.
     found = pendmap.melnikov(Pendulum(gamma=0.02, p=0.1, torque=0.5), np.linspace(1.5, 2.5, 11))
     assert found["p_melnikov"].sel(branch="forward").values.min() > 1
     texts = named(made(found))

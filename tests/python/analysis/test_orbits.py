@@ -1,4 +1,4 @@
-"""Closed orbits, stable and unstable: against reference values and scipy, in figures and files."""
+"""Periodic orbits, stable and unstable, against reference values and scipy; figures and files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DRIVEN = Pendulum(gamma=0.1, p=1.0, omega=2.0)
 
 
 def once_by_scipy(pendulum: Pendulum, start: tuple[float, float], n: int) -> Any:  # noqa: ANN401
-    """The state after n periods and its derivative, by the variational equations."""
+    """Return the state after n periods and its derivative, by the variational equations."""
 
     def slope(tau: float, y: Any) -> list[float]:  # noqa: ANN401
         pull = 1 + pendulum.p * math.cos(pendulum.omega * tau + pendulum.phase)
@@ -67,7 +67,7 @@ def test_the_known_attractors_are_among_the_orbits(truths: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize(("n", "w", "count"), [(1, 1, 2), (2, 0, 3), (2, 2, 1)])
-def test_each_closes_and_has_its_multipliers_by_scipy(n: int, w: int, count: int) -> None:
+def test_each_orbit_closes_and_has_its_multipliers_by_scipy(n: int, w: int, count: int) -> None:
     model = Pendulum(gamma=0.1, p=1.4, omega=2.0, phase=0.4, torque=0.005)
     found = pendmap.orbit(model, n, w)
     assert found.sizes["orbit"] == count
@@ -186,7 +186,7 @@ def test_the_recording_has_paths_and_points(oscillations: xr.Dataset, tmp_path: 
     assert {"/legend", "/summary", "/phase/axes/frame"} <= set(back.columns)
 
 
-def test_a_box_is_kept(tmp_path: Path) -> None:
+def test_orbits_are_sought_within_the_given_box(tmp_path: Path) -> None:
     wide = pendmap.orbit(DRIVEN, 1, 0)
     at = float(wide["theta_point"][0])
     box = Grid(Axis(at - 0.3, at + 0.3, 30), Axis(-0.3, 0.3, 30))

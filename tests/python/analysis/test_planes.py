@@ -1,4 +1,4 @@
-"""Maps over two parameters: regimes, layers, figures, files, the command; physics is in Rust's."""
+"""Parameter maps: regimes, layers, figures, files, command; the Rust tests cover the physics."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def plane() -> xr.Dataset:
 
 
 def by_cell(plane: xr.Dataset) -> Any:  # noqa: ANN401 (an array of words)
-    """The kinds of each cell in words: numbers of regimes go by their shares."""
+    """Return the attractor kinds of each cell in words; regimes are numbered by their shares."""
     return plane["regime_kinds"].values[plane["regime"].values]
 
 
@@ -43,7 +43,7 @@ def test_regimes_and_their_shares(plane: xr.Dataset) -> None:
     assert (np.diff(shares) <= 0).all()
     counts = np.bincount(plane["regime"].values.ravel())
     assert np.allclose(counts / 60, shares)
-    # What a cell's attractors are is what its regime says.
+    # The kinds of a cell's attractors are those of its regime.
     names, cell = plane["kind"].values, plane["entry_cell"].values
     for index in range(60):
         own = {str(names[k]) for k in plane["entry_kind"].values[cell == index]}
@@ -82,9 +82,9 @@ def test_a_cell_is_the_pendulum_with_its_parameters(plane: xr.Dataset) -> None:
 def test_results_in_si_agree(plane: xr.Dataset) -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
     si = pendmap.parameter_map(rig, {"p": (0.2, 2.0, 10), "Omega": (7.0, 12.0, 6)})
-    assert np.mean(by_cell(si) == by_cell(plane)) > 0.9  # long transients end otherwise
+    assert np.mean(by_cell(si) == by_cell(plane)) > 0.9  # long transients end differently
     ours, theirs = 5 * plane["exponent"].values, si["exponent"].values
-    # Rounding parts chaotic trajectories: their exponents are samples.
+    # Rounding separates chaotic trajectories: their exponents are samples.
     regular = (ours < 0) & (theirs < 0) & (by_cell(si) == by_cell(plane))
     assert np.allclose(theirs[regular], ours[regular])
     chaotic = (ours > 0) & (theirs > 0)
@@ -147,7 +147,7 @@ def test_effects_that_no_map_can_have_are_refused() -> None:
         pendmap.parameter_map(chirp, {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)})
 
 
-def test_without_damping_all_is_undecided() -> None:
+def test_without_damping_all_cells_are_undecided() -> None:
     found = pendmap.parameter_map(Pendulum(gamma=0.0), {"p": (0.1, 0.2, 2), "omega": (2, 2.1, 2)})
     assert json.loads(str(found["regime_kinds"].values[0])) == ["undecided"]
     assert np.allclose(found["undecided"], 1)
@@ -194,7 +194,7 @@ def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
 
 
 @pytest.mark.usefixtures("strict_recordings")
-def test_the_recording(plane: xr.Dataset, tmp_path: Path) -> None:
+def test_the_recording_of_a_parameter_map(plane: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(plane, tmp_path)
     wanted = {"/kinds/data/kinds", "/exponent/data/values", "/legend", "/summary"}
     assert wanted <= back.static
@@ -202,7 +202,7 @@ def test_the_recording(plane: xr.Dataset, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("strict_recordings")
 def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: Path) -> None:
-    # The fold under the first tongue ends at omega = 1.26, that under the second begins at 0.97.
+    # The fold below the first tongue ends at omega = 1.26, that below the second begins at 0.97.
     plane = {"p": (0.1, 1.0, 3), "omega": (0.8, 2.2, 3)}
     found = pendmap.parameter_map(Pendulum(), plane, curves=True)
     back = recorded(found, tmp_path)
@@ -252,7 +252,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
 
 
 def test_friction_holds_rest_in_every_cell() -> None:
-    """Whether one of few starts comes to rest is chance; that it is there is not."""
+    """Whether a given start comes to rest depends on the sample; that rest exists does not."""
     plane = {"gamma": (0.05, 0.4, 6), "p": (0.2, 2.0, 6)}
     found = pendmap.parameter_map(Pendulum(theta_r=0.02), plane)
     kinds = [str(kind) for kind in found["kind"].values]
@@ -281,11 +281,11 @@ def test_undamped_motion_has_no_attractors() -> None:
 
 
 def test_chaos_that_friction_ends_is_no_attractor() -> None:
-    # Tumbling lives for some 6000 periods: longer than a search looks, and not for ever.
+    # Tumbling lasts some 6000 periods: longer than the search, but not for ever.
     plane = {"gamma": (0.08, 0.14, 3), "p": (1.9, 2.0, 3)}
     found = pendmap.parameter_map(Pendulum(theta_r=0.02), plane)
     assert "tumbling chaos" not in found["kind"].values
-    # Rotating chaos, in one cell, goes on for ever: it never comes near a rest.
+    # Rotating chaos, in one cell, is persistent: it never comes near rest.
     theta, velocity = (
         found[f"entry_{name}"].values[found["entry_n"].values == 0]
         for name in ("theta", "velocity")

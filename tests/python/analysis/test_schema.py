@@ -1,4 +1,4 @@
-"""The table of each kind of result: attributes and JSON follow from it; numerical choices."""
+"""Schema of each kind of result, from which attributes and JSON follow; numerical choices."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_attributes_and_json_follow_from_the_schema(kind: str) -> None:
     names = [field.name for field in schema.fields]
     assert len(set(names)) == len(names)
     assert all(field.meaning for field in schema.fields)
-    alone = pendmap.ANALYSES[kind][1][0]  # a function that needs no more than a model
+    alone = pendmap.ANALYSES[kind][1][0]  # a function that needs only a model
     result = RESULTS.get(kind, lambda: getattr(pendmap, alone)(DRIVEN))()
     own = set(result.attrs) - {"kind", "title"} - set(DRIVEN.attributes)
     assert own <= set(names)
@@ -56,7 +56,7 @@ def test_numerical_choices_are_checked_as_they_are_made(given: Any, message: str
         Numerics(**given)
 
 
-def test_numerical_choices_as_the_core_and_a_result_have_them() -> None:
+def test_numerical_choices_are_passed_to_the_core_and_stored_in_a_result() -> None:
     numerics = Numerics(1e-5, None, 2, 7)
     assert numerics.core == {"tol": 1e-5, "max_periods": None, "threads": 2, "seed": 7}
     said = numerics.provenance()

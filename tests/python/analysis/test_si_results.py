@@ -1,4 +1,4 @@
-"""What is computed, stored and drawn in SI."""
+"""Results that are computed, stored and drawn in SI."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def term(rig: Rig, t: float, theta: float, velocity: float) -> float:
-    """The acceleration of a rig with quadratic drag and a bearing's harmonic, in SI."""
+    """Return the acceleration of a rig with quadratic drag and a bearing's harmonic, in SI."""
     drag, harmonic = (e.parameters for e in rig.effects)
     pull = rig.w0**2 * (1 + rig.p * math.cos(rig.Omega * t + rig.phi))
     bump = harmonic["amplitude"] * math.sin(harmonic["n"] * theta + harmonic["psi"])
@@ -57,7 +57,7 @@ def test_simulate_in_si_against_scipy_in_si(seed: int, *, rubs: bool) -> None:
 
 
 def by_scipy(rig: Rig, start: tuple[float, float], until: float) -> tuple[float, float]:
-    """The last state, integrated from turn to turn in SI; held wherever the load is too small."""
+    """Return the last state, integrated from turn to turn in SI; held if the load is too small."""
     t, (theta, velocity) = 0.0, start
 
     def load(time: float) -> float:
@@ -241,7 +241,7 @@ def test_effects_are_named_with_units() -> None:
     title = Rig(w0=2.0, effects=effects).title
     for said in ("a = 0.5 rad/s^2, vs = 2 rad/s", "n = 1.5)", "(d = -0.01 rad)"):
         assert said in title
-    bare = Rig(w0=2.0, effects=effects).pendulum.title  # over w0^2, over w0; an angle stays one
+    bare = Rig(w0=2.0, effects=effects).pendulum.title  # over w0^2, over w0; an angle is unchanged
     assert "stribeck_friction (a = 0.125, vs = 1)" in bare
     assert "encoder_offset (d = -0.01 rad)" in bare
 
@@ -253,7 +253,7 @@ def test_effects_are_named_with_units() -> None:
         (Pendulum(p=0), "2π", "a period is 2 pi)"),
     ],
 )
-def test_periods_without_drive_are_said_in_the_units_of_the_map(
+def test_periods_without_drive_are_given_in_the_units_of_the_map(
     model: Rig | Pendulum, own: str, said: str
 ) -> None:
     result = pendmap.basins(model, Grid.square(8))
@@ -265,7 +265,7 @@ def test_periods_without_drive_are_said_in_the_units_of_the_map(
 @pytest.mark.parametrize(
     ("velocity", "said"), [(0.0, "rad, velocity"), (-9.0, "full turns backward)")]
 )
-def test_turns_since_the_start_are_said_in_words(velocity: float, said: str) -> None:
+def test_turns_since_the_start_are_described_in_words(velocity: float, said: str) -> None:
     run = pendmap.simulate(Pendulum(gamma=0.01, p=0), 0.5, velocity, 20.0)
     line = run.attrs["summary"].splitlines()[0]
     assert said in line
@@ -274,7 +274,7 @@ def test_turns_since_the_start_are_said_in_words(velocity: float, said: str) -> 
 
 
 @pytest.mark.parametrize(("theta", "said"), [(1.0, False), (1e5, False), (1e9, True), (1e16, True)])
-def test_angles_too_large_for_their_digits_are_said(theta: float, said: bool) -> None:  # noqa: FBT001
-    """A double has 53 bits: the angle's last one is above the tolerance of 1e-9 from 8e6 on."""
+def test_angles_beyond_the_resolution_of_a_double_are_reported(theta: float, said: bool) -> None:  # noqa: FBT001
+    """A double has 53 bits: its resolution of an angle exceeds the tolerance 1e-9 from 8e6 on."""
     summary = pendmap.simulate(Pendulum(), theta, 0.0, 1.0).attrs["summary"]
     assert ("ANGLES ARE ROUNDED" in summary) == said

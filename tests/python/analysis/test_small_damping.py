@@ -1,4 +1,4 @@
-"""Small damping: motions have time to settle, and costs are reported before a computation."""
+"""Small damping: motions have time to settle; costs are reported before a computation."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_start_that_takes_long_ends_where_scipy_says() -> None:
     def slope(t: float, y: list[float]) -> list[float]:
         return [y[1], -0.01 * y[1] - (1 + 0.6 * math.cos(2 * t)) * math.sin(y[0])]
 
-    # From where the motion has settled, the stroboscopic points are the attractor's.
+    # After the settling time the stroboscopic points are those of the attractor.
     end = (int(label["settle_periods"][0]) + 500) * math.pi
     run = solve_ivp(slope, (0, end), [theta, velocity], method="DOP853", rtol=1e-9, atol=1e-9)
     which = int(label["label"][0])
@@ -47,7 +47,7 @@ def test_a_start_that_takes_long_ends_where_scipy_says() -> None:
     assert np.hypot(*(points - last[:, None])).min() < 1e-2
 
 
-def test_a_bound_that_is_given_stays_as_it_is() -> None:
+def test_a_bound_that_is_given_is_not_extended() -> None:
     pendulum = Pendulum(gamma=0.003, p=1.0, omega=2.0)
     found = pendmap.basins(pendulum, Grid.square(6), check=False, max_periods=100)
     assert found.attrs["max_periods"] == 100
@@ -63,7 +63,7 @@ def test_unusual_costs_are_reported_before_the_computation(pendmap_command: Run)
         assert SMALL not in pendmap_command(*given, *cheap).stderr
 
 
-def test_rotations_that_dry_friction_lets_be_are_explained() -> None:
+def test_rotations_that_dry_friction_does_not_stop_are_explained() -> None:
     pendulum = Pendulum(gamma=0.0, theta_r=0.01, p=0.3, omega=2.0)
     found = pendmap.basins_of(pendulum, [0.0, 0.5], [2.0, 0.1], check=False, max_periods=500)
     assert list(found["label"].values > 0) == [False, True]

@@ -10,7 +10,7 @@ from pendmap import Effect, Grid, Pendulum
 READINGS = (Effect("encoder_offset", {"d": 0.1}), Effect("encoder_gain", {"e": 0.01}))
 
 
-def test_motion_is_told_from_its_reading() -> None:
+def test_effects_on_the_reading_alone_are_reported_as_such() -> None:
     model = Pendulum(p=0, effects=READINGS)
     plain = pendmap.simulate(Pendulum(p=0), 1.0, 0.0, 5.0)
     run = pendmap.simulate(model, 1.0, 0.0, 5.0)

@@ -1,4 +1,4 @@
-"""Pendulums whose mirrored motion is a motion half a period of the drive later."""
+"""Pendulums symmetric under reflection and a shift by half a period of the drive."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_two_attractors_of_a_direct_drive_are_each_other_s_image() -> None:
         image[0] = math.remainder(image[0], math.tau)
         assert np.abs(other - image).max(axis=1).min() < 1e-8
     assert found.attrs["unreliable_mirror"] < 0.05
-    # By symmetry the mean angle over a period is opposite: (+) leans to positive angles.
+    # By symmetry their mean angles over a period are opposite: (+) is at positive angles.
     positive = own if names[0].endswith("(+)") else other
     images = np.array([half_a_period_on(pendulum, 1.07, point) for point in positive])
     assert (positive[:, 0] + images[:, 0]).mean() > 0
@@ -66,7 +66,7 @@ def test_a_symmetric_oscillation_is_its_own_image() -> None:
         ("f*cos(2*phase)*cos(theta)", False),
     ],
 )
-def test_the_symmetry_is_seen_where_it_is(term: str, seen: bool) -> None:  # noqa: FBT001
+def test_the_symmetry_is_detected_if_and_only_if_it_exists(term: str, seen: bool) -> None:  # noqa: FBT001
     push = Formula("push", term, {"f": 2})
     pendulum = Pendulum(**FAMOUS, effects=(push(f=0.4),))
     found = pendmap.basins(pendulum, Grid.square(6))

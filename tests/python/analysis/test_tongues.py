@@ -1,4 +1,4 @@
-"""Critical curves: against reference values, Mathieu's functions, scipy; in figures and files."""
+"""Critical curves against reference values, Mathieu's functions and scipy; in figures and files."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def test_the_known_boundaries_to_1e_9(truths: dict[str, Any], key: str, gamma: f
             gap, multiplier = min((abs(p - float(row["p"])), m) for p, m in found)
             assert gap < 1e-9, (omega, row["p"], gap)
             assert multiplier == row["multiplier"]
-        # And none that is not known.
+        # There are no other boundaries.
         assert len(found) == len(rows), (omega, found)
 
 
-def test_the_onset_of_resonance_to_1e_9(truths: dict[str, Any]) -> None:
+def test_the_onset_of_resonance_is_found_to_1e_9(truths: dict[str, Any]) -> None:
     for row in truths["rest_onset"].values():
         p, multiplier = found_at(DAMPED, row["omega"])[0]
         assert abs(p - row["p_onset"]) < 1e-9
@@ -65,7 +65,7 @@ def test_folds_to_1e_9_where_the_onset_is_subcritical(truths: dict[str, Any]) ->
 
 
 def test_without_damping_they_are_mathieus_characteristic_curves() -> None:
-    # 4/omega^2 = a_r(q) or b_r(q), q = 2 p/omega^2: curves of both kinds, thin tongues too.
+    # 4/omega^2 = a_r(q) or b_r(q), q = 2 p/omega^2: curves of both kinds, thin tongues included.
     omegas = [0.52, 0.66, 0.71, 0.99, 1.03, 1.7, 2.3]
     found = pendmap.tongues(Pendulum(gamma=0.0), omegas, 2.0)
     assert found.sizes["critical"] > 8
@@ -86,11 +86,11 @@ def test_narrow_tongues_are_not_missed() -> None:
         first = [p for p, m in found if m == 1][:2]
         assert len(first) == 2, found
         assert first[1] - first[0] < 0.05
-    # The strip between two tongues at omega = 0.6, 0.0026 wide, is in the reference values.
+    # The strip between two tongues at omega = 0.6, of width 0.0026, is in the reference values.
 
 
 def largest_multiplier(p: float, omega: float, gamma: float, gravity: float = 1.0) -> float:
-    """Return that of rest by scipy; a gravity of -1 is that of inverted rest."""
+    """Return the largest multiplier of rest by scipy; a gravity of -1 gives inverted rest."""
     ends = []
     for start in ((1.0, 0.0), (0.0, 1.0)):
         run = solve_ivp(
@@ -151,7 +151,7 @@ def test_hanging_rest_alone_is_computed_where_upright_is_no_rest() -> None:
 def period_of(
     x: NDArray[np.float64], p: float, omega: float, torque: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return where a state is after a period, and the derivative, at gamma = 0.1 by scipy."""
+    """Return the state after a period and its derivative, at gamma = 0.1, by scipy."""
 
     def slope(t: float, y: NDArray[np.float64]) -> list[float]:
         gravity = 1 + p * math.cos(omega * t)
@@ -167,7 +167,7 @@ def period_of(
 def orbits_near(
     angle: float, p: float, omega: float, torque: float
 ) -> list[NDArray[np.complex128]]:
-    """Return the multipliers of the orbits of the drive's period that Newton's method finds."""
+    """Return the multipliers of the orbits of the drive's period found by Newton's method."""
     found: dict[tuple[float, float], NDArray[np.complex128]] = {}
     for start in angle + np.linspace(-0.6, 0.6, 5):
         x = np.array([start, 0.0])
@@ -194,7 +194,7 @@ def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
     def stable(angle: float, p: float) -> bool:
         return any(abs(m).max() < 1 for m in orbits_near(angle, p, omega, torque))
 
-    # The orbit begins at a fold, and sheds one of twice the period in the end.
+    # The orbit begins at a fold, and ends with a period doubling.
     assert [stable(math.pi, p) for p in (0.995 * low, 1.002 * low)] == [False, True]
     assert [stable(math.pi, p) for p in (0.998 * high, 1.002 * high)] == [True, False]
     assert min(abs(m + 1).min() for m in orbits_near(math.pi, high, omega, torque)) < 1e-6
@@ -207,8 +207,8 @@ def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
 
 
 def test_the_curves_of_a_small_torque_are_those_without() -> None:
-    # Folds move with the torque to the power 2/3, the others with its square. Where rest sheds an
-    # oscillation of period 1, that goes on in place of it.
+    # Folds shift with the torque to the power 2/3, the others with its square. The torque replaces
+    # a pitchfork of rest by a period-1 orbit that continues.
     for omega in (2.0, 6.0):
         level, tilted = (
             pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 20.0)
@@ -220,7 +220,7 @@ def test_the_curves_of_a_small_torque_are_those_without() -> None:
             assert all(abs(tilted[f"{prefix}p"].values - p).min() < 1e-7 for p in doubled)
 
 
-def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> None:
+def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_is_counted_twice() -> None:
     omega = np.linspace(1.55, 1.75, 5)
     one, other = (
         pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 8.0) for torque in (0.2, -0.2)
@@ -232,9 +232,9 @@ def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_counts_twice() -> No
 
 
 @pytest.mark.parametrize("name", list(critical_curves.CURVES))
-def test_asymptotic_curves_have_their_order(name: str) -> None:
+def test_errors_of_asymptotic_curves_have_their_order(name: str) -> None:
     multiplier, formula = critical_curves.CURVES[name]
-    # Towards the tip, with damping in proportion: detuning, p and gamma (or its root) all small.
+    # Toward the tip, with damping in proportion: detuning, p and gamma (or its root) are all small.
     errors = []
     for size in (0.08, 0.04):
         near = 2.0 if multiplier < 0 else 1.0
@@ -246,7 +246,7 @@ def test_asymptotic_curves_have_their_order(name: str) -> None:
     assert order > {"tongue 1, first order": 0.8}.get(name, 1.7), (order, errors)
 
 
-def test_added_damping_is_damping_and_effects_count() -> None:
+def test_added_damping_is_damping_and_effects_are_included() -> None:
     plain = found_at(Pendulum(gamma=0.1), 1.5)
     added = found_at(Pendulum(gamma=0.0, effects=(Effect("viscous_damping", {"gamma": 0.1}),)), 1.5)
     assert np.allclose(plain, added, atol=1e-9)
@@ -324,7 +324,7 @@ def test_the_recording_has_both_planes(whole: xr.Dataset, tmp_path: Path) -> Non
 
 @pytest.fixture(scope="module")
 def finer() -> xr.Dataset:
-    """Few frequencies, and those that a picture needs."""
+    """Return curves at few frequencies and at those added for a picture."""
     return pendmap.tongues(DAMPED, np.linspace(1.1, 2.1, 11), 3.0, refine=True)
 
 
@@ -335,11 +335,11 @@ def test_added_frequencies_resolve_the_turns_of_curves(finer: xr.Dataset) -> Non
     index, p = finer["index"].values, finer["p"].values
     rows = [p[(index == k) & (finer["multiplier"].values < 0)] for k in range(omega.size)]
     begins = next(k for k, row in enumerate(rows) if row.size)
-    # The nose of the first tongue is between two frequencies that no eye tells apart.
+    # The nose of the first tongue lies between two frequencies indistinguishable in a picture.
     assert omega[begins] - omega[begins - 1] < 1e-5
     assert np.ptp(rows[begins]) < 0.02
     assert rows[begins].mean() == pytest.approx(2.3, abs=0.1)
-    # Between any two frequencies the curves are straight, as far as can be seen.
+    # Between any two frequencies the curves are straight within the resolution of a picture.
     for k in range(begins + 1, omega.size - 1):
         middle = (omega[k] + omega[k + 1]) / 2
         exact = [q for q, m in found_at(DAMPED, middle, 3.0) if m < 0]
@@ -355,7 +355,7 @@ def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
 
 
 def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
-    # Between the first tongue and the second a strip climbs by its own width from one to the next.
+    # Between the first two tongues a strip rises by its own width from one frequency to the next.
     omega = np.linspace(0.8, 3.0, 60)
     stable = drawn.chart(tongues_of(omega)).panel("omega-p").marks[0]
     areas = [Outline(area) for area in stable.shapes]
@@ -420,19 +420,19 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
     assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"
 
 
-def test_the_legend_names_the_pendulum_where_it_is_in_view() -> None:
+def test_the_legend_names_the_pendulum_if_it_is_in_view() -> None:
     for omega, shown in (([1.5, 2.5], True), ([6.0, 8.0], False)):
         texts = named(made(pendmap.tongues(DAMPED, omega, 6.0)))
         assert ("this pendulum" in texts) == shown
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])
-def test_orbits_under_a_torque_keep_to_their_balance(low: float, high: float) -> None:
+def test_orbits_of_both_balances_under_a_torque_are_distinct(low: float, high: float) -> None:
     omega = np.linspace(low, high, 13)
     found = pendmap.tongues(Pendulum(gamma=0.1, torque=0.2), omega)
     for place in range(omega.size):
         hanging = found["p"].values[found["index"].values == place]
         inverted = found["inverted_p"].values[found["inverted_index"].values == place]
-        # A strip is found at every frequency that it is at, however narrow.
+        # A strip is found at every frequency at which it exists, however narrow.
         assert inverted.size == 2, omega[place]
         assert np.abs(np.subtract.outer(hanging, inverted)).min() > 1e-3, omega[place]

@@ -23,7 +23,7 @@ def test_trajectories_of_independent_tools(truths: dict[str, Any]) -> None:
         for until, theta, velocity in zip(t["times"], t["theta"], t["v"], strict=True):
             start = float(t["theta0"]), float(t["v0"])
             run = pendmap.simulate(pendulum, *start, float(until), tol=1e-12)
-            # Chaos amplifies rounding: by e^(0.26 tau) at most on these trajectories.
+            # Chaos amplifies rounding errors: by e^(0.26 tau) at most on these trajectories.
             allowed = 1e-12 * max(1, math.exp(0.26 * float(until)) / 1e3)
             assert float(run.theta[-1]) == pytest.approx(float(theta), abs=max(1e-11, allowed))
             assert float(run.velocity[-1]) == pytest.approx(
@@ -57,7 +57,7 @@ def test_sections_are_taken_once_a_period() -> None:
         (Pendulum(p=1, omega=9.0), 9.0, 20.0),
     ],
 )
-def test_there_are_samples_enough_for_a_smooth_curve(
+def test_samples_are_dense_enough_for_a_smooth_curve(
     pendulum: Pendulum, velocity: float, until: float
 ) -> None:
     run = pendmap.simulate(pendulum, 1.0, velocity, until)
@@ -115,7 +115,7 @@ def test_energy_is_kept_without_drive_and_damping_and_lost_by_damping() -> None:
     free = pendmap.simulate(Pendulum(gamma=0, p=0), 2.0, 0.3, 200.0, tol=1e-12)
     assert float(np.ptp(free.energy.values)) < 1e-10
     assert float(free.energy[0]) == pytest.approx(0.3**2 / 2 + 1 - math.cos(2.0), rel=1e-15)
-    # dE/dtau = -gamma v^2, summed up by Simpson's rule.
+    # dE/dtau = -gamma v^2, integrated by Simpson's rule.
     damped = pendmap.simulate(Pendulum(gamma=0.2, p=0), 2.0, 0.3, 4 * math.pi, tol=1e-12)
     lost = simpson(0.2 * damped.velocity.values**2, x=damped.time.values)
     assert float(damped.energy[0] - damped.energy[-1]) == pytest.approx(lost, abs=1e-7)
@@ -126,7 +126,7 @@ def test_energy_is_kept_without_drive_and_damping_and_lost_by_damping() -> None:
 
 
 def test_a_section_holds_no_end_between_two_samples() -> None:
-    """Until 7.5 of 8 samples: the end is the ninth value, and lies in no section."""
+    """The end, at 7.5 of 8 samples, is the ninth value and lies in no section."""
     pendulum = Pendulum()
     for samples, until in ((8, 7.5 / 8), (8, 1.0), (1, 1.5), (4, 2.0)):
         run = pendmap.simulate(pendulum, 1.0, 0.0, until * pendulum.period, samples=samples)
@@ -136,7 +136,7 @@ def test_a_section_holds_no_end_between_two_samples() -> None:
 
 
 def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, np.ndarray]:  # noqa: ANN401
-    """A trajectory, and what was handed over of it meanwhile, shape (3, N)."""
+    """Return a trajectory, and the samples passed to the callback meanwhile, shape (3, N)."""
     parts: list[np.ndarray] = []
     run = pendmap.simulate(
         pendulum, 1.0, 0.5, until, live=lambda *part: parts.append(np.stack(part)), **words
@@ -154,7 +154,7 @@ def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, 
     ],
 )
 @pytest.mark.parametrize("lyapunov", [False, True])
-def test_what_is_shown_meanwhile_is_the_trajectory_bit_for_bit(
+def test_live_samples_equal_the_trajectory_bit_for_bit(
     pendulum: Pendulum | Rig,
     lyapunov: bool,  # noqa: FBT001 (a parameter of the test)
 ) -> None:
@@ -167,14 +167,14 @@ def test_what_is_shown_meanwhile_is_the_trajectory_bit_for_bit(
     assert "interrupted" not in run.attrs
 
 
-def test_far_angles_are_shown_where_they_are() -> None:
+def test_live_samples_of_large_angles_are_exact() -> None:
     parts: list[np.ndarray] = []
     run = pendmap.simulate(Pendulum(), 1e6, 0.0, 9.0, live=lambda *p: parts.append(np.stack(p)))
     assert np.array_equal(np.concatenate(parts, axis=1)[1], run.theta.values)
 
 
 def test_an_interrupt_leaves_what_was_computed() -> None:
-    """The part until then is that of the whole trajectory."""
+    """The stored part equals that of the whole trajectory."""
     pendulum, seen = Pendulum(p=1.0), 0
 
     def show(time: np.ndarray, *_: np.ndarray) -> None:
@@ -199,7 +199,7 @@ def test_an_interrupt_leaves_what_was_computed() -> None:
     assert (run.event_time.values <= float(run.time[-1])).all()
 
 
-def test_what_the_watcher_raises_ends_it() -> None:
+def test_an_error_of_the_live_callback_ends_the_simulation() -> None:
     def show(*_: np.ndarray) -> None:
         raise RuntimeError("enough")
 
@@ -210,13 +210,13 @@ def test_what_the_watcher_raises_ends_it() -> None:
 
 
 def test_half_a_turn_is_no_turn() -> None:
-    # It swings from 2 to -1.85 rad and never goes over the top.
+    # The motion swings from 2 to -1.85 rad and never passes the top.
     swing = pendmap.simulate(Pendulum(gamma=0.0, p=0.0), 2.0, 0.0, 3.6)
     assert swing.attrs["turns"] == 0
     assert "full turn" not in swing.attrs["summary"]
 
 
-def test_a_drive_that_takes_steps_without_end_is_refused() -> None:
+def test_a_drive_that_needs_too_many_steps_is_refused() -> None:
     assert pendmap.simulate(pendmap.Pendulum(p=1e4), 1.0, 0.0, 1.0).theta.size > 1
     for p in (-2e6, 1e14):
         with pytest.raises(InputError, match="times gravity"):

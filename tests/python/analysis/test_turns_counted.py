@@ -1,4 +1,4 @@
-"""Maps where a turn makes a difference, against scipy and against the roots of the torque."""
+"""Maps of models not periodic in the angle, against scipy and the roots of the torque."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ WINDOW = pendmap.Grid((-25.0, 25.0, 50), (-4.0, 4.0, 20))
 
 
 def spring(k: float) -> pendmap.Effect:
-    """The elastic torque ``-k theta``."""
+    """Return an effect with the elastic torque ``-k theta``."""
     return pendmap.Effect("elastic_restoring", {"k": k})
 
 
 def wells(k: float) -> list[float]:
-    """Where ``sin(theta) + k theta`` vanishes and rises: the stable rests without drive."""
+    """Return the stable rests without drive: rising zeros of ``sin(theta) + k theta``."""
     looked = np.linspace(-1.2 / k, 1.2 / k, 20_001)
     pull = np.sin(looked) + k * looked
     rising = np.flatnonzero((pull[:-1] < 0) & (pull[1:] >= 0))
@@ -90,13 +90,13 @@ def test_a_formula_is_mapped_as_the_effect_of_the_library() -> None:
     np.testing.assert_array_equal(one["label"], other["label"])
 
 
-def test_friction_holds_the_pendulum_around_each_turn_apart() -> None:
+def test_friction_holds_the_pendulum_in_the_wells_of_several_turns() -> None:
     k, held = 0.05, 0.1
     model = pendmap.Pendulum(gamma=0.2, p=0.0, theta_r=held, effects=(spring(k),))
     found = pendmap.basins(model, WINDOW)
     rests = [str(n) for n in found["attractor"].values if str(n).startswith("rest")]
     assert len(rests) == sum(abs(x) < 25.0 for x in wells(k))
-    # A start at rest near a well stays there.
+    # A start at rest near a well remains there.
     still = pendmap.basins_of(model, [6.0, -6.0, 0.0], [0.0, 0.0, 0.0])
     names = [str(still["attractor"].values[i - 1]) for i in still["label"].values]
     assert names == ["rest turn +1", "rest turn -1", "rest"]

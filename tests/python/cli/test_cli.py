@@ -1,4 +1,4 @@
-"""The command line, as a user meets it."""
+"""The command line from the point of view of a user."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_figures_of_far_windows_take_no_longer(pendmap_command: Run, tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["basins", "simulate"])
-def test_help_says_what_is_written(pendmap_command: Run, name: str) -> None:
+def test_help_names_the_files_that_are_written(pendmap_command: Run, name: str) -> None:
     said = " ".join(pendmap_command(name, "--help").stdout.split())
     assert "--json alone writes no file" in said
     assert f"--view writes the recording it opens: {name}.rrd" in said
@@ -159,7 +159,7 @@ def test_simulate(pendmap_command: Run, tmp_path: Path) -> None:
     assert names == ["simulate.nc", "simulate.png", "simulate.rrd"]
 
 
-def test_simulate_says_what_friction_does(pendmap_command: Run) -> None:
+def test_simulate_reports_sticks_and_rest(pendmap_command: Run) -> None:
     words = ("simulate", "--p", 0, "--theta-r", 0.1, "--json", "--lyapunov")
     result = json.loads(pendmap_command(*words).stdout)
     assert result["stuck"] is True

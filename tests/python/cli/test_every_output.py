@@ -1,4 +1,4 @@
-"""Every model goes through every command that takes models, to every kind of output."""
+"""Every command that takes a model accepts every model and writes every kind of output."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ REFUSED = {
     ("a direct drive", "tongues"): "a sideways drive or an effect moves it",
     ("a direct drive", "melnikov"): "not proportional to p",
 }
-"""Combinations without a meaning, with the reason."""
+"""Meaningless combinations, with the reason."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -66,7 +66,7 @@ def test_every_output_of_every_command_takes_every_model(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    # The figure is made, but no pixels: they take longer than all the rest.
+    # The figure is built but not rasterised, which would take longer than the rest.
     monkeypatch.setattr(style, "write", lambda figure, part: part.write_text(str(figure)))
     (tmp_path / "model.toml").write_text(f"[pendulum]\n{MODELS[model]}", encoding="utf-8")
     files = ("--out", "a.nc", "--plot", "a.png", "--rerun", "a.rrd")

@@ -1,4 +1,4 @@
-"""Full disks, signals at any moment, libraries that are missing: with the real thing."""
+"""Full disks, signals at any moment and missing libraries, on real processes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def result() -> xr.Dataset:
 
 
 def bounded(words: tuple[str, ...], folder: Path, most: int) -> subprocess.CompletedProcess[str]:
-    """Run a command where no file may have more bytes than this, as ``ulimit -f`` says it."""
+    """Run a command with a limit on the size of its files in bytes, as ``ulimit -f`` sets it."""
     return subprocess.run(
         [str(COMMAND), *words],
         cwd=folder,
@@ -47,9 +47,7 @@ def bounded(words: tuple[str, ...], folder: Path, most: int) -> subprocess.Compl
 
 
 @pytest.mark.parametrize("files", [("m.nc", "m.png", "m.rrd"), ("m.zarr",)])
-def test_what_a_full_disk_does_not_take_is_said_on_one_line(
-    tmp_path: Path, files: tuple[str, ...]
-) -> None:
+def test_a_full_disk_is_reported_on_one_line(tmp_path: Path, files: tuple[str, ...]) -> None:
     options = dict(zip(files, ("--out", "--plot", "--rerun"), strict=False))
     words = [word for file, option in options.items() for word in (option, file)]
     run = bounded((*SMALL, *words), tmp_path, 8192)
@@ -60,7 +58,7 @@ def test_what_a_full_disk_does_not_take_is_said_on_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_fits_is_kept(tmp_path: Path) -> None:
+def test_files_written_before_the_disk_is_full_are_kept(tmp_path: Path) -> None:
     files = ("--out", "m.nc", "--plot", "m.png", "--rerun", "m.rrd")
     (tmp_path / "m.png").write_bytes(b"old")
     run = bounded((*SMALL, *files), tmp_path, 64 * 1024)
@@ -99,7 +97,7 @@ def test_stdout_may_be_full(unbuffered: str) -> None:
     assert run.stderr == "pendmap: No space left on device\n"
 
 
-def test_space_is_asked_for_before(tmp_path: Path) -> None:
+def test_free_space_is_checked_before_the_computation(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="are needed"):
         check_room(tmp_path / "m.nc", 10**18)
     check_room(tmp_path / "m.nc", 10)
@@ -114,7 +112,7 @@ def test_space_is_asked_for_before(tmp_path: Path) -> None:
         ("matplotlib", (*SMALL, "--plot", "m.png"), "matplotlib"),
     ],
 )
-def test_a_library_that_is_missing_is_said_before(
+def test_a_missing_library_is_reported_before_the_computation(
     pendmap_command: Run, tmp_path: Path, module: str, words: tuple[str, ...], needs: str
 ) -> None:
     stub = tmp_path / "stub" / module
@@ -155,10 +153,10 @@ def test_sigterm_at_any_moment_leaves_whole_files_or_none(tmp_path: Path) -> Non
             assert pendmap.load(folder / "basins.nc").sizes["theta"] == 20
 
 
-def test_what_a_library_makes_of_a_signal_is_an_interrupt(
+def test_an_error_that_a_library_raises_on_a_signal_is_an_interrupt(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
-    # A module in C that is stopped while it is imported says ImportError.
+    # A module in C that is interrupted during its import raises ImportError.
     stub = tmp_path / "stub" / "matplotlib"
     stub.mkdir(parents=True)
     (stub / "__init__.py").write_text(
@@ -191,7 +189,7 @@ def test_ctrl_c_at_the_start_is_no_traceback(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_a_killed_run_left_is_swept_and_no_more(tmp_path: Path, result: xr.Dataset) -> None:
+def test_only_files_of_a_killed_run_are_removed(tmp_path: Path, result: xr.Dataset) -> None:
     code = (
         "import os, signal, sys; from pendmap.files import whole_file\n"
         "with whole_file(sys.argv[1], ['.nc']) as part:\n"
@@ -206,12 +204,12 @@ def test_what_a_killed_run_left_is_swept_and_no_more(tmp_path: Path, result: xr.
     assert len(list(tmp_path.iterdir())) == 4  # the second run swept the first one's
     with whole_file(tmp_path / "other.nc", [".nc"]) as alive:
         pendmap.save(result, tmp_path / "m.nc")
-        assert alive.exists()  # a run that lives keeps what it writes
+        assert alive.exists()  # a live process keeps its files
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == sorted([*foreign, "m.nc", "other.nc"])
 
 
-def test_a_folder_on_its_way_out_is_put_back(tmp_path: Path) -> None:
+def test_a_folder_is_restored_after_its_replacement_was_killed(tmp_path: Path) -> None:
     code = (
         "import os, signal, sys, pathlib; from pendmap.files import whole_folder\n"
         "rename = pathlib.Path.rename\n"
@@ -262,7 +260,7 @@ def test_a_zarr_replaces_nothing_but_a_result(tmp_path: Path, result: xr.Dataset
     assert (tmp_path / "foreign.zarr" / "thesis.tex").read_text() == "mine"
 
 
-def test_an_old_zarr_stays_where_the_new_one_fails(tmp_path: Path) -> None:
+def test_an_old_zarr_is_kept_if_the_new_one_fails(tmp_path: Path) -> None:
     words = (*SMALL, "--out", "m.zarr")
     assert bounded(words, tmp_path, 10**9).returncode == 0
     before = pendmap.load(tmp_path / "m.zarr")
@@ -272,7 +270,7 @@ def test_an_old_zarr_stays_where_the_new_one_fails(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["m.zarr"]
 
 
-def test_a_folder_is_put_in_place_whole(tmp_path: Path) -> None:
+def test_a_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:
     with whole_folder(tmp_path / "new") as part:
         part.mkdir()
         (part / "a").touch()

@@ -1,4 +1,4 @@
-"""Public functions in a child of a process that has called all of them."""
+"""Public functions in a forked child of a process that has called all of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bad input and faults, drawn: a handful here, ``make fuzz`` for many."""
+"""Randomly drawn bad input and faults: a few here, many in ``make fuzz``."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import fuzz_cases
 FUZZ = Path(__file__).parents[1] / "fuzz.py"
 
 
-def test_what_is_drawn_ends_well(tmp_path: Path) -> None:
-    # A process of its own: it forks, and computes nothing before.
+def test_drawn_cases_end_well(tmp_path: Path) -> None:
+    # A separate process: it forks, and computes nothing before that.
     words = [sys.executable, str(FUZZ), "--seed", "2", "--count", "56", "--keep", str(tmp_path)]
     run = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -27,7 +27,7 @@ def test_the_same_seed_draws_the_same_case() -> None:
         assert one == again
 
 
-def test_what_ends_badly_is_found(tmp_path: Path) -> None:
+def test_a_case_that_ends_badly_is_reported(tmp_path: Path) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text(
         "import sys; sys.path.insert(0, sys.argv.pop(1))\n"

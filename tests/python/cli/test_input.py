@@ -1,4 +1,4 @@
-"""Arguments of Python callers: refused by name, or taken as they were meant."""
+"""Arguments from Python: accepted in any numeric type, or refused by name."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_any_real_number_is_a_parameter(p: Any) -> None:  # noqa: ANN401
 @pytest.mark.parametrize(
     "p", [10**400, 10**5000, 1j, np.True_, None, [1.0], "1" * 500], ids=lambda p: type(p).__name__
 )
-def test_what_is_no_parameter_is_refused_on_one_short_line(p: Any) -> None:  # noqa: ANN401
+def test_invalid_parameters_are_refused_on_one_short_line(p: Any) -> None:  # noqa: ANN401
     with pytest.raises(InputError, match=r"p must be .*, got ") as error:
         Pendulum(p=p)
     assert len(str(error.value)) < 150
@@ -37,12 +37,12 @@ def test_what_is_no_parameter_is_refused_on_one_short_line(p: Any) -> None:  # n
 @pytest.mark.parametrize(
     "axis", [(0, 1, 2.5), (0, 1, True), (0, 1, "5"), ("0", 1, 5), (-1e308, 1e308, 5)]
 )
-def test_axes_that_are_none_are_refused(axis: tuple[Any, Any, Any]) -> None:
+def test_invalid_axes_are_refused(axis: tuple[Any, Any, Any]) -> None:
     with pytest.raises(InputError, match="must be"):
         Axis(*axis)
 
 
-def test_axes_may_be_tuples_and_counts_numpys() -> None:
+def test_axes_may_be_tuples_and_counts_numpy_integers() -> None:
     grid = Grid((0, 1, 5), (np.float32(0), 1, np.int32(5)))  # type: ignore[arg-type]
     assert grid == Grid(Axis(0, 1, 5), Axis(0, 1, 5))
     assert type(grid.velocity.count) is int
@@ -111,10 +111,10 @@ def test_only_results_are_saved(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-# What the summaries say
+# Statements of summaries
 
 
-def test_an_exponent_is_that_of_its_stretch() -> None:
+def test_the_summary_states_the_interval_of_an_exponent() -> None:
     pendulum = Pendulum(p=1.7)
     run = pendmap.simulate(pendulum, math.pi / 2, 0, 200, lyapunov=True)
     assert run.attrs["exponent_from"] == pytest.approx(20, abs=0.2)
@@ -123,18 +123,18 @@ def test_an_exponent_is_that_of_its_stretch() -> None:
         assert words in run.attrs["summary"]
 
 
-def test_a_tolerance_that_was_missed_is_said_to_be() -> None:
-    # Rounding, magnified by chaos, is more than this.
+def test_a_missed_tolerance_is_reported() -> None:
+    # Rounding errors, magnified by chaos, exceed it.
     missed = pendmap.simulate(Pendulum(p=5, omega=0.5), 1, 0, 100, tol=1e-13)
     assert missed.attrs["reached_error"] > 1e-13
     assert "THE TOLERANCE 1e-13 WAS NOT REACHED" in missed.attrs["summary"]
-    # Whole turns of the start cost nothing.
+    # Whole turns of the start cause no error.
     far, near = (pendmap.simulate(Pendulum(), 1 + turns, 0, 10) for turns in (2000 * math.pi, 0))
     assert abs(far.theta[-1] - near.theta[-1] - 2000 * math.pi) < 1e-8
     assert "TOLERANCE" not in pendmap.simulate(Pendulum(), 1, 0, 10).attrs["summary"]
 
 
-def test_a_map_on_which_nothing_is_decided_says_no_more_than_that() -> None:
+def test_a_map_without_decided_cells_has_a_short_summary() -> None:
     result = pendmap.basins(Pendulum(), Grid.square(8), max_periods=1)
     summary = result.attrs["summary"]
     assert "100 % of the starts undecided within 1 period; --max-periods raises" in summary
@@ -145,10 +145,10 @@ def test_a_map_on_which_nothing_is_decided_says_no_more_than_that() -> None:
     assert "on 1 thread (" in one.attrs["summary"]
 
 
-def test_a_bound_that_was_shortened_beside_chaos_is_explained() -> None:
+def test_a_bound_that_was_shortened_because_of_chaos_is_explained() -> None:
     result = pendmap.basins(Pendulum(p=1.52, omega=1.1), Grid.square(30), check=False)
     assert result.attrs["max_periods"] < 4000
-    # As if a few starts had taken longer than that.
+    # This bound makes a few starts appear to take longer.
     result.attrs["undecided"] = 0.02
     result.attrs["summary"] = summary.summarise(
         result, pendmap.Pendulum(p=1.7), bound_was_chosen=True

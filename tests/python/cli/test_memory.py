@@ -1,4 +1,4 @@
-"""Requests for more memory than there is, under a real limit: one line each, and no file."""
+"""Requests that exceed the memory, under a real limit: one line each, and no file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LIMIT = 6_000_000
-"""What `ulimit -v` is given, in kB."""
+"""Limit of `ulimit -v`, kB."""
 
 COMMANDS = [
     "basins --p 0.6 --grid 20000",
@@ -89,7 +89,7 @@ def test_a_function_that_asks_for_too_much_raises_memory_error(tmp_path: Path) -
 
 
 @needs_limits
-def test_all_threads_that_may_be_asked_for_do_not_end_a_command(tmp_path: Path) -> None:
+def test_a_command_runs_with_the_largest_number_of_threads(tmp_path: Path) -> None:
     line = "-m pendmap basins --p 0.6 --grid 12 --threads 256 --json"
     ended = limited(sys.executable, *line.split(), folder=tmp_path)
     assert ended.returncode == 0, ended.stderr

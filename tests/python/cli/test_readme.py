@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PATIENCE = 120.0
-"""Most processor time of a command, s."""
+"""Upper bound on the processor time of a command, s."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -31,12 +31,12 @@ def marks(page: Path) -> list[pytest.MarkDecorator]:
 
 
 def blocks(language: str, text: str = README) -> list[str]:
-    """All code blocks in a language."""
+    """Return all code blocks in a language."""
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
 def commands(text: str = README) -> list[list[str]]:
-    """All commands, as words."""
+    """Return all commands, each split into words."""
     lines = [line for block in blocks("sh", text) for line in block.splitlines()]
     return [shlex.split(line, comments=True) for line in lines]
 
@@ -54,27 +54,27 @@ PROMISED = {
 
 
 def written(words: list[str]) -> str | None:
-    """The name, without its ending, that the files of a command have."""
+    """Return the name, without extension, of the files that a command writes."""
     if "--out" in words:
         return Path(words[words.index("--out") + 1]).stem
     return None if {"--json", "--plot", "--rerun", "--view"} & set(words) else words[1]
 
 
 def needed(place: int, lines: list[list[str]]) -> list[int]:
-    """Places of the commands that must run before one: the last that wrote each name in it."""
+    """Return indices of the commands a command needs: the last one to write each name in it."""
     names = {Path(word).parts[0].partition(".")[0] for word in lines[place][2:]}
     last = {written(lines[k]): k for k in range(place)}
     return sorted({k for k in map(last.get, names) if k is not None})
 
 
 def children_seconds() -> float:
-    """Processor time, s, of all processes that ended."""
+    """Return the processor time, s, of all ended child processes."""
     spent = os.times()
     return spent.children_user + spent.children_system
 
 
 def together(lines: list[list[str]]) -> list[list[int]]:
-    """Places of the commands that need one another, in order: each command once."""
+    """Return the groups of dependent commands as indices in order, each command once."""
     groups: list[set[int]] = []
     for place in range(len(lines)):
         own = {place, *needed(place, lines)}
@@ -103,7 +103,7 @@ def test_every_command_runs(page: Path, places: list[int], tmp_path: Path) -> No
         assert children_seconds() - began < PATIENCE
 
 
-def test_there_are_commands() -> None:
+def test_the_pages_contain_commands() -> None:
     for name, least in {"README.md": 7, "diagnose.md": 5}.items():
         assert any(page.name == name and len(PROMISED[page]) >= least for page in PAGES)
 
@@ -130,7 +130,7 @@ def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", blocks("toml"))
-def test_every_toml_is_what_it_is_said_to_be(
+def test_every_toml_block_is_a_valid_file_of_its_kind(
     text: str, tmp_path: Path, pendmap_command: Run
 ) -> None:
     if "[columns]" in text:
@@ -151,7 +151,7 @@ def test_every_toml_is_what_it_is_said_to_be(
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_link_leads_somewhere(page: Path) -> None:
+def test_every_link_has_a_target(page: Path) -> None:
     for target in re.findall(r"\]\(<?([^)#>]+)>?\)", page.read_text(encoding="utf-8")):
         if not target.startswith("http"):
             assert (page.parent / target).exists(), target

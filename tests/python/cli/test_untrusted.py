@@ -1,4 +1,4 @@
-"""Files that nobody vouches for: pipes, devices, bombs, damage; refused at once, on one line."""
+"""Untrusted files: pipes, devices, decompression bombs, damage; refused at once, on one line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ READERS = {
 
 @pytest.mark.parametrize("suffix", READERS)
 @pytest.mark.parametrize("kind", ["pipe", "endless", "folder"])
-def test_what_is_no_file_is_refused_without_waiting(tmp_path: Path, suffix: str, kind: str) -> None:
+def test_pipes_and_devices_are_refused_without_waiting(
+    tmp_path: Path, suffix: str, kind: str
+) -> None:
     source = tmp_path / f"x{suffix}"
     if kind == "pipe":
         os.mkfifo(source)
@@ -89,7 +91,7 @@ def test_as_many_columns_as_are_allowed_are_read(tmp_path: Path) -> None:
     rest = ",0.25" * (MOST_COLUMNS - 2)
     names = ["t_s", "theta_rad", *(f"c{k}" for k in range(MOST_COLUMNS - 2))]
     lines = [",".join(names), *(f"{a:.4f},{b:.6f}{rest}" for a, b in zip(t, x, strict=True))]
-    lines[150:150] = ["9," * 10**6]  # a line that broke is left out, however long
+    lines[150:150] = ["9," * 10**6]  # a broken line is left out, however long
     (tmp_path / "wide.csv").write_text("\n".join(lines))
     experiment = pendmap.read_experiment(tmp_path / "wide.csv")
     assert experiment.runs[0].theta == pytest.approx(x, abs=1e-6)
@@ -132,7 +134,7 @@ def test_a_small_result_does_not_unpack_to_more_than_the_memory(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("version", [0, 2, 1.5, "1", "x", float("nan"), [1, 2]])
-def test_a_format_that_is_none_is_refused(tmp_path: Path, version: object) -> None:
+def test_an_unknown_format_is_refused(tmp_path: Path, version: object) -> None:
     attrs = {"format_version": version, "kind": "basins"}
     xr.Dataset({"x": ("t", [1.0])}, attrs=attrs).to_netcdf(tmp_path / "r.nc", engine="netcdf4")
     with pytest.raises(InputError, match="has format"):
@@ -183,7 +185,7 @@ def test_a_description_is_read_or_refused_whatever_its_values(tmp_path: Path) ->
 
 
 def test_a_parquet_file_with_one_byte_wrong_ends_no_process(tmp_path: Path) -> None:
-    # A separate process: a library that aborts ends it.
+    # A separate process, as a library that aborts would end this one.
     code = (
         "import sys, numpy as np, pyarrow as pa\n"
         "from pyarrow import parquet\n"

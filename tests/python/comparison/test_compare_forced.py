@@ -1,4 +1,4 @@
-"""``pendmap compare`` on forced runs: ensembles and steady states, on rigs whose truth is known."""
+"""``pendmap compare`` on forced runs: ensembles and steady states of rigs with known parameters."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_the_error_of_the_start_follows_from_the_noise(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> None:
-    """Runs that tumble; the chance of a true model's statistic is even between 0 and 1."""
+    """On tumbling runs the p-values of a true model's statistics are uniform on [0, 1]."""
     plans = [forced(0.4 * k, 3.0, 40.0, p=1.5, frequency=11.0) for k in range(6)]
     experiment = made(tmp_path, *plans)
     true = compare(RIG, experiment, ensemble=Ensemble(members=200))
@@ -104,7 +104,7 @@ def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> 
 def test_a_steady_state_is_the_models_orbit(
     start: tuple[float, float], kind: str, tmp_path: Path
 ) -> None:
-    """Newton's method finds the same orbit; more damping makes a smaller oscillation."""
+    """The orbit equals that found by Newton's method; more damping makes a smaller oscillation."""
     experiment = made(tmp_path, forced(*start, 90.0))
     one = compare(RIG, experiment, ensemble=Ensemble(members=30, spread=0.002)).forced[0]
     found = one.steady
@@ -124,7 +124,7 @@ def test_a_steady_state_is_the_models_orbit(
     points = zip(stable["point_theta"].values, stable["point_velocity"].values, strict=True)
     nearest = min(points, key=lambda point: math.dist(ours, point))
     assert ours[0] == pytest.approx(nearest[0], abs=3e-4)
-    # Friction turns round with a kink, of which twelve harmonics know little.
+    # Friction has a kink at each turning point, which twelve harmonics resolve poorly.
     assert ours[1] == pytest.approx(nearest[1], abs=3e-3)
     if kind.startswith("oscillation"):
         damped = dataclasses.replace(RIG, c_over_m=1.2)
@@ -197,14 +197,14 @@ def test_runs_that_cannot_be_compared_are_left_out_with_a_reason(tmp_path: Path)
     assert "lost: not compared: what drives it is not known" in str(found)
     with pytest.raises(InputError, match="no run can be compared: lost: what drives"):
         compare(RIG, Experiment(tmp_path, (lost,)))
-    # A drive of the model's own is none of a free decay.
+    # The model's own drive has no part in a free decay.
     driven = compare(dataclasses.replace(RIG, p=0.8, Omega=12.0), Experiment(tmp_path, (free,)))
     assert driven.runs[0].errors is not None
     assert found.runs[0].errors is not None
     assert driven.runs[0].errors.peak_rms == found.runs[0].errors.peak_rms < 1
 
 
-def test_chances_are_ranks() -> None:
+def test_p_values_are_ranks() -> None:
     values = np.arange(99.0)
     assert Statistic("", "", 49.0, values).chance == 1.0
     assert Statistic("", "", 97.5, values).chance == pytest.approx(2 * 2 / 100)
@@ -213,7 +213,7 @@ def test_chances_are_ranks() -> None:
     assert Statistic("", "", 0.0, values).ci95 == (2.0, 96.0)
 
 
-def test_cycles_are_moved_by_periods_and_turns() -> None:
+def test_cycles_are_aligned_by_shifts_of_periods_and_turns() -> None:
     x = np.arange(128) / 128
     one = Cycle.of(2, 0, 1.0, np.sin(math.tau * x) + 0.1 * np.sin(2 * math.tau * x))
     np.testing.assert_allclose(

@@ -1,4 +1,4 @@
-"""Division of an experiment into records to fit and records held back."""
+"""Division of an experiment into records to fit and records held out."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def run(
         (4, 0, ["free0", "free1", "free2", "free3"], True),
     ],
 )
-def test_runs_and_stretches_are_held_back_where_none_is_marked(
+def test_runs_and_stretches_are_held_out_if_none_is_marked(
     free: int, forced: int, held: list[str], *, inside: bool
 ) -> None:
     runs = [run(f"free{k}", "free") for k in range(free)]
@@ -53,14 +53,14 @@ def test_runs_and_stretches_are_held_back_where_none_is_marked(
     assert {each.name for each in data.fitted} == {each.name for each in runs} - whole
 
 
-def test_only_marked_runs_are_held_back() -> None:
+def test_only_marked_runs_are_held_out() -> None:
     runs = [run("a", "free"), run("b", "forced"), run("c", "forced", hold_out=True)]
     data = split_records(Experiment(Path("there"), tuple(runs)))
     assert [each.name for each in data.held] == ["c"]
     assert [each.name for each in data.fitted] == ["a", "b"]
 
 
-def test_a_run_too_short_to_show_its_noise_has_that_of_the_others() -> None:
+def test_a_run_too_short_for_a_noise_estimate_has_that_of_the_others() -> None:
     lengths = {"a": 1500, "b": 1500, "c": 1500, "few": 19, "some": 60}
     runs = tuple(run(name, "free", samples=count) for name, count in lengths.items())
     *known, few, some = split_records(Experiment(Path("there"), runs)).readings
@@ -68,7 +68,7 @@ def test_a_run_too_short_to_show_its_noise_has_that_of_the_others() -> None:
     assert usual == pytest.approx(1e-3, rel=0.1)
     assert few.sigma == some.sigma == usual
     assert 0 < few.doubt < 0.1
-    # Alone it has what it shows, and says how little that is.
+    # Its own estimate is poor, and has a large stated uncertainty.
     (alone,) = split_records(Experiment(Path("there"), (run("a", "free", samples=250),))).readings
     assert alone.doubt > 0.02
 
@@ -79,7 +79,7 @@ def test_the_noise_of_exact_readings_is_that_of_the_finest_sensor() -> None:
     assert all(reading.sigma >= 1e-7 for reading in readings)
 
 
-def test_too_few_samples_to_hold_any_back_are_refused() -> None:
+def test_too_few_samples_for_a_hold_out_are_refused() -> None:
     with pytest.raises(
         InputError, match="one run must have 201 samples or more: there are too few"
     ):

@@ -1,4 +1,4 @@
-"""Readings far denser than the motion, put together: nothing that they say is lost."""
+"""Averaging of readings much denser than the motion, without loss of information."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ TIME = np.arange(20000) * 1e-3
 ANGLE = motion(TIME, (1.5, 0.0), w0=8.0, c_over_m=0.05, friction=0.05)
 
 
-def test_a_block_reads_the_angle_at_its_own_time() -> None:
+def test_a_block_has_the_angle_at_its_own_time() -> None:
     found = average_blocks(FitRun(TIME, ANGLE, 1e-5))
     assert TIME.size / 20 < found.time.size < TIME.size / 10
-    # Means alone are off by T^2 th''/24, a hundred times as much.
+    # Plain means would be off by T^2 th''/24, a hundred times as much.
     off = np.abs(found.theta - CubicSpline(TIME, ANGLE)(found.time))[3:-3]
     assert off.max() < 4e-6
     assert np.median(off) < 2e-6

@@ -1,4 +1,4 @@
-"""The error of forecasts against their horizon, and figure 7, before and after."""
+"""Forecast errors against the horizon, and figure 7 for the given and the new model."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def test_the_new_model_forecasts_farther(found: Discrepancy) -> None:
         assert np.all(np.diff(forecast.horizon) > 0)
         far = forecast.horizon > 0.5 * forecast.horizon[-1]
         before, after = np.mean(forecast.before[far]), np.mean(forecast.after[far])
-        # The new model lacks only the state at the start, which one swing of readings gives.
+        # The new model's only error is that of the initial state, fitted to one swing of readings.
         assert forecast.noise_floor * 0.9 < after < 1.4 * forecast.noise_floor
         assert before > 1.2 * after
 
 
 def test_periods_and_peaks_are_those_of_a_simulation(found: Discrepancy) -> None:
-    """The command ``compare`` has them from the located turns of a simulation."""
+    """The turning points of a simulation give the periods and peaks of ``compare``."""
     model = dataclasses.replace(diagnosed_model(found), notes={})
     simulated = {one.run.name: one.errors for one in compare(model, found.data.experiment).runs}
     assert found.cycles[0].held_out
@@ -60,8 +60,8 @@ def test_periods_and_peaks_are_those_of_a_simulation(found: Discrepancy) -> None
     assert after < 0.5 * before
 
 
-def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
-    """A pendulum that starts upright, at rest, goes as ``th - pi = a cosh(w0 t)`` at first."""
+def test_a_replay_without_other_torques_falls_freely() -> None:
+    """From upright rest, ``th - pi = a cosh(w0 t)`` for small deviations."""
     time = np.linspace(0.0, 0.5, 51)
     run = FitRun(time, np.zeros(51), 1e-9)
     ((readings, curve),) = run_forward(Motion(Rig(w0=6.0), {}), [run], [(np.pi - 1e-5, 0.0)])
@@ -70,7 +70,7 @@ def test_a_replay_falls_freely_where_nothing_else_acts() -> None:
     np.testing.assert_allclose(curve[0], expected, atol=1e-9)
 
 
-def test_the_strength_of_a_drag_is_its_torque(found: Discrepancy) -> None:
+def test_the_strength_of_a_drag_is_its_torque_on_the_motion(found: Discrepancy) -> None:
     strength = effect_strength(found.best.fitted.fit, found.data.fitted, "quadratic_drag")
     q = found.effects[0].parameters["q"]
     speeds = np.concatenate([curve[1] for curve in found.best.fitted.fit.curves])
@@ -90,7 +90,7 @@ def test_forecasts_do_not_depend_on_where_clocks_begin(found: Discrepancy) -> No
 
 
 def _later(run: FitRun, begin: float) -> FitRun:
-    """Return a run on a clock that began earlier; the drive's phase counts from its zero."""
+    """Return a run on a clock that began earlier; the phase of the drive refers to its zero."""
     drive = run.drive
     if drive is not None:
         drive = {**drive, "phi": float(drive["phi"] or 0) - float(drive["Omega"] or 0) * begin}

@@ -1,4 +1,4 @@
-"""Statistics of paths among wells, on paths whose itinerary is known."""
+"""Statistics of paths between wells, for paths with known itineraries."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def of(path: np.ndarray, ruler: Ruler = RULER) -> Itineraries:
     return Itineraries.of(path[None], ruler)
 
 
-def test_a_staircase_of_wells() -> None:
-    """Up two wells, one back, and round twice the other way: 7 passages through 6 wells."""
+def test_passages_of_a_staircase_of_wells_are_counted() -> None:
+    """The path goes up two wells, back one, and twice round: 7 passages through 6 wells."""
     visited = [0, 1, 2, 1, 0, -1, -2, -3]
     path = np.repeat(math.tau * np.array(visited, float), TIME.size // len(visited))
     found = of(path)
@@ -29,7 +29,7 @@ def test_a_staircase_of_wells() -> None:
     assert wells(path[None]).tolist()[0][:: TIME.size // len(visited)] == visited
 
 
-def test_noise_at_the_top_is_no_escape_and_a_jump_over_wells_is_several() -> None:
+def test_noise_at_the_top_is_no_escape_and_a_jump_over_wells_is_several_escapes() -> None:
     near_top = math.pi + np.random.default_rng(1).normal(0, 0.02, TIME.size)
     near_top[0] = 0.0
     assert of(near_top).escapes[0] == 0
@@ -70,7 +70,7 @@ def test_a_path_without_a_cycle_never_settles() -> None:
     found = of(walk)
     assert (found.n[0], found.w[0]) == (0, 0)
     assert math.isinf(found.settled[0])
-    late = np.where(TIME < 39, walk, 0.0)  # four periods are wanted, and one is there
+    late = np.where(TIME < 39, walk, 0.0)  # four periods are required, and only one is present
     assert math.isinf(of(late).settled[0])
 
 

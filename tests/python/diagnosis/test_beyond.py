@@ -1,4 +1,4 @@
-"""A diagnosis is complete where a part beside its verdict cannot be computed."""
+"""Diagnoses of which a supplementary part cannot be computed."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def anew() -> Discrepancy:
 
 
 def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
-    """Make each call into the core diverge with a probability."""
+    """Make each call into the core diverge with a given probability."""
     draw = np.random.default_rng(seed)
     for name in ENTRIES:
         true = getattr(_core, name)
 
-        def call(*given: Any, true: Any = true) -> Any:  # noqa: ANN401 (as the core)
+        def call(*given: Any, true: Any = true) -> Any:  # noqa: ANN401 (the signature of the core)
             if draw.random() < share:
                 raise _core.Diverged(LOST)
             return true(*given)
@@ -79,7 +79,7 @@ def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
 
 @pytest.mark.thorough
 def test_the_torque_of_a_spring_is_named_elastic_with_reserve(tmp_path: Path) -> None:
-    # An oscillator whose period does not grow with the amplitude equals a pendulum with a spring.
+    # An oscillator whose period does not grow with amplitude equals a pendulum with a spring.
     t = np.arange(0, 30, 0.02)
     record = tmp_path / "spring.csv"
     rows = np.c_[t, 3.1 * np.exp(-0.5 * t) * np.cos(6 * t)]

@@ -39,7 +39,7 @@ GAP = ("noise_floor", "before", "after", "held_out_before", "held_out_after")
 
 @pytest.fixture
 def hidden(pendmap_command: Run) -> str:
-    """The folder of an experiment with a drag hidden in it."""
+    """Return the folder of an experiment with a hidden drag."""
     made = pendmap_command(
         *("rig", "hidden", "--effect", "quadratic_drag", "--seed", "3", "--out", "hidden")
     )
@@ -61,7 +61,7 @@ def test_json_and_a_model_that_every_command_takes(
     low, high = effect["ci95"]["q"]
     assert low < effect["parameters"]["q"] < high
     assert found["detection_limits"]["bearing_harmonic"] > 0
-    # The model file that it names exists; --json alone writes no other file.
+    # The model file named in it exists; --json alone writes no other file.
     made = {path.name for path in tmp_path.iterdir()} - {"hidden", "hidden.truth.toml"}
     assert made == {found["model"]} == {"diagnose.toml"}
     path = tmp_path / found["model"]
@@ -79,7 +79,7 @@ def test_json_and_a_model_that_every_command_takes(
     assert Rig.from_toml(path).effects[0].name == "quadratic_drag"
     again = pendmap_command("simulate", "--model", found["model"], "--until", "5", "--json")
     assert again.returncode == 0, again.stderr
-    # A diagnosis of the same records with the model found finds nothing.
+    # A diagnosis of the same records with the new model names nothing.
     more = pendmap_command(
         "diagnose", hidden, "--model", found["model"], "--json", "--out", "b.toml"
     )
@@ -104,7 +104,7 @@ def test_a_viscous_model_lacks_coulomb_friction(tmp_path: Path, pendmap_command:
 def test_the_verdict_comes_first(
     tmp_path: Path, hidden: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # The diagnosis of these records, which other tests need too.
+    # Other tests use the diagnosis of these records too.
     found = once("quadratic_drag", seed=3)
     monkeypatch.setattr(pendmap.diagnosis, "diagnose", lambda *_given, **_named: found)
     monkeypatch.chdir(tmp_path)
@@ -115,7 +115,7 @@ def test_the_verdict_comes_first(
     assert not end.value.code
     assert said.startswith("Verdict: named")
     assert "Written: found.toml" in said
-    # Numbers have the units that the report gives them.
+    # Numbers have the units stated in the report.
     assert re.search(
         r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; closes \d+ % of .*; probability 0\.\d+",
         said,
@@ -234,7 +234,7 @@ def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: R
     run = pendmap_command("diagnose", "small.csv", "--json")
     assert run.returncode == 0, run.stderr
     found = json.loads(run.stdout)
-    # At the amplitude of 2.9 rad that the record is read as, a spring replaces gravity.
+    # At the amplitude of 2.9 rad under the wrong unit, a spring replaces gravity.
     assert found["effects"]
     assert all(effect["approximate"] for effect in found["effects"])
     # With this spring the motion of every proposed run diverges.

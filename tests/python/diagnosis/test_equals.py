@@ -1,4 +1,4 @@
-"""Names that records cannot tell apart, found from the records' own sensitivities."""
+"""Effects that records cannot distinguish, found from the sensitivities of the records."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores:
-    """Score effects at the baseline of an experiment that hides nothing."""
+    """Score effects at the baseline of an experiment without hidden effects."""
     request = virtual_rig.Request("hidden", seed=4, effects=("none",), free=2, forced=forced)
     where = virtual_rig.places(folder / "plain", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
@@ -35,11 +35,13 @@ def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores
         ("drive_frequency", "timebase", 2),
         ("drive_amplitude", "added_mass", 2),
         ("rig_tilt", "encoder_offset", 0),
-        # One period a turn is gravity itself, and gravity turned.
+        # A harmonic of one period a turn is equivalent to gravity and to a rotation of it.
         ("rig_tilt", Candidate("bearing_harmonic", {"n": 1.0}), 0),
     ],
 )
-def test_equals_are_alike(one: str, other: str | Candidate, forced: int, tmp_path: Path) -> None:
+def test_equivalent_effects_have_equal_scores(
+    one: str, other: str | Candidate, forced: int, tmp_path: Path
+) -> None:
     scores = scored(tmp_path, [one, other], forced=forced)
     assert scores.likeness(0, 1) == pytest.approx(1, abs=1e-4)
     gains = [score.gain for score in scores.scores]
@@ -55,7 +57,7 @@ def test_equals_are_alike(one: str, other: str | Candidate, forced: int, tmp_pat
         ("asymmetric_coulomb", "asymmetric_viscous"),
     ],
 )
-def test_effects_that_differ_under_a_drive_are_told_apart(
+def test_effects_that_differ_under_a_drive_are_distinguished(
     one: str, other: str, tmp_path: Path
 ) -> None:
     assert scored(tmp_path, [one, other], forced=2).likeness(0, 1) < 0.99

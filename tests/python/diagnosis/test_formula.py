@@ -1,4 +1,4 @@
-"""``diagnose`` with candidates of the user's own."""
+"""``diagnose`` with candidates defined by the user."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_formula_that_alone_explains_the_records_is_named(
     assert run.returncode == 0, run.stderr
 
 
-# ruff: noqa: ARG001 (a function takes all that a torque may depend on)
+# ruff: noqa: ARG001 (a function takes all arguments of a torque)
 def _table(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
     grid = np.linspace(-math.pi, math.pi, 2001)
     return np.interp(np.angle(np.exp(1j * theta)), grid, [torque(x) for x in grid])

@@ -1,4 +1,4 @@
-"""``diagnose`` on experiments whose truth it cannot read."""
+"""``diagnose`` on experiments whose hidden effects it cannot read."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_a_hidden_effect_is_named_with_its_size(
 def test_an_instant_or_a_frequency_is_found_with_the_size(
     effect: str, seed: int, time: str, tmp_path: Path
 ) -> None:
-    # One of about a thousand frequencies or instants.
+    # The scan has about a thousand frequencies or instants.
     found, truth = diagnosed(tmp_path, effect, seed=seed)
     assert found.verdict == "named"
     (named,) = found.effects
@@ -83,7 +83,7 @@ def test_the_drag_is_named_in_correlated_noise(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_a_search_that_drops_accepted_effects_ends(tmp_path: Path) -> None:
-    # The search accepts a friction alone; the drag in its place gains too little.
+    # The search accepts friction alone; drag in its place gains too little.
     found, _ = diagnosed(
         tmp_path, "quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8, noise=0.1
     )
@@ -116,13 +116,13 @@ def test_a_chirp_of_the_only_forced_run_is_named(
 
 
 @pytest.mark.thorough
-def test_a_friction_that_sticks_is_among_the_names(tmp_path: Path) -> None:
+def test_a_friction_that_sticks_is_named_or_equivalent(tmp_path: Path) -> None:
     found, _ = diagnosed(tmp_path, "stribeck_friction", noise=0.05, size=2.0)
     assert found.verdict in {"named", "ambiguous"}
     assert "stribeck_friction" in _names(found)
 
 
-def test_a_pair_is_named_whole(tmp_path: Path) -> None:
+def test_both_effects_of_a_pair_are_named(tmp_path: Path) -> None:
     found, truth = diagnosed(tmp_path, "quadratic_drag", "bearing_harmonic", noise=0.1)
     assert set(truth) == {"quadratic_drag", "bearing_harmonic"}
     assert found.verdict == "named"
@@ -180,14 +180,14 @@ def test_an_effect_is_found_whose_full_first_step_diverges(tmp_path: Path) -> No
 @pytest.mark.thorough
 @pytest.mark.parametrize("most", [0, 1])
 def test_at_most_the_allowed_number_of_effects_is_added(most: int, tmp_path: Path) -> None:
-    # One effect of the pair leaves a large gap: the search also tries pairs.
+    # One effect of the pair explains only a part: the search also tries pairs.
     pair = ("quadratic_drag", "bearing_harmonic")
     given = {"size": 4.0, "noise": 0.1, "free": 3, "forced": 0}
     found, _ = diagnosed(tmp_path, *pair, seed=1, max_effects=most, **given)
     counted = [name for name in found.nearest.fitted.names if name != "encoder_offset"]
     assert len(counted) <= most
     if not most:
-        # The zero of the sensor does not count, and is not claimed.
+        # The zero of the sensor is not an added effect.
         assert found.best.fitted.chosen == ()
         assert found.best is found.base
         assert found.attempts == ()

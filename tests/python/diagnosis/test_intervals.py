@@ -1,4 +1,4 @@
-"""Intervals of shape parameters, and places on either side of the rest position."""
+"""Intervals of shape parameters; parameters whose mirrored value fits equally well."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> FittedModel:
-    """Return the model fitted from another value of a parameter, held fixed or not."""
+    """Return the model fitted from another value of a parameter, which may be held fixed."""
     fitted = found.best.fitted
     effect, parameter = key.split(".")
     model = fitted.fit.model
@@ -41,7 +41,7 @@ def _from(found: Discrepancy, key: str, value: float, *, held: bool) -> FittedMo
 
 
 def _risen(found: Discrepancy, key: str, value: float) -> float:
-    """Return the rise of the least sum of squares with a parameter held, over that of noise."""
+    """Return the increase of the least sum of squares with a parameter fixed, over the noise."""
     fitted = found.best.fitted
     return (_from(found, key, value, held=True).chi2 - fitted.chi2) / fitted.widening
 

@@ -1,6 +1,7 @@
-"""``diagnose`` on measured records, where the environment names their folder.
+"""``diagnose`` on measured records, in the folder named by the environment.
 
-The fits by hand have viscous damping, Coulomb friction, quadratic drag and the sensor's zero.
+The reference fits by hand have viscous damping, Coulomb friction, quadratic drag and the sensor's
+zero.
 """
 
 from __future__ import annotations
@@ -30,17 +31,17 @@ BY_HAND = {
     "cartpend_upright": 0.0086,
     "multiarm_single_free_large": 0.0028,
 }
-"""Root mean square, rad, that the fits by hand leave of the whole record."""
+"""Root mean square residual, rad, of the fits by hand to the whole record."""
 
 CARTPEND, HELD = ("upright", "40", "20"), "80"
-"""Decays of one pendulum by where they begin, and the one that is held out."""
+"""Decays of one pendulum, named by their starts, and the held-out one."""
 
 HELD_BY_HAND = 0.0083
-"""Root mean square, rad, that the hand fit of the three others leaves of it."""
+"""Root mean square residual, rad, on the held-out decay of the hand fit to the three others."""
 
 
 def path_of(name: str) -> Path:
-    """Return where a record is, in the folder or below it."""
+    """Return the path of a record, in the folder or below it."""
     return next(Path(RECORDS).rglob(f"{name}.csv"))
 
 
@@ -60,7 +61,7 @@ def found(name: str) -> Discrepancy:
 
 
 def check_named(diagnosis: Discrepancy) -> None:
-    """Drag closes most of the gap, no coefficient is negative, and no warm-up is named."""
+    """Assert that drag is named first, no coefficient is negative, and no warm-up is named."""
     names = [effect.name for effect in diagnosis.effects]
     assert names[0] == "quadratic_drag"
     assert not [name for name in names if name.endswith("warm_up")]
@@ -69,7 +70,7 @@ def check_named(diagnosis: Discrepancy) -> None:
         assert name not in estimates or estimates[name].value >= 0
     fitted = diagnosis.best.fitted
     assert impose_physics(diagnosis.data, fitted) is fitted
-    # The residual is far above the noise: the named effects are not all.
+    # The residual is far above the noise: the named effects are incomplete.
     assert diagnosis.verdict == "partial"
     assert all(effect.approximate for effect in diagnosis.effects)
     assert diagnosis.assessment.closed > 0.9

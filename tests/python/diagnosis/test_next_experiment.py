@@ -1,4 +1,4 @@
-"""Recommended records decide as much as is predicted, once they are recorded."""
+"""Proposed records distinguish effects as predicted, once they are recorded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def recorded(request: Request) -> Experiment:
-    """Write and read an experiment; nobody opens its truth."""
+    """Write and read an experiment without its truth."""
     with tempfile.TemporaryDirectory() as folder:
         where = virtual_rig.places(Path(folder) / "records", replace=True)
         virtual_rig.write(virtual_rig.make(request), where)
@@ -41,7 +41,7 @@ def recorded(request: Request) -> Experiment:
 
 
 def done(request: Request, proposal: Proposal) -> tuple[Run, ...]:
-    """Let the rig of a request do what is proposed."""
+    """Make the rig of a request record a proposal."""
     begun = [run.plan for run in virtual_rig.make(request).runs]
     plans = [
         RunPlan(
@@ -58,7 +58,7 @@ def done(request: Request, proposal: Proposal) -> tuple[Run, ...]:
     return tuple(dataclasses.replace(run, hold_out=False) for run in every)
 
 
-def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment, Discrepancy]:  # noqa: ANN401 (what the rig is asked for)
+def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment, Discrepancy]:  # noqa: ANN401 (parameters of the request)
     request = Request("hidden", seed=seed, effects=effects or ("none",), forced=0, **given)
     records = recorded(request)
     return request, records, diagnose(records)
@@ -66,7 +66,7 @@ def hidden(seed: int, *effects: str, **given: Any) -> tuple[Request, Experiment,
 
 @pytest.mark.thorough
 def test_the_recommended_record_leaves_one_name() -> None:
-    """Drifts that are alike within minutes: the rig does what was recommended."""
+    """Drifts indistinguishable within minutes are distinguished by the proposed record."""
     request, records, before = hidden(1000018, "viscous_drift", size=0.08, free=3)
     assert before.verdict == "ambiguous"
     (alike,) = before.equivalent
@@ -83,7 +83,7 @@ def test_the_recommended_record_leaves_one_name() -> None:
     assert after.verdict == "named"
     alternatives = after.assessment.identified[0].alternatives
     power = min(r.behind for r in alternatives if r.candidate.name in alike and not r.contains)
-    # Its scatter, and that of the size from which it was predicted.
+    # The tolerance includes the scatter of the gain and of the estimate that predicted it.
     doubt = 2 / math.sqrt(best.value) + 2 / math.sqrt(before.assessment.identified[0].gain)
     assert power == pytest.approx(best.value, rel=3 * doubt)
 
@@ -134,7 +134,7 @@ def test_the_information_of_a_proposal_is_that_of_its_record(what: str) -> None:
     assert errors[0] == pytest.approx(errors[1], rel=0.3)
 
 
-def test_exact_equals_are_told_apart_by_no_proposal() -> None:
+def test_no_proposal_distinguishes_equivalent_effects() -> None:
     found = once("bias_torque", seed=6, size=0.3, free=2, forced=0)
     outlook = found.advice.outlook
     assert outlook is not None
@@ -155,7 +155,7 @@ def test_every_verdict_has_a_table_and_json_without_gaps() -> None:
     (chosen,) = [row for row in table["experiments"] if row["recommended"]]
     assert chosen["what"] in fields["next_experiment"]
     assert chosen["predicted"] <= table["wanted"] < table["now"]
-    # The least recording time of all that do enough.
+    # The least recording time of all sufficient proposals.
     enough = [r["seconds"] for r in table["experiments"] if r["predicted"] <= table["wanted"]]
     assert chosen["seconds"] == min(enough)
     assert all(run["drive"] is None for row in table["experiments"] for run in row["runs"])
@@ -165,14 +165,14 @@ def test_an_effect_that_a_free_decay_does_not_show_has_no_limit() -> None:
     found = once("none", seed=5, free=1, forced=0)
     limits = found.advice.limits
     assert limits["added_mass"].size == math.inf
-    # One period a turn is gravity itself.
+    # A harmonic of one period a turn is gravity itself.
     assert [c.shape["n"] for c in limits["bearing_harmonic"].unseen] == [1.0]
     assert limits["encoder_offset"].size == pytest.approx(limits["rig_tilt"].size, rel=1e-3)
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
-    """Against sums of squares of normal draws about the expected gain."""
+    """The probability is compared with sums of squares of normal draws about the expected gain."""
     rng = np.random.default_rng(1)
     mean = np.zeros(count)
     mean[0] = math.sqrt(required_gain(22.0, count))
@@ -182,7 +182,7 @@ def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
 
 @pytest.mark.thorough
 def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
-    """The limit is that of records without an effect; the same rig then hides it."""
+    """The limit follows from records without an effect; the same rig then has one of that size."""
     _, _, clean = hidden(11, free=2, noise=0.2)
     limit = clean.advice.limits["encoder_gain"].size
     found = 0
@@ -195,7 +195,7 @@ def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
 
 
 def test_information_beside_other_columns_is_the_schur_complement() -> None:
-    """Against least squares on the columns themselves."""
+    """The information is compared with least squares on the columns."""
     rng = np.random.default_rng(2)
     x = rng.standard_normal((300, 5)) * [1, 1e3, 1e-4, 7, 1]
     x[:, 4] = x[:, 0] + 2e-3 * x[:, 1]
@@ -206,7 +206,7 @@ def test_information_beside_other_columns_is_the_schur_complement() -> None:
     assert f.followed([4], [0, 1], [3])[:, 0] == pytest.approx([1, 2e-3])
 
 
-def test_chances_of_names() -> None:
+def test_probabilities_of_names_follow_from_the_expected_gain() -> None:
     """Twice the difference of log-likelihoods has the mean s G and the variance 4 s G."""
     rng = np.random.default_rng(3)
     draws = 16 + 2 * 4 * rng.standard_normal(400_000)
@@ -214,7 +214,7 @@ def test_chances_of_names() -> None:
     assert chance_resolved(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
 
 
-def test_the_rig_does_runs_that_are_planned() -> None:
+def test_the_rig_records_planned_runs() -> None:
     """Planned runs do not change those before them; contradictory requests are refused."""
     request = Request("hidden", seed=4, effects=("none",), free=1, forced=0)
     first = virtual_rig.make(request).runs[0]

@@ -1,4 +1,4 @@
-"""The colour of residuals' noise, read from quick frequencies and continued to slow ones."""
+"""Spectra of residual noise, estimated at high frequencies and extrapolated to low ones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def density(correlation: float, phase: float = W0 * INTERVAL) -> float:
 
 @pytest.mark.parametrize("swell", [1.0, 1.15])
 def test_the_chance_of_slow_residuals_is_that_of_noise_alone(swell: float) -> None:
-    # Noise about swings whose initial states were fitted, in one run stronger than is stated.
+    # Noise about swings with fitted initial states; in one run stronger than stated.
     rng = np.random.default_rng(2)
     chances = []
     for _ in range(100):
@@ -39,23 +39,25 @@ def test_the_chance_of_slow_residuals_is_that_of_noise_alone(swell: float) -> No
     assert noise_of(noise + error, fitted=False).chance < CHANCE
 
 
-def test_white_noise_stays_white() -> None:
+def test_white_noise_is_estimated_as_white() -> None:
     rng = np.random.default_rng(7)
     found = [noise_of(coloured(rng, 0.0)) for _ in range(100)]
     assert sum(abs(one.colour) > 0.02 for one in found) <= 2
     levels = np.array([one.level for one in found])
-    # Each is the mean of some 2,000 squares.
+    # Each is the mean of about 2,000 squares.
     assert np.std(levels) < 1.3 * np.sqrt(2 / 2000)
     assert np.mean(levels) == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize(
     ("correlation", "noise"),
-    # Of coarser counts than that quick noise of 0.9 is nothing but rounding.
+    # With coarser counts, high-frequency noise of 0.9 is rounding alone.
     [(c, n) for c in COLOURS for n in (0.3, 1.0, None) if n != 0.3 or c < 0.8],
 )
-def test_coloured_noise_has_no_excess(correlation: float, noise: float | None) -> None:
-    # Of coarse counts white noise of the rounding hides how steep the coloured part is.
+def test_coloured_noise_has_no_excess_of_slow_residuals(
+    correlation: float, noise: float | None
+) -> None:
+    # With coarse counts the white rounding noise hides the slope of the coloured part.
     rng = np.random.default_rng(3)
     chances, levels = [], []
     for _ in range(40):
@@ -69,7 +71,7 @@ def test_coloured_noise_has_no_excess(correlation: float, noise: float | None) -
     truth = density(correlation)
     if noise is not None:
         truth = noise**2 * truth + COUNT**2 / 12
-    # A verdict looks in four directions.
+    # A verdict tests four directions.
     assert min(chances) > CHANCE / 4
     assert np.mean(np.array(chances) < 0.01) <= 2 / 40
     assert np.median(levels) == pytest.approx(truth, rel=0.4 if correlation > 0.8 else 0.2)
@@ -77,7 +79,7 @@ def test_coloured_noise_has_no_excess(correlation: float, noise: float | None) -
 
 @pytest.mark.parametrize("correlation", COLOURS)
 def test_a_missing_effect_shows_in_coloured_noise(correlation: float) -> None:
-    # As strong over the noise where it is, whatever its colour: 300 a run in the sum of squares.
+    # The effect adds 300 a run to the sum of squares, whatever the colour of the noise.
     rng = np.random.default_rng(5)
     slow = np.sin(0.5 * W0 * INTERVAL * np.arange(SAMPLES))
     error = np.sqrt(300 * density(correlation, 0.5 * W0 * INTERVAL) / np.sum(slow**2)) * slow
@@ -88,7 +90,7 @@ def test_a_missing_effect_shows_in_coloured_noise(correlation: float) -> None:
 
 
 def test_the_chance_of_a_gain_is_that_of_noise_alone() -> None:
-    # What one number gains, the product with a column of unit length, squared, at the swing.
+    # The gain of one number: squared product with a column of unit length at the swing's frequency.
     rng = np.random.default_rng(8)
     for correlation in (0.0, 0.5):
         chances = []
@@ -109,12 +111,12 @@ def test_coloured_noise_of_an_encoder_is_no_effect(
         tmp_path, seed=seed, free=3, forced=0, correlation=correlation, noise=0.15, counts=2048
     )
     assert found.verdict == "none"
-    # Readings beside each other err alike: they are worth less than as many that err anew.
+    # Errors of adjacent readings are correlated: they carry less information than independent ones.
     assert found.level > 2
 
 
 @pytest.mark.thorough
-def test_intervals_hold_in_coloured_noise(tmp_path: Path) -> None:
+def test_intervals_have_their_coverage_in_coloured_noise(tmp_path: Path) -> None:
     inside = []
     for seed in range(1, 9):
         found, truth = diagnosed(
@@ -133,5 +135,5 @@ def test_intervals_hold_in_coloured_noise(tmp_path: Path) -> None:
             low, high = bounds["quadratic_drag"]["q"]
             inside.append(low <= truth["quadratic_drag"]["q"] <= high)
     assert len(inside) >= 6
-    # By the stated noise alone, too narrow by three, half of them would miss.
+    # By the stated noise, too small by a factor of three, half of the intervals would miss.
     assert sum(inside) >= len(inside) - 1

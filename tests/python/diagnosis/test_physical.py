@@ -1,4 +1,4 @@
-"""Models of a diagnosis are physical: no coefficient drives the motion."""
+"""Physical constraints on models of a diagnosis: no coefficient adds energy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SWING = 2 * np.pi / W0
 
 
 def decay(c_over_m: float = 0.0, drag: float = Q, seed: int = 1) -> Experiment:
-    """A free decay made by scipy, with noise of 1 mrad."""
+    """Return a free decay made by scipy, with noise of 1 mrad."""
     theta = motion(TIME, (2.4, 0.0), w0=W0, c_over_m=c_over_m, friction=TR, drag=drag)
     theta = theta + np.random.default_rng(seed).normal(0, 1e-3, TIME.shape)
     run = Run("a", "a.csv", "free", TIME, theta, np.ones(TIME.size, bool))
@@ -69,8 +69,8 @@ def test_a_physical_model_is_unchanged() -> None:
     assert impose_physics(data, fitted) is fitted
 
 
-def test_a_drag_that_drives_is_refused() -> None:
-    # Damping that falls with the velocity: drag of the wrong sign fits best.
+def test_a_drag_that_adds_energy_is_refused() -> None:
+    # The damping falls with velocity: a drag of the wrong sign fits best.
     data = split_records(decay(c_over_m=0.15, drag=-0.01))
     fitted = with_effect(data, "quadratic_drag", q=0.01)
     assert fitted.fit["quadratic_drag.q"] == pytest.approx(-0.01, rel=0.1)
@@ -89,8 +89,8 @@ def test_a_time_constant_is_between_a_swing_and_the_length_of_the_record(
     assert (impose_physics(data, fitted) is not None) is possible
 
 
-def test_the_model_that_is_printed_is_the_one_that_is_written(tmp_path: Path) -> None:
-    # Cubic damping, and no effect may be added: negative friction fits best.
+def test_the_printed_model_equals_the_written_one(tmp_path: Path) -> None:
+    # The damping is cubic, and no effect may be added: negative friction fits best.
     found, _ = diagnosed(
         tmp_path, "cubic_damping", seed=5, size=3.0, free=3, forced=0, max_effects=0
     )
@@ -133,7 +133,7 @@ def test_a_forced_run_without_its_drive_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("part", "possible"), [(2.0, False), (0.5, True)])
 def test_a_drift_takes_no_friction_below_0(part: float, *, possible: bool) -> None:
-    # A record by scipy whose friction falls by a part of itself.
+    # A record by scipy whose friction decreases by a fraction.
     def rhs(t: float, state: list[float]) -> list[float]:
         friction = TR * (1 - part * t / TIME[-1]) * np.tanh(state[1] / 1e-3)
         return [state[1], -0.05 * state[1] - W0**2 * np.sin(state[0]) - friction]

@@ -1,4 +1,4 @@
-"""Drag of an unknown power: the unit of its size goes with a number that is fitted too."""
+"""Drag of unknown power: the unit of its size depends on a fitted number."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def rig(q: float, n: float) -> Rig:
 
 @pytest.fixture(scope="module")
 def run() -> FitRun:
-    """A decay with quadratic drag, a power law of 2, made by scipy."""
+    """Return a decay with quadratic drag, a power law of 2, made by scipy."""
     theta = motion(TIME, (2.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.09, drag=0.02)
     return FitRun(TIME, theta + np.random.default_rng(1).normal(0, SIGMA, TIME.shape), SIGMA)
 
 
-def test_columns_by_a_power_keep_its_size_in_si(run: FitRun) -> None:
+def test_derivatives_by_a_power_are_at_a_fixed_size_in_si(run: FitRun) -> None:
     q, n = 0.02, 1.4
     held = fit_runs([run], rig(q, n), [*BASE, Q, N], windows=WINDOW, hold=True, steps=0)
     names, (window,) = window_slopes(held, [run], (), held.model)
@@ -68,8 +68,8 @@ def test_columns_by_a_power_keep_its_size_in_si(run: FitRun) -> None:
 
 @pytest.mark.parametrize("n", [1.1, 1.4, 2.4, 3.0])
 def test_every_power_leads_to_the_same_fit(run: FitRun, n: float) -> None:
-    """The size of a start is that in the unit of the start's own power."""
-    size = 0.02 * 4.0 ** (2 - n)  # as strong at 4 rad/s
+    """The size of a start is in the unit of the start's power."""
+    size = 0.02 * 4.0 ** (2 - n)  # equal drag at 4 rad/s
     fit = fit_runs([run], rig(1.0, 1.7), [*BASE, Q, N], start={Q: size, N: n})
     assert fit.converged
     for name, truth in ((Q, 0.02), (N, 2.0)):
@@ -94,7 +94,7 @@ def test_the_ends_of_the_size_s_interval_are_those_of_its_profile() -> None:
     places = [fit.names.index(Q), fit.names.index(N)]
     (a, ab), (_, b) = fit.covariance[np.ix_(places, places)]
     for end in size.ci95:
-        # All others fitted at powers about the best one there, where a parabola has its least.
+        # All others fitted at powers near the best one there, at the minimum of a parabola.
         middle = fit[N] + ab / a * size.value * math.log(end / size.value)
         offsets = math.sqrt(b - ab**2 / a) * np.linspace(-3, 3, 5)
         fits = [fit_runs([run], rig(end, middle + d), BASE, profiled=()) for d in offsets]
@@ -118,7 +118,7 @@ def test_a_formula_with_a_power_is_fitted_alike(run: FitRun) -> None:
 
 
 def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]]:
-    """Hide a power law; return its truth, and the fits from neighbouring powers of the scan."""
+    """Hide a power law; return its truth and the fits from neighbouring powers of the scan."""
     request = virtual_rig.Request(
         "hidden", seed=seed, effects=("power_law_drag",), size=6.0, free=3, noise=0.05, rate=50.0
     )
@@ -146,7 +146,7 @@ def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
         # Fits of candidates end 0.05 above the least sum of squares at most.
         assert abs(one[N] - other[N]) < 2 * math.sqrt(0.05) * one.estimates[N].stderr
         size, power = one.estimates[Q], one.estimates[N]
-        # That of the size is one of its logarithm.
+        # The size's error is one of its logarithm.
         scaled.append(
             [
                 math.log(size.value / truth["q"]) * size.value / size.stderr,

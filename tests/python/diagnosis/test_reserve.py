@@ -35,7 +35,7 @@ def test_probability_falls_with_the_misfit_and_with_the_number_of_effects() -> N
     assert by_chance[0] > SURE > by_chance[-1]
     by_count = [min(probabilities(0.5, [500.0] * count)) for count in (1, 2, 3)]
     assert by_count == sorted(by_count, reverse=True)
-    # A weak effect beside a strong one is less sure.
+    # A weak effect in addition to a strong one is less probable.
     strong, weak = probabilities(0.5, [2000.0, 20.0])
     assert strong > weak
     assert probabilities(0.5, [2000.0, 1500.0])[1] > weak
@@ -50,7 +50,7 @@ def test_residuals_without_a_hidden_effect_are_explained_by_noise() -> None:
     assert all(0 <= chance <= 1 for chance in found.assessment.form.chances.values())
 
 
-def test_a_form_that_the_library_lacks_shows_in_the_residuals(tmp_path: Path) -> None:
+def test_an_effect_outside_the_library_shows_in_the_residuals(tmp_path: Path) -> None:
     found, _ = diagnosed(
         tmp_path, "encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",)
     )
@@ -72,7 +72,7 @@ def test_two_effects_in_the_place_of_one_are_named_with_reserve(seed: int, tmp_p
 
 @pytest.fixture(scope="module")
 def waving() -> tuple[State, ScoredModel]:
-    """Decays with drag, made by scipy, whose readings have a wave that no effect has."""
+    """Return decays with drag, by scipy, and a wave in the readings that no effect describes."""
     time = np.arange(1500) * 0.02
     runs = []
     for name, start in (("a", 2.2), ("b", 1.4)):
@@ -96,7 +96,7 @@ def runs_of(state: State, fitted: FittedModel) -> RunByRun:
     [
         ({}, "partial"),
         ({"closes": 1.1}, "unknown"),
-        # No residual counts: the alternatives of the drag, which the wave hides, decide.
+        # With residuals ignored the alternatives to the drag, which the wave hides, decide.
         ({"rest": 0.0}, "ambiguous"),
     ],
 )

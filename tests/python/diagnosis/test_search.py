@@ -1,4 +1,4 @@
-"""The search: its fits, their reuse, and the acceptance of effects."""
+"""The search: its fits, their caching, and the acceptance of effects."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def recorded(folder: Path, *effects: str, **given: float) -> DataSplit:
 
 
 def decay(drag: float) -> DataSplit:
-    """A free decay made by scipy, with noise of 2 mrad."""
+    """Return a free decay made by scipy, with noise of 2 mrad."""
     time = np.arange(1500) * 0.02
     theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=drag)
     theta = theta + np.random.default_rng(1).normal(0, 2e-3, time.shape)
@@ -48,7 +48,7 @@ def decay(drag: float) -> DataSplit:
 
 @pytest.fixture(scope="module")
 def dragged() -> tuple[State, FittedModel | None]:
-    """A state of a decay with drag, and its physical core."""
+    """Return the state of a decay with drag, and its physical core."""
     data = decay(drag=0.02)
     base, core = fit_baseline(data)
     return State(data, base, Thresholds(), 3, ()), core
@@ -59,7 +59,7 @@ def best(dragged: tuple[State, FittedModel | None]) -> FittedModel:
     return search(*dragged, lambda _: None)
 
 
-def test_the_core_is_fitted_beside_the_given_model(
+def test_the_core_is_fitted_in_addition_to_the_given_model(
     dragged: tuple[State, FittedModel | None],
 ) -> None:
     state, core = dragged
@@ -166,7 +166,7 @@ def test_a_model_that_loses_on_held_out_records_is_refused(
     assert len(hold_out_losses(state.data, best, held, state.level)) == 3
 
 
-def test_alternatives_are_behind_by_the_gain_that_they_miss(
+def test_alternatives_have_the_difference_of_gains(
     dragged: tuple[State, FittedModel | None], best: FittedModel
 ) -> None:
     state, _ = dragged

@@ -1,6 +1,6 @@
 """Features of SINDy in the benchmark, against formulas and motions written here.
 
-A peer that is given wrong features loses for the wrong reason.
+Wrong features would make the benchmark's comparison unfair.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ INTERVAL = 0.002
 TIME = np.arange(0.0, 8.0, INTERVAL)
 
 FAINT = 1e-5
-"""Size of what is hidden: its square is nothing."""
+"""Size of a hidden effect, small enough for its square to be negligible."""
 
 
 @pytest.fixture(scope="module")
 def sindy() -> ModuleType:
-    """``benchmarks/blind/sindy_features.py``."""
+    """Return the module ``benchmarks/blind/sindy_features.py``."""
     sys.path.insert(0, str(Path(__file__).parents[3]))
     return importlib.import_module("benchmarks.blind.sindy_features")
 
 
 class Motion(NamedTuple):
-    """A motion with its derivatives by the time: rad, rad/s, rad/s^2."""
+    """A motion with its time derivatives: rad, rad/s, rad/s^2."""
 
     theta: Floats
     v: Floats
@@ -51,13 +51,13 @@ class Motion(NamedTuple):
 
 
 def rates(time: Floats, theta: Floats, v: Floats, drag: float = 0.0) -> Floats:
-    """``th''`` of the driven pendulum."""
+    """Return ``th''`` of the driven pendulum."""
     lift = AMPLITUDE * np.cos(OMEGA * time + PHASE)
     return -(W0**2) * (1 + lift) * np.sin(theta) - DAMPING * v - drag * v * np.abs(v)
 
 
 def motion(time: Floats = TIME, drag: float = 0.0) -> Motion:
-    """The motion at ``time``, without noise."""
+    """Return the motion at ``time``, without noise."""
     solved = solve_ivp(
         lambda t, y: [y[1], rates(t, y[0], y[1], drag)],
         (TIME[0] - 0.1, TIME[-1]),
@@ -71,7 +71,7 @@ def motion(time: Floats = TIME, drag: float = 0.0) -> Motion:
 
 
 def run(theta: Floats) -> FitRun:
-    """The record of a driven motion."""
+    """Return the record of a driven motion."""
     drive = {"p": AMPLITUDE, "Omega": OMEGA, "phi": PHASE}
     return FitRun(TIME, theta, 1e-5, drive=drive)
 
@@ -79,7 +79,7 @@ def run(theta: Floats) -> FitRun:
 def offered(
     sindy: ModuleType, seen: Motion, effect: str, phase: float = 0.0, **shape: float
 ) -> Floats:
-    """The column of one feature along a motion."""
+    """Return the column of one feature along a motion."""
     states = sindy.States(run(seen.theta), INTERVAL, 5, *seen)
     rig = Parameters(W0, DAMPING, 0.01)
     pool = [
@@ -116,12 +116,12 @@ def test_torques_are_those_of_their_formulas(
     seen = motion()
     expected, found = torque(seen), offered(sindy, seen, effect, **shape)
     moving = np.abs(seen.v) > 1e-3
-    # To first order in the size; the rig's own friction is in a ripple's acceleration too.
+    # To first order in the size; a ripple's acceleration includes the rig's friction too.
     assert np.max(np.abs(found - expected)[moving]) < 2e-4 * np.max(np.abs(expected))
 
 
 def read_by(*g: Callable[[Floats], Floats]) -> Callable[[Motion], Motion]:
-    """The reading ``y = th + e g(th)`` of a motion, from g and its two derivatives."""
+    """Return the reading ``y = th + e g(th)`` of a motion, from g and its two derivatives."""
 
     def reading(m: Motion) -> Motion:
         error, slope, bend = (FAINT * part(m.theta) for part in g)
@@ -131,7 +131,7 @@ def read_by(*g: Callable[[Floats], Floats]) -> Callable[[Motion], Motion]:
 
 
 def read_at(rate: float) -> Callable[[Motion], Motion]:
-    """The motion itself, by a clock of that rate."""
+    """Return the motion as read on a clock of that rate."""
     return lambda m: Motion(m.theta, rate * m.v, rate**2 * m.a)
 
 
@@ -151,7 +151,7 @@ def read_at(rate: float) -> Callable[[Motion], Motion]:
         ("timebase", 0.0, read_at(1 / (1 + FAINT)), TIME / (1 + FAINT)),
     ],
 )
-def test_readings_are_those_of_a_motion_that_was_read_so(
+def test_reading_features_are_those_of_distorted_readings(
     sindy: ModuleType,
     effect: str,
     phase: float,
@@ -166,14 +166,14 @@ def test_readings_are_those_of_a_motion_that_was_read_so(
     base = np.column_stack([(1 + lift) * np.sin(seen.theta), seen.v])
 
     def left(column: Floats) -> Floats:
-        """Less what gravity and damping, in every model, take up."""
+        """Remove the part that gravity and damping, in every model, explain."""
         return np.asarray(column - base @ np.linalg.lstsq(base, column)[0])
 
     assert np.max(np.abs(left(error))) > 0.01 * np.max(np.abs(error))
     assert np.max(np.abs(left(found) - left(error))) < 0.002 * np.max(np.abs(left(error)))
 
 
-def test_the_filter_leaves_the_motion(sindy: ModuleType) -> None:
+def test_the_filter_preserves_the_motion(sindy: ModuleType) -> None:
     seen = motion()
     states = sindy.states_of(run(seen.theta), 15)
     inner = slice(15, -15)

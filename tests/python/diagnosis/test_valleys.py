@@ -1,6 +1,6 @@
-"""Experiments with local minima: a mirrored place, a lost window, a curved valley.
+"""Experiments with local minima: a mirrored position, a lost window, a curved valley.
 
-Earlier versions named another effect, or were many standard errors off.
+Earlier versions named another effect, or had errors of many standard errors.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
                 "rate": 500.0,
             },
         ),
-        # The estimate was 17 standard errors off along the valley of size and width.
+        # The estimate was off by 17 standard errors along the valley of size and width.
         (
             ["stribeck_friction"],
             MIXED
@@ -76,14 +76,14 @@ def test_a_hidden_effect_is_named_alone_with_its_parameters(
     assert sorted(effect.name for effect in found.effects) == sorted(effects)
     for effect in found.effects:
         for name, (low, high) in effect.ci95.items():
-            # Four standard errors.
+            # Within four standard errors.
             error = (high - low) / 3.92
             true = truth[effect.name][name]
             assert low - 2.1 * error < true < high + 2.1 * error, (effect.name, name)
 
 
 @pytest.mark.thorough
-def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
+def test_an_effect_is_named_although_a_fit_loses_the_end_of_a_run(tmp_path: Path) -> None:
     # The drift was named a warm-up of 180 years: its fit had lost the end of a run.
     found, _ = diagnosed(
         tmp_path,
@@ -99,7 +99,7 @@ def test_a_lost_end_of_a_run_costs_no_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_held_out_runs_with_little_information_refuse_no_effect(tmp_path: Path) -> None:
+def test_held_out_runs_with_little_information_reject_no_effect(tmp_path: Path) -> None:
     # The phases fitted to the held-out runs absorb the error of the frequency there.
     found, _ = diagnosed(
         tmp_path,

@@ -1,4 +1,4 @@
-"""Weights of readings: errors of the model beside the noise, numbers of independent readings."""
+"""Weights of readings: model error in addition to noise, numbers of independent readings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SIGNS = np.where(np.arange(N) % 2, 1.0, -1.0)
 
 
 def data(*runs: FitRun, doubt: float = 0.0) -> DataSplit:
-    """Return runs from separate records; the first is held back too."""
+    """Return runs from separate records; the first is held out too."""
     time = np.arange(N) * 0.01
     angle = motion(time, (1.0, 0.0), w0=6.2, c_over_m=0.05, friction=0.03)
     good = np.ones(N, bool)
@@ -58,7 +58,7 @@ def leaving(*residuals: Floats) -> FittedModel:
 
 
 def test_the_error_of_a_model_is_the_root_mean_square_of_its_residuals() -> None:
-    # Half of them sqrt(5) at sigma = 1, half sqrt(8) at 2: the mean square is 6.5.
+    # Half are sqrt(5) at sigma = 1, half sqrt(8) at 2: the mean square is 6.5.
     left = SIGNS * np.where(SIGMA == 1, math.sqrt(5), math.sqrt(8))
     # Residuals of the stated noise give no error.
     errors = model_errors(data(run(SIGMA), run(SIGMA)), leaving(left, SIGNS * SIGMA))
@@ -67,7 +67,7 @@ def test_the_error_of_a_model_is_the_root_mean_square_of_its_residuals() -> None
 
 def test_untrusted_readings_and_rounding_are_no_error() -> None:
     trusted = np.arange(N) != 7
-    # Rounding of a count of sqrt(12) has the variance 1: 2 is noise, 6 is more.
+    # Rounding to a count of sqrt(12) has variance 1: 2 is noise, 6 is more.
     counted = run(1.0, count=math.sqrt(12), trusted=trusted)
     for square, error in ((2.0, 0.0), (6.0, math.sqrt(6))):
         left = SIGNS * math.sqrt(square)
@@ -78,7 +78,7 @@ def test_untrusted_readings_and_rounding_are_no_error() -> None:
 
 @pytest.mark.parametrize(("doubt", "error"), [(0.0, math.sqrt(1.5)), (0.1, 0.0)])
 def test_uncertain_noise_allows_larger_residuals(doubt: float, error: float) -> None:
-    # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; 1.5 is left.
+    # 1 + 4 sqrt(2 / 800 + 4 doubt^2) is 1.2 or 1.8; the remainder is 1.5.
     left = SIGNS * math.sqrt(1.5)
     found = model_errors(data(run(1.0), doubt=doubt), leaving(left))
     assert found == pytest.approx((error,), abs=1e-9)
@@ -89,14 +89,14 @@ def test_readings_of_a_run_that_a_model_misses_have_equal_weights() -> None:
     found = weight_records(records, (2.0, 4.0, 0.0))
     one, two, three = found.fitted
     assert one.sigma == pytest.approx(np.full(N, 2.0))
-    # The counts are in it and are no intervals any more.
+    # Rounding is included, and readings are no longer intervals.
     assert two.sigma == pytest.approx(np.full(N, 4.0))
     assert two.count is None
     assert three is records.fitted[2]
     (held,) = found.held
     assert held.sigma == pytest.approx(np.full(N, 2.0))
-    # A whole run held back has its noise, and what the others have beyond theirs: 4 - 2.5, 16 - 10
-    # and nothing.
+    # A run held out as a whole has its noise and the excess of the others over theirs: 4 - 2.5, 16
+    # - 10 and 0.
     apart = dataclasses.replace(records, held=(run(1.0),), held_of=(9,))
     (held,) = weight_records(apart, (2.0, 4.0, 0.0)).held
     assert np.square(held.sigma) == pytest.approx(1 + (1.5 + 6.0) / 3)
@@ -112,8 +112,8 @@ def test_each_reading_of_white_noise_is_independent() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_residuals_that_oscillate_are_a_few_readings(count: int) -> None:
-    # Cosines of the transform itself, equally strong: 3 (count P)^2 / (count P^2) readings.
+def test_residuals_that_oscillate_are_few_independent_readings(count: int) -> None:
+    # Cosines of the DFT, equally strong: 3 (count P)^2 / (count P^2) independent readings.
     amplitudes = np.zeros((1, SAMPLES))
     amplitudes[0, 40 : 40 + count] = math.sqrt(SAMPLES / count)
     found = fitted_to(idct(amplitudes, type=2, norm="ortho"))

@@ -1,4 +1,4 @@
-"""Results in files: complete or absent, and read back as they were."""
+"""Results in files: complete or absent, and read back unchanged."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="module")
 def results() -> list[xr.Dataset]:
-    """One result of each kind, with and without attractors."""
+    """Return one result of each kind, with and without attractors."""
     return [
         pendmap.basins(Pendulum(p=0.6), Grid.square(12)),
         pendmap.basins(pendmap.PRESETS["fig2b"], Grid.square(8)),
@@ -34,7 +34,7 @@ def test_written_results_are_read_back(
 ) -> None:
     for result in results:
         file = tmp_path / f"result{suffix}"
-        for _ in range(2):  # a second time it is replaced
+        for _ in range(2):  # the second time replaces the first
             pendmap.save(result, file)
         again = pendmap.load(file)
         xr.testing.assert_equal(again, result)

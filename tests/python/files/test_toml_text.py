@@ -1,4 +1,4 @@
-"""TOML as people write it: it reads back, with a table for each entry of a list."""
+"""TOML text: it reads back unchanged, with a table for each entry of a list."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ DEEP = {
     ],
     ids=["nothing", "deep", "long", "mixed"],
 )
-def test_it_reads_back(content: dict[str, Any]) -> None:
+def test_written_toml_reads_back(content: dict[str, Any]) -> None:
     assert tomllib.loads(toml_text(content)) == content
 
 
-def test_lists_of_tables_have_a_heading_each() -> None:
+def test_each_table_of_a_list_has_a_heading() -> None:
     run = {"file": "run_00.csv", "drive": {"p": 0.2, "phi": -1.5}, "ends": [0.5, 2]}
     assert toml_text({"version": 1, "rig": {"w0": 6.2}, "run": [run, {"file": "b"}]}) == (
         "version = 1\n"
@@ -42,6 +42,6 @@ def test_lists_of_tables_have_a_heading_each() -> None:
     )
 
 
-def test_what_toml_has_not_is_refused() -> None:
+def test_values_that_toml_cannot_hold_are_refused() -> None:
     with pytest.raises(TypeError):
         toml_text({"effect": [{"name": object()}]})

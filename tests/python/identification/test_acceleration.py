@@ -1,4 +1,4 @@
-"""Damping from an accelerometer alone, against decays of scipy read by the formulas."""
+"""Damping from an accelerometer alone, against decays integrated with scipy."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def agrees(report: IdentificationReport, truth: dict[str, float], sigmas: float 
 def test_the_truth_is_found_at_any_amplitude(
     tmp_path: Path, release: float, distance: float
 ) -> None:
-    """Sensors on both sides of the centre of oscillation at 0.255 m, also beyond a quarter turn."""
+    """Sensors are on both sides of the centre of oscillation, 0.255 m; swings may exceed 90 deg."""
     time, _, force = readings(release=release, distance=distance, bias=0.05, tilt=0.02)
     report = identified(experiment(tmp_path, TANGENTIAL % distance, time, force))
     agrees(report, TRUTH | ({"bias": 0.05, "tilt": 0.02} if release >= 1 else {}))
@@ -73,7 +73,7 @@ def test_readings_in_g_use_the_gravity_of_the_rig(tmp_path: Path) -> None:
     agrees(identified(there), TRUTH)
 
 
-def test_the_sense_of_the_axis_does_not_matter_alone(tmp_path: Path) -> None:
+def test_the_sign_of_the_axis_alone_does_not_change_the_result(tmp_path: Path) -> None:
     time, _, force = readings()
     one = identified(experiment(tmp_path / "a", TANGENTIAL % 0.1, time, force)).best
     other = identified(experiment(tmp_path / "b", TANGENTIAL % 0.1, time, -force)).best
@@ -82,7 +82,7 @@ def test_the_sense_of_the_axis_does_not_matter_alone(tmp_path: Path) -> None:
 
 
 def test_errors_equal_those_of_an_angle_of_the_same_relative_noise(tmp_path: Path) -> None:
-    """Readings over their gain are angles of small swings: so are the errors."""
+    """Readings divided by their gain are angles for small swings, and have the same errors."""
     time, theta, force = readings()
     gain = GRAVITY - 0.1 * TRUTH["w0"] ** 2
     angle = theta + 0.02 / gain * np.random.default_rng(1).standard_normal(time.size)
@@ -97,7 +97,7 @@ def test_errors_equal_those_of_an_angle_of_the_same_relative_noise(tmp_path: Pat
 
 
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:
-    """Thirty short decays; 95 % of 90 intervals are 85.5 +- 2.1."""
+    """Of 90 intervals of 95 % from thirty short decays 85.5 +- 2.1 contain the true value."""
     held = count = 0
     for seed in range(30):
         time, _, force = readings(release=0.6, seconds=12, rate=50, seed=seed, bias=0.03)
@@ -119,7 +119,7 @@ def test_strong_friction_makes_the_reading_jump(tmp_path: Path) -> None:
         assert report.best[name] == pytest.approx(true, rel=0.01)
 
 
-def test_sheet_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
+def test_figure_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
     time, _, force = readings(bias=0.05)
     report = identify_experiment(
         pendmap.read_experiment(experiment(tmp_path / "a", TANGENTIAL % 0.1, time, force))
@@ -133,13 +133,13 @@ def test_sheet_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
     model = identified_model(report)
     assert not {"bias", "tilt"} & set(model.notes["covariance"]["names"])
     render.draw_identification(report, tmp_path / "sheet.png")
-    # The other methods read the angle that was made, and come near.
+    # The other methods read the reconstructed angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)
 
 
-def test_a_model_beside_an_accelerometer(tmp_path: Path) -> None:
-    """The rms of the residual is the noise over the gain; a model of another w0 misses it."""
+def test_a_model_is_compared_with_an_accelerometer(tmp_path: Path) -> None:
+    """The rms residual is the noise over the gain; a model of another w0 has a larger one."""
     time, _, force = readings()
     there = pendmap.read_experiment(experiment(tmp_path, TANGENTIAL % 0.1, time, force))
     rig = pendmap.Rig(**TRUTH)
@@ -149,7 +149,7 @@ def test_a_model_beside_an_accelerometer(tmp_path: Path) -> None:
     assert compare(other, there).runs[0].rms > 3 * noise
 
 
-def test_diagnose_asks_for_an_angle(tmp_path: Path) -> None:
+def test_diagnose_requires_an_angle(tmp_path: Path) -> None:
     time, _, force = readings()
     there = pendmap.read_experiment(experiment(tmp_path, TANGENTIAL % 0.1, time, force))
     with pytest.raises(InputError, match="its angle is made of an acceleration"):
@@ -157,7 +157,7 @@ def test_diagnose_asks_for_an_angle(tmp_path: Path) -> None:
 
 
 def test_an_angle_and_an_accelerometer_are_fitted_together(tmp_path: Path) -> None:
-    """Each run has its own sensor: the angle a zero, the accelerometer bias and tilt."""
+    """Each run has its own sensor parameters: a zero of the angle, bias and tilt otherwise."""
     time, _, force = readings(bias=0.05)
     folder = experiment(tmp_path, TANGENTIAL % 0.1, time, force)
     one = pendmap.read_experiment(folder).runs[0]

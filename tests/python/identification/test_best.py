@@ -1,4 +1,4 @@
-"""Which method the model is of, and how its intervals are printed."""
+"""Choice of the method that gives the model, and printing of its intervals."""
 
 from __future__ import annotations
 

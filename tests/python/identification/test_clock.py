@@ -1,4 +1,4 @@
-"""Records with time stamps: nothing depends on when the clock began."""
+"""Records with time stamps: results do not depend on the origin of the clock."""
 
 from __future__ import annotations
 

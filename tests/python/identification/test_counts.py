@@ -1,4 +1,4 @@
-"""Counts coarser than the noise: readings are intervals."""
+"""Counts coarser than the noise, where each reading is an interval."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMES = ("w0", "c_over_m", "Tr", "encoder_offset.d")
 def coarse(
     counts: int, noise: float, seed: int, *, rate: float = 100, seconds: float = 25
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A decay read in counts, with noise in counts before the rounding."""
+    """Return a decay in counts, with noise in counts before the rounding."""
     release = 1.2 + 0.15 * (seed % 10)
     degrees = 360 / counts
     return record(
@@ -38,7 +38,7 @@ def run_of(time: np.ndarray, theta: np.ndarray, count: float | None, sigma: floa
 
 
 def evaluate_hold_out(run: FitRun, fit: TrajectoryFit, w0: float) -> TrajectoryFit:
-    """The model of a fit with another natural frequency, nothing adapted to the record."""
+    """Evaluate a fit's model with another natural frequency, without adapting it to the record."""
     start = {name: fit[name] for name in fit.names} | {"w0": w0}
     return fit_runs(
         [run], fit.model, NAMES, start=start, windows=fit.windows, hold=True, steps=0, profiled=()
@@ -61,7 +61,7 @@ def test_the_sum_is_the_likelihood_of_the_counts() -> None:
     rise = deviance(other) - deviance(fit)
     assert rise > 10
     assert other.chi2 - fit.chi2 == pytest.approx(rise, rel=1e-6)
-    # The mean is 1 a reading, like that of squares; the slopes have the variance that is stated.
+    # The mean is 1 per reading, as for squares; the slopes have the stated variance.
     assert fit.chi2 / fit.degrees == pytest.approx(1, abs=0.05)
     assert np.mean(fit.white[0] ** 2) == pytest.approx(1, abs=0.15)
 

@@ -1,4 +1,4 @@
-"""Damaged records: every method ends in a result, or says in one line what is wrong."""
+"""Damaged records: every method returns a result or raises an error of one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PENDULUMS = [
 
 
 def lose(time: Floats, angle: Floats, lost: np.ndarray) -> tuple[Floats, Floats]:
-    """Leave samples out."""
+    """Remove samples."""
     return time[~lost], angle[~lost]
 
 
@@ -52,7 +52,7 @@ DAMAGES: dict[str, Damage] = {
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_record_ends_in_a_result_or_a_line(name: str) -> None:
+def test_a_damaged_record_gives_a_result_or_an_error_of_one_line(name: str) -> None:
     rng = np.random.default_rng(len(name))
     for k, made in enumerate(PENDULUMS):
         seconds, rate = float(rng.choice([0.5, 2, 20, 60])), float(rng.choice([10, 30, 100]))
@@ -68,13 +68,13 @@ def test_a_damaged_record_ends_in_a_result_or_a_line(name: str) -> None:
         try:
             start = starting_values(time, angle)
         except InputError as error:
-            assert "\n" not in str(error)  # noqa: PT017 (either is right)
+            assert "\n" not in str(error)  # noqa: PT017 (either outcome is valid)
         else:
             assert start.w0 > 0
 
 
-def test_no_peak_lies_beyond_the_readings() -> None:
-    # Lines drawn between readings have no noise of their own, and bends where readings were.
+def test_no_peak_exceeds_the_readings() -> None:
+    # Interpolated samples have no noise, and kinks at the readings.
     time, angle = record(PENDULUMS[0], seconds=84, counts=4096, noise_deg=0.1)
     dense = np.arange(time[0], time[-1], 2e-4)
     found = find_peaks(dense, np.interp(dense, time, angle))

@@ -1,4 +1,4 @@
-"""A hundred kinds of damaged file: identification ends in a result or in one clear line."""
+"""A hundred kinds of damaged file: identification gives a result or an error of one line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ TRUTH = 6.2
 
 
 @pytest.mark.parametrize("name", READ)
-def test_damage_ends_in_a_result_with_its_warning_or_in_one_line(name: str, tmp_path: Path) -> None:
+def test_damage_gives_a_result_with_its_warning_or_an_error_of_one_line(
+    name: str, tmp_path: Path
+) -> None:
     damage = DAMAGES[name]
     path = tmp_path / f"record{damage.suffix}"
     made = damage.make(sound())
@@ -40,7 +42,7 @@ def test_damage_ends_in_a_result_with_its_warning_or_in_one_line(name: str, tmp_
         for warning in found.warnings:
             one_line(warning)
     warned = any(found.warnings for found in report.methods.values()) or report.run.findings
-    # What reads as a sound record does, must also lead to its pendulum.
+    # A damage without a finding must not change the identified pendulum.
     assert warned or model.w0 == pytest.approx(TRUTH, rel=1e-3), name
     assert as_json(report)["methods"]
     assert list(as_text(report))

@@ -1,4 +1,4 @@
-"""The combined decrement as printed, and its repair: exact formulas, the recipe, records."""
+"""The combined decrement as printed, and its correction: exact formulas, the recipe, records."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_eqs_2_7_and_2_10_invert_2_4_to_2_6(
         return
     assert combined.decrement(made) == pytest.approx(delta, abs=1e-12)
     assert combined.coulomb(made) == pytest.approx(theta_r, abs=1e-12)
-    # Every triplet says the same, and so do both readings of "odd half cycles alone".
+    # All triplets agree, and so do both readings of "odd half cycles alone".
     deltas, thetas = combined.triplets(made)
     assert deltas == pytest.approx(delta, abs=1e-10)
     assert thetas == pytest.approx(theta_r, abs=1e-10)
@@ -66,7 +66,7 @@ def test_the_repaired_method_finds_the_zero_error(
 
 
 def _quarter(amplitude: float) -> float:
-    """A quarter period by the arithmetic-geometric mean, not by an elliptic integral."""
+    """Return a quarter period by the arithmetic-geometric mean, not by an elliptic integral."""
     a, b = 1.0, math.cos(amplitude / 2)
     for _ in range(8):
         a, b = (a + b) / 2, math.sqrt(a * b)
@@ -74,7 +74,7 @@ def _quarter(amplitude: float) -> float:
 
 
 def exact_peaks(truths: dict[str, Any]) -> Peaks:
-    """Peaks of the reference decay, the final stop dropped."""
+    """Return the peaks of the reference decay without the final stop."""
     exact = truths["free_decay"]["nonlinear"][0]
     return Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
 
@@ -190,7 +190,7 @@ def test_a_missing_peak_is_not_bridged() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_short_record_gives_the_numbers_of_peaks_found_and_needed(count: int) -> None:
-    """Two peaks lie between 12 and 90 degrees, ``count`` of them below."""
+    """Two peaks lie between 12 and 90 degrees, ``count`` below 12."""
     small = math.radians(11.0) * 0.9 ** np.arange(count)
     size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
     made = Peaks.of(np.arange(count + 2) * 0.5, size)
@@ -219,7 +219,7 @@ def test_errors_of_bare_peaks_follow_from_their_scatter() -> None:
     w0 = found["combined_repaired"].estimates["w0"]
     assert w0.stderr is not None
     assert abs(w0.value - 6.2) < 4 * w0.stderr
-    # Too few to tell a scatter: no intervals of width 0.
+    # Too few for a scatter: no intervals of width 0.
     few = identify_peaks(Peaks.of(time[-12:], peak[-12:]), ["log_decrement"])["log_decrement"]
     assert all(each.ci95 is None and each.stderr is None for each in few.estimates.values())
     assert not any("chi^2" in warning for warning in few.warnings)

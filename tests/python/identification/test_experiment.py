@@ -112,7 +112,7 @@ def test_runs_that_are_not_read_are_reported() -> None:
     assert said == "1 run read; 2 forced runs and 1 run held out are not used"
     assert left_out(there, [runs[0], runs[3]]) == "2 runs read; 2 forced runs are not used"
     assert not left_out(there, runs)
-    # One is both: where runs held out are read, it is left out since it is forced.
+    # The run is both held out and forced: it is left out because it is forced.
     both = Experiment(Path("there"), (*runs, run("forced", hold_out=True)))
     assert left_out(both, [runs[0], runs[3]]) == "2 runs read; 3 forced runs are not used"
     two = Experiment(Path("there"), (*runs, run(hold_out=True)))
@@ -121,7 +121,7 @@ def test_runs_that_are_not_read_are_reported() -> None:
 
 
 def test_a_long_hold_before_the_release_does_no_harm(tmp_path: Path) -> None:
-    # Followed backward through a hold of 15 s this swing would grow until it turns over.
+    # Followed backward through a hold of 15 s the fitted swing would grow to a rotation.
     time, angle = record(decay(release=2.0, until=40.0), seconds=30, seed=3)
     held = np.full(1500, angle[0])
     rows = np.column_stack([np.arange(1500 + time.size) * 0.01, np.concatenate([held, angle])])

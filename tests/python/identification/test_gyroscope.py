@@ -40,7 +40,7 @@ def rates(  # noqa: PLR0913 (the release and the sensor)
     per_second: float = 100.0,
     seed: int = 0,
 ) -> tuple[Floats, Floats]:
-    """Return times and what a gyroscope reads of a decay, rad/s."""
+    """Return times and the readings of a gyroscope in a decay, rad/s."""
     made = decay(w0=6.2, c_over_m=0.0496, tr=0.08, release=release)
     time = np.arange(round(seconds * per_second) + 1) / per_second
     last = made.spline.x[-1]
@@ -75,7 +75,7 @@ def agrees(best: Identification, truth: dict[str, float], sigmas: float = 3.5) -
 
 @pytest.mark.parametrize("release", [0.3, 1.0, 2.2, 2.9])
 def test_the_truth_is_found_at_any_amplitude(tmp_path: Path, release: float) -> None:
-    """The record goes on at rest, where integrated noise resembles motion."""
+    """The record continues at rest, where integrated noise resembles motion."""
     best = fit_model(read(tmp_path, *rates(release=release, seconds=40)))
     agrees(best, TRUTH | {"bias": 0.01})
     assert best.misfit == pytest.approx(1, abs=0.1)
@@ -91,7 +91,7 @@ def test_a_large_bias_of_a_gyroscope_is_fitted(tmp_path: Path, bias: float) -> N
 
 
 def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
-    # A phone's rate that reads three quarters of the true one, bias and all.
+    # The sensor reads three quarters of the true rate, bias included.
     time, rate = rates()
     run = read(tmp_path, time, 0.75 * rate)
     (said,) = [each.text for each in run.findings if each.what == "angle-scale"]
@@ -99,14 +99,14 @@ def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
     experiment = Experiment(Path(), (run,))
     best = identify_experiment(experiment, methods=["trajectory"], effects=["encoder_gain"]).best
     agrees(best, {**TRUTH, "encoder_gain.e": -0.25, "bias": 0.01})
-    # Drag would mend a part of it, if it drove the motion.
+    # A drag that adds energy would compensate a part of it.
     assert identify_experiment(experiment, methods=["trajectory"]).with_drag is None
     best = identify_experiment(experiment, methods=["trajectory"], effects=["quadratic_drag"]).best
     assert any(w.startswith("quadratic_drag.q is -") for w in best.warnings)
 
 
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:
-    """Forty short decays; 95 % of 120 intervals are 114 +- 2.4."""
+    """Of 120 intervals of 95 % from forty short decays 114 +- 2.4 contain the true value."""
     held = 0
     for seed in range(40):
         run = read(tmp_path, *rates(release=0.6, seconds=12, per_second=50, seed=seed))
@@ -119,7 +119,7 @@ def test_intervals_hold_the_truth(tmp_path: Path) -> None:
 
 
 def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
-    """An angle of noise sigma / w0 gives the same information on a small swing."""
+    """For small swings an angle with noise sigma / w0 gives the same information."""
     time, rate = rates(release=0.5)
     best = fit_model(read(tmp_path, time, rate))
     _, angle = record(
@@ -137,7 +137,7 @@ def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
 
 
 def test_a_gyroscope_in_degrees_per_second(tmp_path: Path) -> None:
-    """The unit follows from the heading, or from the period where there is none."""
+    """The unit follows from the heading, or from the period if there is none."""
     time, rate = rates()
     for name in ("Gyroscope z (deg/s)", "gyro_z"):
         run = read(tmp_path, time, rate * 180 / math.pi, name)
@@ -154,8 +154,8 @@ def test_a_gyroscope_with_times_in_milliseconds(tmp_path: Path) -> None:
     agrees(fit_model(pendmap.read_experiment(path).runs[0]), TRUTH | {"bias": 0.01})
 
 
-def test_clipped_and_false_readings_do_not_count(tmp_path: Path) -> None:
-    """Sensors for 500 degrees a second clip a wide swing; what is clipped does not count."""
+def test_clipped_and_false_readings_are_left_out(tmp_path: Path) -> None:
+    """Sensors for 500 degrees a second clip a wide swing; clipped readings are left out."""
     time, rate = rates()
     end = math.radians(500)
     rate[[700, 1500]] += 3.0
@@ -168,7 +168,7 @@ def test_clipped_and_false_readings_do_not_count(tmp_path: Path) -> None:
 
 
 def test_drift_at_rest_is_no_release(tmp_path: Path) -> None:
-    """At rest the integrated angle walks; that is no motion."""
+    """The drift of the integrated angle at rest is not taken for motion."""
     time = np.arange(4001) / 100
     made = decay(c_over_m=0.05, tr=0.5, release=1.0)
     last = float(made.spline.x[-1])
@@ -183,7 +183,7 @@ def test_drift_at_rest_is_no_release(tmp_path: Path) -> None:
 
 
 def forced(time: Floats) -> Floats:
-    """Return the velocity of a pendulum without dry friction on a pivot that goes up and down."""
+    """Return the velocity of a pendulum without dry friction on a vertically moving pivot."""
 
     def slope(t: float, y: Floats) -> list[float]:
         lift = 1 + 0.3 * math.cos(11.0 * t + 0.5)
@@ -194,7 +194,7 @@ def forced(time: Floats) -> Floats:
 
 
 def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
-    """The motion of the pivot does not enter a rate."""
+    """The motion of the pivot does not affect a rate."""
     time = np.arange(2000) / 100
     noise = 5e-3 * np.random.default_rng(0).standard_normal(time.size)
     written(tmp_path / "run.csv", time, forced(time) + 0.01 + noise)
@@ -211,7 +211,7 @@ def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
 
 
 def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
-    """Steps of ten times the noise err evenly, by step / sqrt(12)."""
+    """Rounding errors of steps of ten times the noise have the deviation step / sqrt(12)."""
     time, rate = rates(noise=2e-3)
     run = read(tmp_path, time, 0.02 * np.round(rate / 0.02))
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.02 / math.sqrt(12), rel=0.1)
@@ -257,23 +257,23 @@ def test_an_angle_and_a_gyroscope_are_fitted_together(tmp_path: Path) -> None:
     agrees(fit_model(one, other), TRUTH | {"offset": 0.01, "bias[0]": 0.01})
 
 
-def test_sheet_model_and_comparison(tmp_path: Path) -> None:
+def test_figure_model_and_comparison_of_a_gyroscope(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates(release=1.0, seconds=40)))
     report = identify_experiment(there)
     assert report.best.method == "trajectory"
     render.draw_identification(report, tmp_path / "sheet.png")
     assert "bias" not in identified_model(report).notes["covariance"]["names"]
-    # The other methods read the angle that was integrated, and come near.
+    # The other methods read the integrated angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)
-    # A model of the truth misses by the noise over w0, one of another w0 by more.
+    # The residual of the true model is the noise over w0; of another w0 it is larger.
     level = 5e-3 / TRUTH["w0"]
     assert compare(pendmap.Rig(**TRUTH), there).runs[0].rms == pytest.approx(level, rel=0.05)
     other = pendmap.Rig(w0=6.21, c_over_m=0.0496, Tr=0.08)
     assert compare(other, there).runs[0].rms > 3 * level
 
 
-def test_diagnose_asks_for_an_angle(tmp_path: Path) -> None:
+def test_diagnose_requires_an_angle(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates()))
     with pytest.raises(InputError, match="its angle is a velocity integrated") as fault:
         split_records(there)

@@ -29,7 +29,7 @@ TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
 
 @pytest.fixture
 def decay_file(tmp_path: Path) -> Path:
-    """The record of a free decay, as a file of two columns."""
+    """Return the file of a free decay, of two columns."""
     time, angle = record(decay(), seconds=60, seed=3)
     path = tmp_path / "decay.csv"
     table = np.stack([time, angle], axis=1)
@@ -203,7 +203,7 @@ def test_numbers_with_their_errors(value: float, error: float | None, shown: str
 
 
 def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:
-    """The exit code is 128 and the number of the signal, by the convention of shells."""
+    """The exit code is 128 plus the number of the signal, the convention of shells."""
     words = ["identify", decay_file, "--method", "energy_balance", "--out", "model.toml"]
     read, write = os.pipe()
     os.close(read)

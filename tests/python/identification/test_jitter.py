@@ -1,4 +1,4 @@
-"""Clocks whose instants miss their stamps: noise that grows with speed, fits that weigh by it."""
+"""Clocks with jitter: noise that grows with speed, and fits weighted accordingly."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ NAMES = {"w0": "w0", "c_over_m": "c_over_m", "Tr": "friction"}
 
 @pytest.fixture(scope="module")
 def fine() -> np.ndarray:
-    """The motion at 2000 Hz, held at its release before time 0."""
+    """Return the motion at 2000 Hz, held at its release before time 0."""
     released = motion(FINE[200:], (2.0, 0.0), **TRUTH)
     return np.concatenate((np.full(200, released[0]), released))
 
 
 def late(fine: np.ndarray, tau: float, sigma: float, seed: int) -> np.ndarray:
-    """Readings at instants that miss their stamps by tau, s, with a noise of sigma, rad."""
+    """Return readings with a clock jitter of tau, s, and noise of sigma, rad."""
     rng = np.random.default_rng(seed)
     missed = TIME + tau * rng.standard_normal(TIME.size)
     return np.interp(missed, FINE, fine) + sigma * rng.standard_normal(TIME.size)
@@ -49,7 +49,7 @@ def test_the_scatter_of_instants_about_their_stamps_is_estimated(
 
 
 @pytest.mark.parametrize("sigma", [3e-4, 3e-3, 2e-2])
-def test_noise_that_does_not_grow_weighs_all_readings_alike(fine: np.ndarray, sigma: float) -> None:
+def test_noise_independent_of_speed_gives_equal_weights(fine: np.ndarray, sigma: float) -> None:
     for seed in range(10):
         reading = reading_of(TIME, late(fine, 0.0, sigma, seed), count=0.0)
         assert reading.law is None
@@ -72,7 +72,7 @@ def test_readings_at_missed_instants_are_moved_toward_rest(fine: np.ndarray) -> 
     law = noise_of(TIME, late(fine, tau, 1e-3, 1)).law
     assert law is not None
     moved, theta = mean - fine[200:60_200:20], fine[200:60_200:20]
-    # A least-squares factor between what the scatter does and what the law says.
+    # The factor by least squares between the actual scatter and that of the law.
     shift = law.shift(TIME, theta)
     assert float(moved @ shift / (shift @ shift)) == pytest.approx(1.0, abs=0.25)
 
@@ -92,7 +92,7 @@ def test_weights_halve_the_errors_and_match_the_scatter(fine: np.ndarray) -> Non
             scores[name].append(off / (found.estimates[name].stderr or np.nan))
             ratios[name].append((off, plain.estimates[name].value - TRUTH[own]))
     for name in NAMES:
-        # The sum of 12 squares is beyond these once in 10 000 times each.
+        # The sum of 12 squares is beyond each bound once in 10 000 times.
         assert 1.0 < float(np.sum(np.square(scores[name]))) < 40.0
     for name in ("c_over_m", "Tr"):
         weighted, plain_one = np.sqrt(np.mean(np.square(ratios[name]), axis=0))
@@ -114,8 +114,8 @@ def test_velocities_are_those_of_polynomials_through_each_window() -> None:
             assert gain[k] == pytest.approx(np.sqrt(square[-2, -2]), rel=1e-6)
 
 
-def test_readings_count_alike_where_the_model_errs_more_than_the_noise(fine: np.ndarray) -> None:
-    # A gain of 3 % is no scatter of a clock: by its law the few readings at rest would rule.
+def test_readings_have_equal_weights_where_model_error_exceeds_the_noise(fine: np.ndarray) -> None:
+    # A gain of 3 % is no clock jitter: by its law the few readings at rest would dominate.
     theta = late(fine, 2e-3, 3e-4, 1) + 0.03 * fine[200:60_200:20] ** 3
     reading = reading_of(TIME, theta, count=0.0)
     assert reading.law is not None
@@ -129,7 +129,7 @@ def test_readings_count_alike_where_the_model_errs_more_than_the_noise(fine: np.
 
 
 def test_wrong_stamps_cause_no_bias(fine: np.ndarray) -> None:
-    """The instants are regular and their stamps miss them: a weight must not know by how much."""
+    """The clock samples regularly and its stamps err: a weight must not depend on the error."""
     tau, sigma, decays = 2e-3, 1e-3, 12
     exact = fine[200::20][: TIME.size]
     away = []
@@ -155,7 +155,7 @@ def test_wrong_stamps_cause_no_bias(fine: np.ndarray) -> None:
 def test_the_noise_of_few_samples_a_period_is_a_bound(
     fine: np.ndarray, every: int, *, few: bool
 ) -> None:
-    """The stamps are exact: what grows with speed is motion that polynomials leave."""
+    """With exact stamps the part that grows with speed is motion that polynomials do not follow."""
     for seed in range(10):
         floor = noise_of(TIME[::every], late(fine, 0.0, 2.5e-3, seed)[::every])
         assert floor.bound == few

@@ -1,4 +1,4 @@
-"""Peaks and crossings: where they are, how sure that is, and what spoils them."""
+"""Peaks and crossings: their positions, standard errors, and disturbances."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_standard_errors_of_peaks_match_the_scatter(
         time, angle = record(WIDE, rate=rate, noise_deg=noise_deg, counts=counts, seed=seed)
         peaks = find_peaks(time, angle)
         turned = peaks.turned
-        # Below twenty times the noise's share friction bends a peak's sides too differently.
+        # Below twenty times the noise friction makes a peak too asymmetric.
         turned = turned.select(np.abs(turned.amplitude) > 0.1)
         wrong = turned.amplitude - WIDE.peak[turned.index]
         off["amplitude"] += list(wrong / turned.stderr_amplitude)
@@ -64,7 +64,7 @@ def test_standard_errors_of_peaks_match_the_scatter(
 
 
 def _zero(k: int) -> float:
-    """The true crossing of half cycle `k`, by bisection."""
+    """Return the true crossing of half cycle `k`, by bisection."""
     low, high = WIDE.peak_time[k], WIDE.peak_time[k + 1]
     for _ in range(50):
         middle = (low + high) / 2
@@ -85,7 +85,7 @@ def test_coarse_counts_leave_the_numbers_of_the_peaks_right(rate: float) -> None
 
 
 def test_the_last_half_cycle_that_stops_is_marked() -> None:
-    # It stops at 0.006 rad on the side it came from: far above the noise.
+    # It stops at 0.006 rad on the side it came from, far above the noise.
     stuck = decay(c_over_m=0.05, tr=1.0, release=1.0)
     time, angle = record(stuck, seconds=12, noise_deg=0.02)
     peaks = find_peaks(time, angle)
@@ -148,7 +148,7 @@ def test_outliers_do_not_turn_a_peak() -> None:
     assert np.abs(turned.amplitude - WIDE.peak[turned.index]).max() < 5e-3
 
 
-def test_an_angle_that_rests_some_turns_away() -> None:
+def test_an_angle_that_rests_several_turns_from_0_has_its_peaks() -> None:
     time, angle = record(WIDE, seconds=30)
     there, away = find_peaks(time, angle), find_peaks(time, angle + 2 * math.tau)
     assert away.amplitude == pytest.approx(there.amplitude, abs=1e-9)
@@ -162,7 +162,7 @@ def test_a_record_without_swings_has_no_peaks() -> None:
     assert len(find_peaks(time[:3], noise[:3])) == 0
 
 
-def test_the_noise_floor_and_the_count_are_seen() -> None:
+def test_the_noise_floor_and_the_count_are_detected() -> None:
     for noise_deg in (0.05, 0.1, 0.5):
         time, angle = record(WIDE, noise_deg=noise_deg)
         assert reading_of(time, angle).sigma == pytest.approx(math.radians(noise_deg), rel=0.03)

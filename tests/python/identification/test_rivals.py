@@ -1,4 +1,4 @@
-"""Every method on the same decays: each finds what its assumptions allow."""
+"""All methods on the same decays: each finds what its assumptions allow."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SMALL = decay(release=0.2, c_over_m=0.0496, tr=0.03, until=40.0)
 VISCOUS = decay(release=0.2, c_over_m=0.12, tr=0.0, until=40.0)
 DRY = decay(release=0.2, c_over_m=0.0, tr=0.03, until=60.0)
 
-# What a method must find on a clean decay that fits its assumptions, and how closely.
+# Expected result and tolerance of each method on a clean decay that meets its assumptions.
 ASSUMED = [
     ("combined", SMALL, {"w0": 2e-3, "c_over_m": 0.03, "Tr": 0.03}),
     ("combined_odd_ends", SMALL, {"w0": 2e-3, "c_over_m": 0.03, "Tr": 0.03}),

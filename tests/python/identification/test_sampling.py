@@ -1,4 +1,4 @@
-"""Peaks of records with few samples a period, and of samples drawn between readings."""
+"""Peaks of records with few samples a period, and of samples interpolated between readings."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_all_peaks_are_found_at_any_rate_with_errors_that_match_the_scatter(
         speed = (made.angle(at + 1e-4) - made.angle(at - 1e-4)) / 2e-4
         crossings += list(made.angle(at) / speed / peaks.crossing_stderr[passed])
     for what, ratios in (("times", times), ("sizes", sizes), ("crossings", crossings)):
-        # Some hundred ratios, whose errors blocks of swings share in part.
+        # About a hundred ratios, with errors partly shared within blocks of swings.
         assert 0.89 < np.mean(np.abs(ratios) < 1.96) <= 1.0, what
         assert 0.6 < np.std(ratios) < 1.15, what
 
@@ -104,7 +104,7 @@ def test_the_noise_of_few_samples_a_period_is_not_their_motion(samples: float) -
 @pytest.mark.parametrize("noise_deg", [0.0, 0.3])
 @pytest.mark.parametrize("counts", [128, 256])
 def test_the_noise_of_coarse_counts_in_a_quick_rotation(counts: int, noise_deg: float) -> None:
-    # Three counts from sample to sample at 128: rounding errors of neighbours go with one another.
+    # Three counts a sample at 128 samples a period: rounding errors of neighbours are correlated.
     made = solve_ivp(
         lambda _, y: [y[1], 1.5 - 0.1 * y[1] - 6.3**2 * math.sin(y[0])],
         (0, 60), [0.0, 19.0], rtol=1e-9, atol=1e-10, dense_output=True,
@@ -121,7 +121,7 @@ def test_the_noise_of_coarse_counts_in_a_quick_rotation(counts: int, noise_deg: 
 
 
 def drawn(time: Floats, angle: Floats, ratio: int, made: str) -> tuple[Floats, Floats]:
-    """Samples between the readings, as exports make them."""
+    """Return samples interpolated between the readings, as some exports have them."""
     dense = np.arange((time.size - 1) * ratio + 1) * (time[1] - time[0]) / ratio
     if made == "held":
         return dense, angle[np.arange(dense.size) // ratio]

@@ -1,4 +1,4 @@
-"""Rows of table 1: none repeats another."""
+"""Rows of table 1, without repetition."""
 
 from __future__ import annotations
 

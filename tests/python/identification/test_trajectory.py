@@ -1,4 +1,4 @@
-"""The trajectory method on motions that scipy made."""
+"""The trajectory method on motions integrated with scipy."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_the_search_converges_from_far(decay: np.ndarray, w0: float, damping: fl
     assert not found.warnings
 
 
-def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+def test_intervals_have_their_coverage() -> None:
     covered = []
     for seed in range(12):
         rng = np.random.default_rng([5, seed])
@@ -76,12 +76,12 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             for name, own in NAMES.items():
                 low, high = found.estimates[name].ci95 or (math.nan, math.nan)
                 covered.append(low <= truth[own] <= high)
-    # 180 of which 171 are expected; the three of a record hang together.
+    # 171 of 180 are expected; the three intervals of a record are correlated.
     assert 160 <= sum(covered) <= 179
 
 
 def test_the_standard_error_is_the_cramer_rao_bound(decay: np.ndarray) -> None:
-    # The covariance against the information of finite differences by scipy, state included.
+    # The covariance against the information from finite differences by scipy, state included.
     found = identify(TIME, noisy(decay, 1e-3, 2), sigma=1e-3)
     columns = [np.ones_like(TIME)]
     for name in ("w0", "c_over_m", "friction"):
@@ -157,7 +157,7 @@ def test_several_runs_share_the_parameters_of_the_pendulum() -> None:
     assert fit["p"] == pytest.approx(p, rel=1e-7)
     assert fit["Omega"] == pytest.approx(big_omega, rel=1e-8)
     assert fit["phi"] == pytest.approx(phi, rel=1e-7)
-    # Forced motions may be chaotic: their windows stay short.
+    # Forced motions may be chaotic: their windows are kept short.
     assert len(fit.windows) == 11
     both = fit_runs(runs, dataclasses.replace(model, Tr=0.05), ["w0", "c_over_m", "Tr"])
     assert both.names == ("w0", "c_over_m", "Tr", "phi[1]")
@@ -198,14 +198,14 @@ def test_the_noise_is_estimated_without_a_model(decay: np.ndarray, sigma: float)
     assert reading_of(TIME, noisy(decay, sigma, 6)).sigma == pytest.approx(sigma, rel=0.08)
 
 
-def test_half_swings_give_a_start(decay: np.ndarray) -> None:
+def test_half_swings_give_starting_values(decay: np.ndarray) -> None:
     start = rough_start(TIME, noisy(decay, 5e-3, 7), 5e-3)
     assert start is not None
     for name, own in NAMES.items():
         assert start[name] == pytest.approx(TRUTH[own], rel=0.02 if name == "w0" else 0.5)
 
 
-def test_samples_not_trusted_do_not_count(decay: np.ndarray) -> None:
+def test_untrusted_samples_are_left_out(decay: np.ndarray) -> None:
     theta, trusted = noisy(decay, 1e-3, 8), np.ones(TIME.shape, bool)
     trusted[500:700] = False
     theta[500:700] = 4.0

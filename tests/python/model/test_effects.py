@@ -27,7 +27,7 @@ OWN = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque":
 
 
 def middle(name: str) -> pendmap.Effect:
-    """The effect with values from the middle of the typical ranges."""
+    """Return the effect with values from the middle of the typical ranges."""
     (effect,) = (e for e in pendmap.effects() if e.name == name)
     values = {p.name: sum(p.typical) / 2 for p in effect.parameters}
     values |= {p.name: 3.0 for p in effect.parameters if p.role == "order"}
@@ -121,7 +121,8 @@ def test_an_unknown_name_gets_one_line(pendmap_command: Run) -> None:
 @pytest.mark.parametrize("name", TORQUES)
 def test_maps_and_trajectories_agree(name: str) -> None:
     model = pendulum(name)
-    # A drift goes on in a trajectory and is held in a map: over one period it makes no difference.
+    # A drift proceeds in a trajectory and is constant in a map: over one period the effect is
+    # small.
     run = pendmap.simulate(model, 1.0, 0.3, model.period, tol=1e-10)
     theta, velocity, _ = pendmap.advance(model, [1.0], [0.3], periods=1, tol=1e-7)
     tolerance = 1e-3 if name in DRIFTING else 1e-6
@@ -140,11 +141,11 @@ def test_torques_that_do_not_repeat_are_simulated_and_not_mapped() -> None:
     ):
         with pytest.raises(InputError, match="not in maps: it does not repeat every turn"):
             ask()
-    # No start says where a contact turned last.
+    # A start does not determine the last turning point of a contact.
     yielding = pendmap.Pendulum(p=0.6, effects=(middle("dahl_friction"),))
     assert pendmap.simulate(yielding, 1.0, 0.0, 10.0).theta.size > 1
     with pytest.raises(InputError, match="not in maps: it depends on where the motion last turned"):
         pendmap.basins(yielding, pendmap.Grid.square(4))
-    # An elastic torque bounds the angle, and nothing is taken off it.
+    # An elastic torque bounds the angle, which is not wrapped.
     spring = pendmap.Pendulum(p=0.6, effects=(uneven, middle("elastic_restoring")))
     assert pendmap.basins(spring, pendmap.Grid.square(4)).sizes["attractor"] > 0

@@ -55,7 +55,7 @@ def test_a_formula_converts_between_si_and_no_dimensions(
     slow = pendmap.simulate(rig, 1.5, 0.0, until=4.0)
     bare = pendmap.simulate(rig.pendulum, 1.5, 0.0, until=4.0 * 6.2)
     assert float(slow.theta[-1]) == pytest.approx(float(bare.theta[-1]), abs=1e-9)
-    # Against a power law of the library with the same numbers.
+    # Against a power law of the library with equal numbers.
     q, n = (values["k"], 0.5) if "k" in values else (values["q"], values["n"])
     other = Rig(w0=6.2, c_over_m=0.1, effects=(Effect("power_law_drag", {"q": q, "n": n}),))
     known = pendmap.simulate(other, 1.5, 0.0, until=4.0)
@@ -144,7 +144,7 @@ def test_formulas_are_read_from_a_file(tmp_path: Path, pendmap_command: Run) -> 
     assert [effect["mappable"] for effect in listed] == ["yes", "yes"]
     shown = pendmap_command("effects", "--effects", str(path), "lean")
     assert shown.returncode == 0, shown.stderr
-    # What it shows for a model file is one.
+    # The output of the command is itself a model file.
     model = tmp_path / "model.toml"
     example = shown.stdout.partition("take by --model:")[2]
     model.write_text(f"{example}\n[pendulum]\ngamma = 0.1\np = 0.6\nomega = 2\n", encoding="utf-8")
@@ -172,7 +172,7 @@ def test_maps_refuse_torques_that_do_not_repeat() -> None:
     assert pendmap.simulate(Pendulum(effects=(uneven(k=0.1),)), 1.0, 0.0, until=1.0) is not None
 
 
-# ruff: noqa: ARG001, ARG005 (each function takes all that a torque may depend on)
+# ruff: noqa: ARG001, ARG005 (each function takes all arguments of a torque)
 def _drag(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
     return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
 

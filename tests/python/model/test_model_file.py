@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def test_everything_in_a_file_in_si(tmp_path: Path) -> None:
+def test_a_file_in_si_with_every_key_is_read(tmp_path: Path) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))
     assert isinstance(rig, Rig)
     assert (rig.w0, rig.c_over_m, rig.Tr, rig.phi, rig.lab_time_s) == (6.2, 0.05, 0.08, 0.3, 150)
@@ -223,7 +223,7 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         ("[pendulum]\nw0 = 6\nY = [1]\n", "Y must be a number, got [1]"),
         ("[pendulum]\nc_over_m = 1\n", "w0 is missing: a model in SI needs w0 in rad/s, or length"),
         ("[pendulum]\nzeta = '1'\n", "zeta must be a number, got '1'"),
-        # what contradicts
+        # contradictions
         (
             "[pendulum]\ngamma = 0.1\nzeta = 0.1\n",
             "gamma is 0.1, but 0.2 by 2 zeta of zeta = 0.1: they contradict, one of them must be",

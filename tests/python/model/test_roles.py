@@ -1,4 +1,4 @@
-"""The definition of an effect gives the role of each parameter; its name does not matter."""
+"""The definition of an effect, not the name, gives the role of each parameter."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_a_search_begins_where_an_effect_is_weak_and_of_a_usual_shape(
 
 
 def renamed(entry: dict[str, Any]) -> dict[str, Any]:
-    """The definition with other names for its parameters."""
+    """Return the definition with other names for its parameters."""
     other = copy.deepcopy(entry)
     for k, parameter in enumerate(other["parameters"]):
         parameter["name"] = f"other{k}"
@@ -84,7 +84,7 @@ def renamed(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def predict_limits(name: str) -> list[Any]:
-    """Return the candidates of an effect, their parameters by place."""
+    """Return the candidates of an effect, with parameters by position."""
     names = [p["name"] for p in effects.definition(name)["parameters"]]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
 

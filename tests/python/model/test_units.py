@@ -1,4 +1,4 @@
-"""A rig in SI and a pendulum without dimensions: one conversion, two gammas, no contradictions."""
+"""A rig in SI and a dimensionless pendulum: one conversion, two gammas, no contradictions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ sizes = st.floats(1e-3, 1e3)
 signed = st.floats(-1e3, 1e3)
 
 
-# The numbers
+# Numbers
 
 
 def test_the_paper_s_quantities_by_hand() -> None:
@@ -143,7 +143,7 @@ def test_zeta_is_half_of_gamma() -> None:
         ({"w0": 6.2, "gamma": 0.1}, "gamma is not known: it must be one of w0, length_m"),
     ],
 )
-def test_contradictions_are_refused_with_their_numbers(
+def test_contradictory_values_are_refused_with_their_numbers(
     given: dict[str, Any], complaint: str
 ) -> None:
     with pytest.raises(InputError) as error:
@@ -152,7 +152,7 @@ def test_contradictions_are_refused_with_their_numbers(
     assert "\n" not in str(error.value)
 
 
-def test_rounded_digits_do_not_contradict_and_the_rig_s_own_name_counts() -> None:
+def test_rounded_digits_do_not_contradict_and_the_rig_s_own_name_has_priority() -> None:
     rig = Rig.of(w0=6.2, p=0.2906, stroke_mm=20, frequency_hz=1.9)
     assert rig.p == 0.2906
 
@@ -227,7 +227,7 @@ def test_effects_twice_or_outside_their_range_are_refused() -> None:
 
 def test_models_are_values() -> None:
     for model in (SWING, SWING.pendulum):
-        again = pickle.loads(pickle.dumps(model))  # noqa: S301 (what was just written)
+        again = pickle.loads(pickle.dumps(model))  # noqa: S301 (written here)
         assert again == model
         assert hash(again) == hash(model)
         assert dataclasses.asdict(model)["effects"][0]["name"] == "quadratic_drag"

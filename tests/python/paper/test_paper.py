@@ -64,7 +64,7 @@ def test_one_figure(pendmap_command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_all_that_are_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_figures_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paper_motions, "SECONDS", 60.0)  # 2500 s take the rig minutes
     monkeypatch.setattr(paper_motions, "TUMBLED", 30.0)
     monkeypatch.chdir(tmp_path)
@@ -121,7 +121,7 @@ def test_the_same_seed_gives_the_same_record() -> None:
 
 
 def test_figure_2_is_persistent_tumbling_chaos_at_the_papers_points() -> None:
-    """Each turns over both ways, never settles, and fills a section of a dimension above 1."""
+    """Each trajectory rotates both ways, never settles, and fills a section of dimension > 1."""
     runs = paper_figures.tumbling(2000)
     points = [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8)]
     assert [(run.attrs["p"], run.attrs["omega"]) for run in runs] == points
@@ -155,10 +155,10 @@ def model() -> pendmap.Rig:
 
 
 @pytest.mark.thorough
-def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
+def test_figure_8_compares_steady_states_of_the_requested_kinds(
     model: pendmap.Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two oscillations of period 2 and two rotations, reached by rig and model, alike."""
+    """Rig and model reach the same two oscillations of period 2 and two rotations."""
     monkeypatch.setattr(paper_motions, "SECONDS", 250.0)
     runs = paper_motions.steady_states(model)
     kinds = [one.steady.measured.kind for one in runs if one.steady is not None]
@@ -175,8 +175,8 @@ def test_figure_8_compares_steady_states_of_the_kinds_that_were_asked_for(
 
 
 @pytest.mark.thorough
-def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path: Path) -> None:
-    """The rig's run is one that the identified model could have made; no path lies on another."""
+def test_figure_9_compares_tumbling_by_its_statistics(model: pendmap.Rig, tmp_path: Path) -> None:
+    """The rig's run is consistent with the identified model's ensemble; no paths coincide."""
     runs = paper_motions.tumbling(model)
     for one in runs:
         assert [each.name for each in one.statistics] == [
@@ -188,7 +188,7 @@ def test_figure_9_compares_tumbling_by_what_it_does(model: pendmap.Rig, tmp_path
         ]
         assert min(each.chance for each in one.statistics) > 0.01
         escapes, settled = (one.statistics[k] for k in (1, 3))
-        # How often one chaotic run escapes, the rounding of the processor decides; not this:
+        # The number of escapes of one chaotic run depends on rounding; these bounds do not:
         assert escapes.median > 20
         assert 10 < settled.median < 250
         assert np.isinf(settled.ensemble).mean() < 0.05

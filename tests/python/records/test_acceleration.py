@@ -1,4 +1,4 @@
-"""The acceleration channel: what it needs, how it is refused, what is reported beside an angle."""
+"""The acceleration channel: what it requires, its refusals, its check of an angle."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def said(run: Run) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("release", [0.3, 1.4, 2.5])
-def test_the_angle_that_is_made_is_near(tmp_path: Path, release: float) -> None:
+def test_the_reconstructed_angle_is_near_the_true_one(tmp_path: Path, release: float) -> None:
     time, theta, force = readings(release=release)
     run = read(experiment(tmp_path, column(PLACE % 0.1), time, force))
     assert run.accelerometer is not None
@@ -89,7 +89,7 @@ def test_only_an_acceleration_has_a_place(tmp_path: Path) -> None:
         read(there)
 
 
-def test_an_axis_along_the_rod_is_told_from_one_across(tmp_path: Path) -> None:
+def test_axes_along_and_across_the_rod_are_distinguished(tmp_path: Path) -> None:
     for gravity, removed in ((GRAVITY, "false"), (0.0, "true")):
         time, _, force = readings("radial", gravity=gravity)
         place = f"{PLACE % 0.1}, gravity_removed = {removed}"
@@ -97,7 +97,7 @@ def test_an_axis_along_the_rod_is_told_from_one_across(tmp_path: Path) -> None:
             read(experiment(tmp_path, column(place), time, force))
 
 
-def test_a_wrong_unit_is_told_by_readings_that_no_swing_has(tmp_path: Path) -> None:
+def test_a_wrong_unit_is_detected_by_impossible_readings(tmp_path: Path) -> None:
     time, _, force = readings(release=1.4)
     with pytest.raises(InputError, match=r"reaches .* at most .* unit, distance_m, direction"):
         read(experiment(tmp_path, column(PLACE % 0.1, "g"), time, force))
@@ -111,7 +111,7 @@ def test_the_centre_of_oscillation_is_refused(tmp_path: Path) -> None:
     time, _, force = readings(distance=near)
     text = said(read(experiment(tmp_path, column(PLACE % near), time, force)))
     assert "centre of oscillation" in text["acceleration-weak"]
-    # 1 mm of the 38 mm that are left.
+    # An error of 1 mm, over the remaining 38 mm.
     percent = re.search(r"1 mm makes angles ([\d.]+) % wrong", text["acceleration-weak"])
     assert percent is not None
     assert float(percent[1]) == pytest.approx(0.1 / (CENTRE - near), rel=0.1)
@@ -138,7 +138,7 @@ def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
 
 
 def test_files_of_phyphox(tmp_path: Path) -> None:
-    """Files of phyphox: three axes, with gravity, or without as "Linear Acceleration"."""
+    """Files of phyphox have three axes, with gravity, or without it as "Linear Acceleration"."""
     for heading, gravity in (("Acceleration", GRAVITY), ("Linear Acceleration", 0.0)):
         time, _, across = readings(distance=0.3, gravity=gravity)
         _, _, along = readings("radial", distance=0.3, gravity=gravity, seed=1)
@@ -170,7 +170,7 @@ BESIDE = {
 
 
 @pytest.mark.parametrize("case", BESIDE)
-def test_beside_an_angle_it_is_a_check_that_is_reported(tmp_path: Path, case: str) -> None:
+def test_an_acceleration_checks_an_angle(tmp_path: Path, case: str) -> None:
     place, sign, key, words = BESIDE[case]
     time, theta, force = readings(release=1.2)
     theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
@@ -188,7 +188,7 @@ def test_beside_an_angle_it_is_a_check_that_is_reported(tmp_path: Path, case: st
     assert run.acceleration is not None
 
 
-def test_a_radial_axis_beside_an_angle_shows_its_distance(tmp_path: Path) -> None:
+def test_a_radial_axis_and_an_angle_give_the_sensor_s_distance(tmp_path: Path) -> None:
     time, theta, force = readings("radial", release=1.2, distance=0.2)
     theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
     names = "t_s,theta_rad,acc"

@@ -23,7 +23,7 @@ def test_degrees_become_radians(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.theta, theta, atol=1e-6)
 
 
-def test_small_degrees_are_known_by_their_periods(tmp_path: Path) -> None:
+def test_small_degrees_are_recognised_by_their_periods(tmp_path: Path) -> None:
     time, theta, _ = motion(start=0.045, duration=30.0)
     run = read(tmp_path, text((time, np.degrees(noisy(theta, 1e-4, 0)))))
     finding = found(run)["angle-unit"]
@@ -49,14 +49,14 @@ def test_wrapped_turns_are_unwrapped(tmp_path: Path, low: float) -> None:
 
 
 @pytest.mark.parametrize("quarters", [-1, 1, 2])
-def test_a_gauge_is_turned_back(tmp_path: Path, quarters: int) -> None:
+def test_a_gauge_rotated_by_quarter_turns_is_corrected(tmp_path: Path, quarters: int) -> None:
     time, theta = clean()
     run = read(tmp_path, text((time, theta + quarters * math.pi / 2)))
     assert found(run)["gauge-turned"].mended
     np.testing.assert_allclose(run.theta, theta, atol=1e-5)
 
 
-def test_missed_counts_are_found_where_they_are(tmp_path: Path) -> None:
+def test_missed_counts_are_located(tmp_path: Path) -> None:
     time, theta = clean()
     run = read(tmp_path, text((time, theta + 30 * COUNT * (time > 12))))
     assert found(run)["missed-counts"].where == "row 1203"
@@ -138,7 +138,7 @@ def test_a_rig_in_other_units_is_reported(tmp_path: Path, rig: str, says: str) -
 def test_a_pivot_in_millimetres_is_one_in_metres(tmp_path: Path) -> None:
     p, omega, phi = 0.3, 12.0, 0.4
     time, theta, _ = motion(drive=(p, omega, phi))
-    # a(t) = p cos is the acceleration over g, so that the pivot is at -p g / omega^2 cos.
+    # a(t) = p cos is the acceleration over g, so the pivot's position is -p g / omega^2 cos.
     place = 1000 * p * 9.81 / omega**2 * np.cos(omega * time + phi)
     for sign, keys in ((-1, set()), (1, {"sign-turned"}), (-1000, {"pivot-unit"})):
         described = '[[run]]\nfile = "a.csv"\npivot = { vertical = "y", unit = "mm" }\n'
@@ -148,7 +148,7 @@ def test_a_pivot_in_millimetres_is_one_in_metres(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("counts", [128, 1000, 4096])
-def test_counts_are_seen(tmp_path: Path, counts: int) -> None:
+def test_counts_are_detected(tmp_path: Path, counts: int) -> None:
     time, theta, _ = motion(duration=60.0)
     count = 2 * math.pi / counts
     run = read(tmp_path, text((time, count * np.round(theta / count))))
@@ -156,14 +156,14 @@ def test_counts_are_seen(tmp_path: Path, counts: int) -> None:
 
 
 @pytest.mark.parametrize("duration", [0.4, 1.0, 3.0])
-def test_a_few_swings_do_not_tell_the_zero(tmp_path: Path, duration: float) -> None:
+def test_a_few_swings_do_not_determine_the_zero(tmp_path: Path, duration: float) -> None:
     time, theta = clean(start=2.4, duration=duration)
     run = read(tmp_path, text((time, theta)))
     np.testing.assert_allclose(run.theta, theta, atol=1e-6)
     assert not any(f.mended for f in run.findings if f.what.startswith(("zero", "gauge")))
 
 
-def test_a_rest_that_is_seen_tells_the_zero(tmp_path: Path) -> None:
+def test_a_recorded_rest_determines_the_zero(tmp_path: Path) -> None:
     time, theta = clean(start=0.1, duration=20.0)
     run = read(tmp_path, text((time, theta + 0.5)))
     assert found(run)["zero-offset"].mended

@@ -72,7 +72,7 @@ def test_a_coarse_clock_is_spread(tmp_path: Path) -> None:
     assert np.ptp(run.time - time) < 0.03
 
 
-def test_a_counter_goes_on(tmp_path: Path) -> None:
+def test_a_counter_that_overflows_is_continued(tmp_path: Path) -> None:
     time, theta = clean()
     run = read(tmp_path, text(((time + 55) % 65.536, theta)))
     np.testing.assert_allclose(run.time, time + 55, atol=1e-5)
@@ -104,7 +104,7 @@ def test_a_clock_whose_stamps_hide_its_jitter_is_found(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0])
 @pytest.mark.parametrize("counts", [0, 128, 1024, 8192])
-def test_noise_is_right_within_a_few_per_cent(rate: float, counts: int) -> None:
+def test_noise_is_estimated_within_a_few_per_cent(rate: float, counts: int) -> None:
     time, theta, _ = motion(rate=rate)
     for noise in (0.0005, 0.003):
         count = 2 * np.pi / counts if counts else 0.0
@@ -147,7 +147,7 @@ def test_samples_that_are_missing_are_counted(tmp_path: Path, scatter: float) ->
     assert run.rate_hz == pytest.approx(100, rel=1e-3)
 
 
-def test_a_clock_that_counts_from_long_ago_is_told_by_the_millisecond(tmp_path: Path) -> None:
+def test_times_of_an_epoch_clock_are_printed_to_a_millisecond(tmp_path: Path) -> None:
     time, theta = clean()
     path = tmp_path / "a.csv"
     path.write_text(text((time + 1732209590.125, theta)), encoding="utf-8")
@@ -166,7 +166,7 @@ def test_the_last_digit_of_a_file_is_no_counter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_stamps_that_differ_by_rounding_are_one(tmp_path: Path, seed: int) -> None:
-    # As of a clock that was set back by seconds: its stamps come again, a digit off.
+    # A clock set back by seconds repeats its stamps up to rounding.
     rng = np.random.default_rng(seed)
     time, theta = clean()
     again = rng.choice(np.arange(1, time.size - 1), 20, replace=False)
@@ -180,7 +180,7 @@ def test_stamps_that_differ_by_rounding_are_one(tmp_path: Path, seed: int) -> No
 
 @pytest.mark.parametrize("stamp", ["last", "zero"])
 @pytest.mark.parametrize("tick", [0.01, 0.1])
-def test_a_clock_that_stops_costs_what_follows(tmp_path: Path, stamp: str, tick: float) -> None:
+def test_readings_after_a_clock_stops_are_left_out(tmp_path: Path, stamp: str, tick: float) -> None:
     time, theta = clean(duration=40.0)
     stamps = np.floor(time / tick + 1e-6) * tick
     stamps[2203:] = stamps[2202] if stamp == "last" else 0.0

@@ -1,4 +1,4 @@
-"""Copies of a run are found, however they are written, and recordings of one motion are none."""
+"""Copies of a run are found in any format; separate recordings of one motion are not copies."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def copied(read: Experiment) -> list[str]:
 
 
 def rewritten(time: Floats, theta: Floats, draw: np.random.Generator) -> str:
-    """Return the text of a part of a record on another clock, in another unit, in other digits."""
+    """Return a part of a record as text, on another clock, in another unit, with other digits."""
     size = theta.size
     first = int(draw.integers(0, size // 3))
     part = slice(first, first + int(draw.integers(size // 2, size - first + 1)))
@@ -53,7 +53,7 @@ def rewritten(time: Floats, theta: Floats, draw: np.random.Generator) -> str:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_copy_counts_once_however_it_is_written(seed: int, tmp_path: Path) -> None:
+def test_a_copy_is_used_once_in_any_format(seed: int, tmp_path: Path) -> None:
     draw = np.random.default_rng(seed)
     start = float(draw.uniform(0.3, 2.5))
     time, theta, _ = recorded.motion(start, rate=float(draw.choice([50.0, 100.0])))
@@ -75,7 +75,7 @@ def test_a_copy_counts_once_however_it_is_written(seed: int, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_copy_of_which_readings_are_lost_or_edited_counts_once(seed: int, tmp_path: Path) -> None:
+def test_a_copy_with_lost_or_edited_readings_is_used_once(seed: int, tmp_path: Path) -> None:
     draw = np.random.default_rng(seed)
     time, theta, _ = recorded.motion(float(draw.uniform(0.5, 2.5)), rate=100.0)
     reading = recorded.noisy(theta, 1e-3, float(draw.choice([0.0, recorded.COUNT])), seed)
@@ -90,17 +90,17 @@ def test_a_copy_of_which_readings_are_lost_or_edited_counts_once(seed: int, tmp_
         "one.csv": recorded.text((time, reading)),
         "copy.csv": recorded.text((time[kept] + 7.0, copy[kept])),
     }
-    # A gap may make two runs of it.
+    # A gap may divide it into two runs.
     assert [run.name for run in experiment(tmp_path, files).runs if run.moves] == ["one"]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_recordings_of_one_decay_are_no_copies(seed: int, tmp_path: Path) -> None:
-    """A release lower down follows the end of one higher up, as any pendulum does."""
+    """A release from a smaller angle follows the end of a larger one, for any pendulum."""
     draw = np.random.default_rng(seed)
     files = {}
     for k, start in enumerate((2.0, 1.9, 1.2, 1.2)):
-        # The last two begin alike, to the count; the third is what the first comes to.
+        # The last two begin alike, to the count; the third equals a later part of the first.
         time, theta, _ = recorded.motion(start, duration=30.0, rate=200.0)
         reading = recorded.noisy(theta, 3e-4, recorded.COUNT, int(draw.integers(1e6)))
         files[f"run_{k}.csv"] = recorded.text((time, reading))
@@ -140,7 +140,7 @@ def test_a_copy_held_out_tests_nothing(tmp_path: Path) -> None:
     assert compared.left_out == (("copy", "it is a copy of another run"),)
 
 
-def test_runs_of_several_pendulums_are_told_before_any_number(tmp_path: Path) -> None:
+def test_runs_of_several_pendulums_are_reported_first(tmp_path: Path) -> None:
     time, theta, _ = recorded.motion(duration=30.0)
     files = {
         f"run_{k}.csv": recorded.text((scale * time, recorded.noisy(theta, seed=k)))
@@ -150,7 +150,7 @@ def test_runs_of_several_pendulums_are_told_before_any_number(tmp_path: Path) ->
     assert [found.what for found in read.findings] == ["rigs-differ"]
     with pytest.raises(pendmap.InputError, match="no model follows these records"):
         identify_experiment(read)
-    # Runs of one pendulum have no finding; the periods are those of the small swing.
+    # Runs of one pendulum give no finding; periods are those of the small swing.
     same = experiment(
         tmp_path / "same",
         {
@@ -178,8 +178,8 @@ def test_a_drive_is_resolved_by_two_readings_a_period(rate: float, tmp_path: Pat
         assert "1.25 Hz" in said[0]
 
 
-def test_a_record_of_which_little_can_be_used_is_told_before_any_number(tmp_path: Path) -> None:
-    """A motion that gains energy all the time is carried by something."""
+def test_a_record_with_few_usable_readings_is_reported_first(tmp_path: Path) -> None:
+    """A motion that gains energy all the time is driven."""
     time = np.arange(0, 30, 0.01)
     growing = 0.1 * np.exp(0.05 * time) * np.cos(6 * time)
     path = tmp_path / "run.csv"
@@ -187,7 +187,7 @@ def test_a_record_of_which_little_can_be_used_is_told_before_any_number(tmp_path
     (run,) = pendmap.read_experiment(path).runs
     (said,) = (f.text for f in run.findings if f.what == "few-used")
     assert f"only {run.trusted.sum()} of 3000 readings" in said
-    # A long rest is no reason: nothing moves there.
+    # A long rest does not trigger the finding.
     time, theta, _ = recorded.motion(1.0, duration=20.0)
     long = np.arange(0, 500, 0.01)
     rest = np.interp(long, time, theta * np.maximum(1 - time / 18, 0))

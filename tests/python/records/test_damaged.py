@@ -1,4 +1,4 @@
-"""A hundred kinds of damaged file: each ends in a result that says so, or in one clear line."""
+"""A hundred kinds of damaged file: each gives a result with a finding, or an error of one line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def consistent(run: pendmap.Run) -> None:
-    """Check the properties that every run has."""
+    """Check the properties of every run."""
     assert run.time.shape == run.theta.shape == run.trusted.shape
     assert run.time.dtype == run.theta.dtype == np.float64
     assert run.time.size >= 3
@@ -54,7 +54,7 @@ def test_there_are_a_hundred_kinds() -> None:
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_damage_ends_in_a_finding_or_in_one_line(name: str, tmp_path: Path) -> None:
+def test_damage_gives_a_finding_or_an_error_of_one_line(name: str, tmp_path: Path) -> None:
     damage = DAMAGES[name]
     path = tmp_path / f"record{damage.suffix}"
     made = damage.make(sound())
@@ -124,13 +124,15 @@ def fuzz(path: Path, content: bytes) -> None:
 
 @QUIET
 @given(content=st.binary(max_size=400))
-def test_any_bytes(tmp_path: Path, content: bytes) -> None:
+def test_any_bytes_are_read_or_refused(tmp_path: Path, content: bytes) -> None:
     fuzz(tmp_path / "record.csv", content)
 
 
 @QUIET
 @given(rows=ROWS, separator=st.sampled_from([",", ";", "\t", " ", "|"]))
-def test_any_rows(tmp_path: Path, rows: list[list[str]], separator: str) -> None:
+def test_any_rows_are_read_or_refused(
+    tmp_path: Path, rows: list[list[str]], separator: str
+) -> None:
     lines = ["t_s" + separator + "theta_rad", *(separator.join(row) for row in rows)]
     fuzz(tmp_path / "record.csv", "\n".join(lines).encode(errors="replace"))
 
@@ -147,7 +149,9 @@ def test_any_rows(tmp_path: Path, rows: list[list[str]], separator: str) -> None
     ),
     ordered=st.booleans(),
 )
-def test_any_numbers(tmp_path: Path, values: list[tuple[float, float]], *, ordered: bool) -> None:
+def test_any_numbers_are_read_or_refused(
+    tmp_path: Path, values: list[tuple[float, float]], *, ordered: bool
+) -> None:
     time = sorted(t for t, _ in values) if ordered else [t for t, _ in values]
     rows = (f"{t!r},{a!r}" for t, (_, a) in zip(time, values, strict=True))
     fuzz(tmp_path / "record.csv", "\n".join(itertools.chain(["t_s,theta_rad"], rows)).encode())
@@ -158,7 +162,9 @@ def test_any_numbers(tmp_path: Path, values: list[tuple[float, float]], *, order
     at=st.lists(st.integers(0, 20_000), min_size=1, max_size=30),
     what=st.lists(st.integers(0, 255), min_size=1, max_size=30),
 )
-def test_any_bytes_changed_in_a_record(tmp_path: Path, at: list[int], what: list[int]) -> None:
+def test_any_bytes_changed_in_a_record_are_read_or_refused(
+    tmp_path: Path, at: list[int], what: list[int]
+) -> None:
     content = bytearray(sound().encode())
     for place, byte in zip(at, what, strict=False):
         content[place % len(content)] = byte

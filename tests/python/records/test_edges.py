@@ -1,4 +1,4 @@
-"""Encoders that write a line at each edge: all lines are kept, and are as good as their stamps."""
+"""Encoders that write a line at each edge: all lines are kept, as precise as their time stamps."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def motion_of(release: float) -> Decay:
 
 
 def edges(motion: Decay, counts: int) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-    """Times of the edges, their numbers, and the count that begins at each; by root finding."""
+    """Return times and numbers of the edges, and the count after each; by root finding."""
     step = math.tau / counts
     grid = np.arange(0.0, 40.0, 2e-4)
     count = np.floor(motion.angle(grid) / step).astype(int)
@@ -51,7 +51,7 @@ def edges(motion: Decay, counts: int) -> tuple[Floats, NDArray[np.int64], NDArra
 
 @pytest.mark.parametrize("written", ["count", "edge"])
 @pytest.mark.parametrize("unit", ["rad", "deg"])
-def test_each_edge_is_kept_and_stands_where_it_is(tmp_path: Path, written: str, unit: str) -> None:
+def test_each_edge_is_kept_with_its_angle(tmp_path: Path, written: str, unit: str) -> None:
     motion = motion_of(0.8)
     time, edge, shown = edges(motion, 1200)
     step = math.tau / 1200
@@ -62,7 +62,7 @@ def test_each_edge_is_kept_and_stands_where_it_is(tmp_path: Path, written: str, 
     assert run.trusted.sum() > 0.999 * time.size
     assert "1200 counts a turn" in found(run)["edges-logged"].text
     assert not {"time-gap", "time-jitter", "time-uneven", "counts-seen"} & set(found(run))
-    # A count shows the half of it that the zero of the counter takes up.
+    # A count is offset by half a step, which the zero of the counter absorbs.
     off = run.theta - motion.angle(run.time)
     assert np.ptp(off) < 1e-3 * step
     assert abs(np.median(off)) < 0.51 * step

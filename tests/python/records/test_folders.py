@@ -1,4 +1,4 @@
-"""Files without a description: folders of them, records without times, unused columns."""
+"""Files without a description: folders, records without times, unused columns."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ def test_files_of_a_plain_folder_are_runs_in_the_order_of_names(tmp_path: Path) 
     assert set(shown.sha256) == {"a.txt", "b.csv", "c.dat"}
 
 
-def test_a_folder_without_a_record_is_one_line(pendmap_command: Run, tmp_path: Path) -> None:
+def test_a_folder_without_a_record_is_refused_in_one_line(
+    pendmap_command: Run, tmp_path: Path
+) -> None:
     folder = tmp_path / "lab"
     folder.mkdir()
     for wrong in (None, "clamped at noon\n"):
@@ -79,7 +81,7 @@ def test_a_column_alone_is_an_angle_at_a_rate(tmp_path: Path, head: str, decimal
     assert run.rate_hz == pytest.approx(100)
 
 
-def test_a_line_that_cannot_be_read_leaves_its_place_in_time(tmp_path: Path) -> None:
+def test_an_unreadable_line_keeps_its_sampling_instant(tmp_path: Path) -> None:
     time, theta = clean()
     lines = [f"{value:.6f}" for value in theta]
     lines[700] = "overrun"
@@ -89,7 +91,7 @@ def test_a_line_that_cannot_be_read_leaves_its_place_in_time(tmp_path: Path) -> 
     np.testing.assert_allclose(run.time, np.delete(time, 700), atol=1e-9)
 
 
-def test_a_rate_in_a_description_is_a_clock_and_an_option_goes_before_it(tmp_path: Path) -> None:
+def test_a_rate_in_a_description_gives_the_times_and_an_option_overrides_it(tmp_path: Path) -> None:
     time, theta = clean()
     described = '[columns]\nangle = "w"\nrate_hz = 100\n[[run]]\nfile = "run.csv"\n'
     content = text((theta, theta), "w,copy")
@@ -99,7 +101,7 @@ def test_a_rate_in_a_description_is_a_clock_and_an_option_goes_before_it(tmp_pat
     np.testing.assert_allclose(run.time, 2 * time, atol=1e-9)
 
 
-def test_a_column_of_times_goes_before_a_rate(tmp_path: Path) -> None:
+def test_a_column_of_times_overrides_a_rate(tmp_path: Path) -> None:
     time, theta = clean()
     path = tmp_path / "timed.csv"
     path.write_text(text((time, theta)), encoding="utf-8")
@@ -151,7 +153,7 @@ def test_the_rate_reaches_each_command(pendmap_command: Run, tmp_path: Path) -> 
     assert "--rate" in pendmap_command("diagnose", "--help").stdout
 
 
-def test_columns_that_nobody_uses_are_named(tmp_path: Path) -> None:
+def test_unused_columns_are_named(tmp_path: Path) -> None:
     time, theta = clean()
     names = "t_s,theta_rad,cart_pos_m,motor torque [Nm],still,spare"
     columns = (time, theta, 0.1 * np.sin(time), np.cos(time), 0 * time, time**2)
@@ -166,7 +168,7 @@ def test_columns_that_nobody_uses_are_named(tmp_path: Path) -> None:
     assert any("no free decay" in line for line in doubts(shown, run))
 
 
-def test_columns_that_are_used_or_never_change_are_not_asked_about(tmp_path: Path) -> None:
+def test_used_or_constant_columns_are_not_reported(tmp_path: Path) -> None:
     time, theta = clean()
     content = text((time, theta, 0 * time, np.cos(time)), "t_s,theta_rad,torque,cart_acc")
     run = read(tmp_path, content)
@@ -193,7 +195,7 @@ def test_a_position_of_something_else_is_no_angle(tmp_path: Path) -> None:
     assert "may be the angle itself" in found(run)["angle-column"].text
 
 
-def test_a_position_beside_an_angle_stays_a_position(tmp_path: Path) -> None:
+def test_a_position_in_a_file_with_an_angle_is_a_position(tmp_path: Path) -> None:
     time, theta = clean()
     run = read(tmp_path, text((time, np.sin(0.7 * time), theta), "time,position,angle"))
     assert run.channels["angle"] == "angle"
@@ -202,9 +204,7 @@ def test_a_position_beside_an_angle_stays_a_position(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, np.nan])
 @pytest.mark.parametrize("name", ["theta", "theta_rad"])
-def test_pixels_go_before_an_angle_that_says_nothing(
-    tmp_path: Path, angle: float, name: str
-) -> None:
+def test_pixels_override_a_constant_angle(tmp_path: Path, angle: float, name: str) -> None:
     time, theta = clean()
     x, y = 640 + 300 * np.sin(theta), 200 + 300 * np.cos(theta)
     run = read(tmp_path, text((time, x, y, 0 * time + angle), f"t_s,x,y,{name}"))

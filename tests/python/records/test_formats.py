@@ -1,4 +1,4 @@
-"""Files as tools write them, and experiment.toml."""
+"""Files in the formats of common tools, and experiment.toml."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def same(run: Run, *, within: float = 1e-5, duration: float = 20.0) -> None:
-    """Whether a run is the clean record."""
+    """Return whether a run equals the clean record."""
     time, theta = clean(duration=duration)
     np.testing.assert_allclose(run.time, time, atol=1e-6)
     np.testing.assert_allclose(run.theta, theta, atol=within)
@@ -47,7 +47,7 @@ def phyphox(separator: str, decimal: str) -> str:
 @pytest.mark.parametrize(
     ("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ",")]
 )
-def test_phyphox(tmp_path: Path, separator: str, decimal: str) -> None:
+def test_a_file_of_phyphox_is_read(tmp_path: Path, separator: str, decimal: str) -> None:
     run = read(tmp_path, phyphox(separator, decimal))
     _, theta, speed = motion(duration=40.0)
     assert run.channels["velocity"] == "Gyroscope y (rad/s)"
@@ -59,7 +59,9 @@ def test_phyphox(tmp_path: Path, separator: str, decimal: str) -> None:
 
 @pytest.mark.parametrize(("separator", "decimal"), [("\t", "."), (",", "."), (";", ",")])
 @pytest.mark.parametrize("upward", [True, False])
-def test_tracker(tmp_path: Path, separator: str, decimal: str, *, upward: bool) -> None:
+def test_a_file_of_tracker_is_read(
+    tmp_path: Path, separator: str, decimal: str, *, upward: bool
+) -> None:
     time, theta, _ = motion(rate=30.0, duration=20.0)
     rng = np.random.default_rng(2)
     x = 320.5 + 210 * np.sin(theta) + rng.normal(0, 0.3, theta.size)
@@ -73,7 +75,7 @@ def test_tracker(tmp_path: Path, separator: str, decimal: str, *, upward: bool) 
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.3 / 210, rel=0.1)
 
 
-def test_tracker_with_an_angle(tmp_path: Path) -> None:
+def test_a_file_of_tracker_with_an_angle_is_read(tmp_path: Path) -> None:
     time, theta = clean()
     content = text((time, np.sin(theta), -np.cos(theta), np.degrees(theta)), "t,x,y,θ [°]")
     run = read(tmp_path, "mass A,,,\n" + content)
@@ -88,7 +90,7 @@ def test_a_short_arc_is_reported(tmp_path: Path) -> None:
     assert "circle-uncertain" in found(read(tmp_path, content))
 
 
-def test_a_serial_logger(tmp_path: Path) -> None:
+def test_a_file_of_a_serial_logger_is_read(tmp_path: Path) -> None:
     time, theta = clean()
     lines = [f"{1000 * t:.0f},{a:.5f}" for t, a in zip(time, theta, strict=True)]
     content = "ets Jul 29 2019\r\nrst:0x1\r\n\x00\x00,-0.\r\nREADY\r\n" + "\r\n".join(lines)
@@ -109,7 +111,9 @@ def test_a_serial_logger(tmp_path: Path) -> None:
         ("Timestamp (ms),Encoder (rev)", (1e3, 0.5 / math.pi)),
     ],
 )
-def test_units_in_names(tmp_path: Path, names: str, factors: tuple[float, float] | None) -> None:
+def test_units_in_column_names_are_read(
+    tmp_path: Path, names: str, factors: tuple[float, float] | None
+) -> None:
     time, theta = clean()
     if factors is None:
         with pytest.raises(pendmap.InputError, match="no column of angles"):
@@ -121,7 +125,7 @@ def test_units_in_names(tmp_path: Path, names: str, factors: tuple[float, float]
     assert "angle-unit" not in found(run)
 
 
-def test_parquet_is_the_same(tmp_path: Path) -> None:
+def test_parquet_equals_text(tmp_path: Path) -> None:
     time, theta = clean()
     pd.DataFrame({"t_s": time, "theta_rad": theta}).to_parquet(tmp_path / "a.parquet")
     (run,) = pendmap.read_experiment(tmp_path / "a.parquet").runs
@@ -167,7 +171,7 @@ def test_every_key_of_a_description(tmp_path: Path) -> None:
     assert read_in.sha256["a.csv"] == hashlib.sha256(semicolons.encode()).hexdigest()
 
 
-def test_drives_and_pivots(tmp_path: Path) -> None:
+def test_drives_and_pivots_are_read(tmp_path: Path) -> None:
     time, theta, _ = motion(drive=(0.3, 12.0, 0.4))
     push = -0.3 * 9.81 * np.cos(12 * time + 0.4)
     description = """
@@ -190,7 +194,7 @@ def test_drives_and_pivots(tmp_path: Path) -> None:
     assert "sign-turned" in found(second)  # upward is positive, and it pulls where p is positive
 
 
-def test_peaks_alone(tmp_path: Path) -> None:
+def test_peaks_alone_are_read(tmp_path: Path) -> None:
     time = 0.5 * np.arange(30)
     peaks = np.exp(-0.03 * time) * (-1.0) ** np.arange(30)
     run = read(tmp_path, text((time, peaks), "t_s,peak_rad"))
@@ -199,7 +203,7 @@ def test_peaks_alone(tmp_path: Path) -> None:
     assert math.isnan(pendmap.noise_floor(run).sigma)
 
 
-def test_a_folder_without_a_description(tmp_path: Path) -> None:
+def test_a_folder_without_a_description_is_read(tmp_path: Path) -> None:
     with pytest.raises(pendmap.InputError, match=r"has no experiment\.toml"):
         pendmap.read_experiment(tmp_path)
 
@@ -221,7 +225,7 @@ def test_an_angle_alone_has_no_times(tmp_path: Path) -> None:
         read(tmp_path, text((clean()[1],), "theta_rad"))
 
 
-def test_a_pivot_without_unit_and_a_drive_that_is_not_there_are_reported(tmp_path: Path) -> None:
+def test_a_pivot_without_unit_and_an_absent_drive_are_reported(tmp_path: Path) -> None:
     time, theta = clean()
     content = text((time, theta, np.cos(time)), "t_s,theta_rad,acc_y")
     described = '[[run]]\nfile = "run.csv"\nkind = "forced"\n'
@@ -253,7 +257,7 @@ def test_a_refused_description_names_its_fault(tmp_path: Path, line: str, says: 
 
 @pytest.fixture
 def workbook(tmp_path: Path) -> Callable[[str], Path]:
-    """A file that begins as a workbook does."""
+    """Return the first bytes of a workbook."""
 
     def made(kind: str) -> Path:
         path = tmp_path / f"book.{kind}"
@@ -268,7 +272,7 @@ def workbook(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.mark.parametrize(("kind", "engine"), [("xlsx", "openpyxl"), ("xls", "xlrd")])
-def test_a_workbook_without_its_reader_is_one_line(
+def test_a_workbook_without_its_reader_is_refused_in_one_line(
     workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, engine: str
 ) -> None:
     def absent(*_: object, **__: object) -> None:
@@ -285,7 +289,7 @@ def test_a_workbook_is_read_as_its_text_would_be(
     workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, clock: str
 ) -> None:
     time, theta = clean()
-    begin = dt.datetime(2024, 3, 31, 1, 59, 50)  # noqa: DTZ001 (as a workbook has it)
+    begin = dt.datetime(2024, 3, 31, 1, 59, 50)  # noqa: DTZ001 (workbooks have no time zone)
     stamps = [begin + dt.timedelta(seconds=t) for t in time] if clock == "date" else time
     rows: list[list[Any]] = [["Pendulum of Monday", None, None], [None, None, None]]
     rows += [["Time", None, "Angle (deg)"]]

@@ -1,4 +1,4 @@
-"""An accelerometer alone: holds and releases, and what is not reported of a made angle."""
+"""An accelerometer alone: holds and releases, and checks that a reconstructed angle omits."""
 
 from __future__ import annotations
 
@@ -23,18 +23,20 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment
 
 ONCE_A_PERIOD = 1.1
-"""Seconds: what is given up of a swing before a hand takes it."""
+"""Part of a swing, s, that may be lost before a hand stops it."""
 
 
 def spans(read: Experiment) -> list[tuple[float, float]]:
-    """Return from when to when each run is for fitting."""
+    """Return the interval of each run that is used for fitting."""
     ends = [run.time[run.trusted][[0, -1]] for run in read.runs]
     return [(float(low), float(high)) for low, high in ends]
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("release", [1.5, 1.9, 2.5, 2.9])
-def test_beyond_a_quarter_turn_nobody_holds(tmp_path: Path, sensor: str, release: float) -> None:
+def test_no_hold_is_found_beyond_a_quarter_turn(
+    tmp_path: Path, sensor: str, release: float
+) -> None:
     time, _, force = readings(**SENSORS[sensor][0], release=release, seconds=30)
     (run,) = pendmap.read_experiment(experiment(tmp_path, column(sensor), time, force)).runs
     assert run.trusted.all()
@@ -65,18 +67,18 @@ def test_releases_begin_where_the_hand_lets_go(
     read = pendmap.read_experiment(experiment(tmp_path, column(sensor), time, force))
     _free(read, free, 0.0)
     said = {finding.what for finding in (*read.findings, *read.runs[0].findings)}
-    assert "outliers" not in said  # the jumps where it is let go are none
+    assert "outliers" not in said  # the jumps at the release are none
 
 
 @pytest.mark.parametrize("sensor", ["near", "far"])
-def test_a_hand_may_tremble(tmp_path: Path, sensor: str) -> None:
+def test_a_trembling_hand_is_a_hold(tmp_path: Path, sensor: str) -> None:
     time, force, free = handled(sensor, ((1.2, 12.0), (0.9, 10.0)), tremble=0.003)
     read = pendmap.read_experiment(experiment(tmp_path, column(sensor), time, force))
     _free(read, free, 0.05)
 
 
-def test_held_it_reads_the_whole_of_gravity(tmp_path: Path) -> None:
-    """Held at 1.2 rad it reads 9.14 m/s^2, more than the 5.97 that any swing has there."""
+def test_a_held_accelerometer_reads_all_of_gravity(tmp_path: Path) -> None:
+    """Held at 1.2 rad it reads 9.14 m/s^2; any swing reads 5.97 there at most."""
     time, force, free = handled("near", ((1.2, 12.0), (0.9, 10.0)))
     held = (time > free[0][0] - 1.4) & (time < free[0][0])
     assert float(np.median(force[held])) == pytest.approx(GRAVITY * np.sin(1.2), rel=1e-3)
@@ -87,7 +89,7 @@ def test_held_it_reads_the_whole_of_gravity(tmp_path: Path) -> None:
         pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
 
 
-def test_the_releases_together_tell_the_damping(tmp_path: Path) -> None:
+def test_the_releases_together_give_the_damping(tmp_path: Path) -> None:
     time, force, _ = handled("near", ((1.2, 12.0), (0.9, 10.0), (1.4, 14.0)))
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
     best = identify_experiment(read, methods=["trajectory"]).best
@@ -99,7 +101,7 @@ def test_the_releases_together_tell_the_damping(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sensor", ["far", "removed", "angular"])
 def test_intervals_of_a_bias_are_in_order(tmp_path: Path, sensor: str) -> None:
-    """Beyond the centre of oscillation, and without gravity, the gain is negative."""
+    """The gain is negative beyond the centre of oscillation, and without gravity."""
     time, _, force = readings(**SENSORS[sensor][0], release=1.3, seconds=20)
     read = pendmap.read_experiment(experiment(tmp_path, column(sensor), time, force))
     report = identify_experiment(read, methods=["trajectory"])
@@ -111,7 +113,7 @@ def test_intervals_of_a_bias_are_in_order(tmp_path: Path, sensor: str) -> None:
     assert told[0] < told[1]
 
 
-def test_a_made_angle_judges_no_model(tmp_path: Path) -> None:
+def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     time, _, force = readings(release=1.3, seconds=20, tilt=0.03)
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
     report = identify_experiment(read)
@@ -130,7 +132,7 @@ def test_a_made_angle_judges_no_model(tmp_path: Path) -> None:
     assert any("made of an acceleration" in line for line in compared.as_text(beside))
 
 
-def test_figures_of_a_made_angle_say_why_they_judge_none(tmp_path: Path) -> None:
+def test_figures_of_a_reconstructed_angle_explain_the_missing_judgement(tmp_path: Path) -> None:
     from pendmap.charts import comparison, identification  # noqa: PLC0415 (slow to import)
     from pendmap.render import drawing  # noqa: PLC0415 (likewise)
 

@@ -1,4 +1,4 @@
-"""Records that begin while a hand holds the pendulum: no held reading is taken for free."""
+"""Records that begin while a hand holds the pendulum: no held reading is used for fitting."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 ANGLES = (0.3, 1.0, 1.3, 2.0, 2.8, 3.0)
 HOLDS = (0.3, 0.7, 1.5, 5.0, 20.0)
 LOST = 0.25
-"""Seconds of free swing that may be lost."""
+"""Free swing that may be lost, s."""
 
 
 def held(folder: Path, angle: float, hold: float, degrees: float, seed: int) -> tuple[Run, int]:
-    """Return the run of a pendulum held, then let go at rest, and the place of the release."""
+    """Return the run of a pendulum held, then released at rest, and the index of the release."""
     free = motion(start=angle, duration=15.0)[1]
     count = round(100 * hold)
     noise, step = math.radians(degrees), (0.0, 2 * math.pi / 4096, 2 * math.pi / 1024)[seed % 3]
@@ -43,7 +43,9 @@ def test_the_end_of_a_hold_is_late_rather_than_early(tmp_path: Path, angle: floa
 
 
 @pytest.mark.parametrize(("angle", "hold"), [(1.3, 1.5), (2.8, 0.4), (0.5, 12.0)])
-def test_a_fit_after_a_hold_leaves_noise_alone(tmp_path: Path, angle: float, hold: float) -> None:
+def test_a_fit_after_a_hold_has_residuals_of_noise_alone(
+    tmp_path: Path, angle: float, hold: float
+) -> None:
     run, _ = held(tmp_path, angle, hold, 0.1, 4)
     fit = identify(run.time, run.theta, trusted=run.trusted)
     assert fit.misfit == pytest.approx(1.0, abs=0.15)

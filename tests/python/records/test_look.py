@@ -1,4 +1,4 @@
-"""``pendmap look``, as a user meets it, and its figure."""
+"""``pendmap look`` from the point of view of a user, and its figure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FIELDS = {"channels", "rate_hz", "noise", "segments", "findings"}
 
 
 def odd(folder: Path) -> Path:
-    """A record with much to say about it."""
+    """Write a record with many findings."""
     time, theta = clean(duration=30.0)
     rng = np.random.default_rng(1)
     readings = np.concatenate([np.full(200, theta[0]), theta])
@@ -66,7 +66,7 @@ def test_json_keeps_the_contract(pendmap_command: Run, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["odd.csv"]
 
 
-def test_a_folder_says_each_run(pendmap_command: Run, tmp_path: Path) -> None:
+def test_a_folder_lists_each_run(pendmap_command: Run, tmp_path: Path) -> None:
     folder = folder_of(tmp_path, 3)
     result = json.loads(pendmap_command("look", folder, "--json").stdout)
     assert set(result) >= FIELDS
@@ -78,7 +78,7 @@ def test_a_folder_says_each_run(pendmap_command: Run, tmp_path: Path) -> None:
     assert "w0 6.2" in said
 
 
-def test_text_says_what_json_says(pendmap_command: Run, tmp_path: Path) -> None:
+def test_text_and_json_have_equal_findings(pendmap_command: Run, tmp_path: Path) -> None:
     path = odd(tmp_path)
     said = pendmap_command("look", path).stdout
     for finding in pendmap.read_experiment(path).runs[0].findings:
@@ -138,7 +138,7 @@ def several(tmp_path: Path) -> dict[str, pendmap.Experiment]:
     return {path.stem: pendmap.read_experiment(path) for path in paths}
 
 
-def test_every_word_of_a_figure_has_its_place(tmp_path: Path) -> None:
+def test_no_text_of_a_figure_is_cut_or_covered(tmp_path: Path) -> None:
     for name, experiment in several(tmp_path).items():
         figure = drawn(experiment)
         boxes = []
@@ -168,7 +168,7 @@ def test_a_figure_too_small_is_refused(tmp_path: Path) -> None:
     [
         ("multiarm_single_free_large.csv", 1000, 0.0, 6e-5),
         ("cartpend_free_long.csv", 50, 2 * np.pi / 4000, 1.7e-3),
-        # A pendulum fitted to it from 3 to 25 s leaves 1.04e-3; the noise of that part is 1.07e-3.
+        # The residual of a pendulum fitted from 3 to 25 s is 1.04e-3; that part's noise is 1.07e-3.
         ("cartpend_forced_cart_pulse.csv", 50, 2 * np.pi / 4000, 0.85e-3),
     ],
 )
@@ -183,7 +183,7 @@ def test_measured_records(name: str, rate: float, count: float, noise: float) ->
 def test_a_forced_record_that_flickers_by_a_count_at_rest_is_looked_at(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
-    """It has noise, but no speeds to tell it by."""
+    """The record has noise, but no velocities from which to estimate jitter."""
     readings = 0.001534 * np.random.default_rng(0).integers(0, 2, 2000)
     (tmp_path / "run_00.csv").write_text(text((np.arange(2000) / 100, readings)), encoding="utf-8")
     (tmp_path / "experiment.toml").write_text(

@@ -1,4 +1,4 @@
-"""Outliers: all of them are found, also beside one another, beside gaps and at the ends."""
+"""Outliers: all are found, also adjacent ones, next to gaps and at the ends."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_outliers_of_the_virtual_rig_do_not_spoil_its_noise(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("apart", [2, 4, 6, 7, 8, 11])
-def test_outliers_near_one_another_are_told_from_a_jump(tmp_path: Path, apart: int) -> None:
+def test_adjacent_outliers_are_distinguished_from_a_jump(tmp_path: Path, apart: int) -> None:
     time, theta = clean()
     at = [500, 500 + apart, 500 + 2 * apart]
     theta[at] += [0.5, 2.1, -0.9]
@@ -48,7 +48,7 @@ def test_outliers_near_one_another_are_told_from_a_jump(tmp_path: Path, apart: i
 
 @pytest.mark.parametrize("at", [0, 1, 3, 6, 9, 1991, 1995, 1998, 2000])
 @pytest.mark.parametrize("size", [0.25, -2.0])
-def test_outliers_at_the_ends(tmp_path: Path, at: int, size: float) -> None:
+def test_outliers_at_the_ends_are_found(tmp_path: Path, at: int, size: float) -> None:
     time, theta, _ = motion()
     readings = noisy(theta, 0.005)
     readings[at] += size
@@ -56,7 +56,7 @@ def test_outliers_at_the_ends(tmp_path: Path, at: int, size: float) -> None:
     assert np.flatnonzero(~run.trusted).tolist() == [at]
 
 
-def test_an_outlier_beside_a_gap(tmp_path: Path) -> None:
+def test_an_outlier_next_to_a_gap_is_found(tmp_path: Path) -> None:
     time, theta, _ = motion()
     readings = noisy(theta, 0.005)
     readings[[499, 520]] += [0.4, -1.2]
@@ -66,7 +66,7 @@ def test_an_outlier_beside_a_gap(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rate", [60.0, 100.0, 500.0])
-def test_two_percent_of_outliers_with_gaps(tmp_path: Path, rate: float) -> None:
+def test_two_percent_of_outliers_with_gaps_are_found(tmp_path: Path, rate: float) -> None:
     time, theta, _ = motion(duration=40.0, rate=rate)
     rng = np.random.default_rng(5)
     readings = noisy(theta, 0.004)

@@ -1,4 +1,4 @@
-"""The pivot's recorded motion: sign, scale, and places that come in steps."""
+"""The pivot's recorded motion: sign, scale, and quantised positions."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ TIME = np.arange(round(12 * RATE)) / RATE
 
 
 def place(time: Floats) -> Floats:
-    """A cart that goes 60 mm to the left and back, once in 1.5 s, and stands still then."""
+    """Return the position of a cart that moves 60 mm to the left and back in 1.5 s, then stops."""
     return -0.03 * (1 - np.cos(math.tau * np.clip(time - 0.5, 0.0, 1.5) / 1.5)) + 0.2
 
 
 def pushed(time: Floats) -> Floats:
-    """Its acceleration, m/s^2."""
+    """Return the acceleration of the cart, m/s^2."""
     inside = (time > 0.5) & (time < 2.0)
     return np.where(
         inside, -0.03 * (math.tau / 1.5) ** 2 * np.cos(math.tau * (time - 0.5) / 1.5), 0
@@ -43,7 +43,7 @@ def pushed(time: Floats) -> Floats:
 
 
 def swung(acceleration: Callable[[float], float]) -> Floats:
-    """The angle of a pendulum at rest that is pushed so, by scipy."""
+    """Return the angle, by scipy, of a pendulum at rest on the accelerated cart."""
 
     def slope(t: float, y: Sequence[float]) -> tuple[float, float]:
         push = acceleration(t) / GRAVITY * math.cos(y[0])
@@ -66,7 +66,7 @@ def described(tmp_path: Path, columns: Sequence[Floats], pivot: str) -> pendmap.
 
 
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 2e-3])
-def test_places_in_steps_push_as_the_pivot_did(tmp_path: Path, step: float) -> None:
+def test_quantised_positions_give_the_pivot_s_acceleration(tmp_path: Path, step: float) -> None:
     run = described(
         tmp_path, [step * np.round(place(TIME) / step)], 'horizontal = "cart", unit = "m"'
     )
@@ -81,7 +81,7 @@ def test_places_in_steps_push_as_the_pivot_did(tmp_path: Path, step: float) -> N
     assert np.abs(push).max() < 2 * np.abs(pushed(TIME)).max()
 
 
-def test_speeds_in_steps_push_too(tmp_path: Path) -> None:
+def test_quantised_velocities_give_the_pivot_s_acceleration(tmp_path: Path) -> None:
     speed = np.gradient(place(TIME), TIME)
     run = described(tmp_path, [0.01 * np.round(speed / 0.01)], 'horizontal = "cart", unit = "m/s"')
     assert run.pivot is not None
@@ -89,7 +89,7 @@ def test_speeds_in_steps_push_too(tmp_path: Path) -> None:
     assert np.abs(run.pivot["horizontal"] - pushed(TIME)).mean() < 0.1 * np.abs(pushed(TIME)).mean()
 
 
-def test_places_without_steps_stay_as_they_are(tmp_path: Path) -> None:
+def test_positions_without_steps_are_unchanged(tmp_path: Path) -> None:
     run = described(tmp_path, [place(TIME)], 'horizontal = "cart", unit = "m"')
     assert run.pivot is not None
     assert run.pivot_unit == "m"
@@ -120,7 +120,9 @@ def test_another_sign_or_scale_is_refused(tmp_path: Path, key: str, says: str) -
         described(tmp_path, [place(TIME)], f'horizontal = "cart", {key}')
 
 
-def test_a_run_with_places_in_steps_is_compared(pendmap_command: Command, tmp_path: Path) -> None:
+def test_a_run_with_quantised_positions_is_compared(
+    pendmap_command: Command, tmp_path: Path
+) -> None:
     time = np.arange(12_000) / 1000
     noise = 5e-4 * np.random.default_rng(1).standard_normal(time.size)
     cart = 1e-3 * np.round(place(time) / 1e-3)

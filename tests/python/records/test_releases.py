@@ -47,7 +47,7 @@ def length(run: Run) -> float:
         ((1.2, 2.0), (20.03, 25.02), {}),
         (*THREE, {}),
         ((2.0, -1.0, 0.4, 1.5), (15.3, 12.6, 10.2, 18.0), {"tremor": 0.02}),
-        # It never grows, and no hold lasts for a period.
+        # The amplitude never grows, and no hold lasts for a period.
         ((1.5, 0.3, 0.3), (10.03, 8.02, 9.1), {"tremor": 0.0, "hold": 0.3, "carry": 0.6}),
         ((0.5, 2.0), (12.0, 15.0), {"tremor": 0.0, "hold": 3.0, "carry": 2.0}),
     ],
@@ -63,13 +63,13 @@ def test_each_release_is_a_run(
     assert f"{count} releases" in said.text
     for run, (low, high) in zip(there.runs, made.spans, strict=True):
         used = run.time[run.trusted]
-        assert low <= used[0] < low + 0.3  # nothing of the hand, little of the motion lost
+        assert low <= used[0] < low + 0.3  # no reading of the hand, little of the motion lost
         assert high - 0.5 < used[-1] <= high
         at = np.searchsorted(made.time, run.time)
         np.testing.assert_allclose(run.theta, made.theta[at], atol=1e-6)
 
 
-def test_all_releases_tell_more_than_the_longest(tmp_path: Path) -> None:
+def test_all_releases_together_are_more_precise_than_the_longest(tmp_path: Path) -> None:
     together, alone = [], []
     for seed in range(4):
         there = pendmap.read_experiment(write(tmp_path, released(*THREE, seed=seed)))
@@ -83,7 +83,7 @@ def test_all_releases_tell_more_than_the_longest(tmp_path: Path) -> None:
                 errors.append((estimate.value - true, estimate.stderr))
     both, one = (np.array(errors).reshape(4, 3, 2) for errors in (together, alone))
     assert np.all(both[..., 1] < 0.75 * one[..., 1])
-    # The errors themselves, each over what the longest alone is uncertain by.
+    # The errors of the estimates, over the standard errors from the longest alone.
     size = one[..., 1].mean(axis=0)
     assert np.sum((both[..., 0] / size) ** 2) < np.sum((one[..., 0] / size) ** 2)
 
@@ -129,7 +129,7 @@ def test_each_release_inherits_the_description_of_its_run(tmp_path: Path) -> Non
     report = identify_experiment(there, methods=["trajectory"])
     assert report.joint is not None
     assert [run.name for run in report.runs] == ["a", "decay (2) 1/2", "decay (2) 2/2"]
-    # Drifts count from the laboratory's clock: a release begins when the file says.
+    # Drifts refer to the laboratory's clock: a release begins at its time in the file.
     second = there.runs[1]
     given = as_fit_run(second, reading_of(second.time, second.theta))
     assert given.lab_time_s + given.time[0] == pytest.approx(300 + second.time[0])
@@ -151,8 +151,8 @@ def test_a_release_of_few_swings_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.06, 0.8])
-def test_friction_is_no_hand(tmp_path: Path, friction: float) -> None:
-    # Tr is 0.02 of w0^2 at most: the last swings have little else than friction.
+def test_friction_is_not_taken_for_a_hand(tmp_path: Path, friction: float) -> None:
+    # Tr is 0.02 of w0^2 at most: the last swings are damped almost by friction alone.
     time, theta = record(decay(release=0.8, c_over_m=0.05, tr=friction, until=80.0), seconds=60)
     rest = np.flatnonzero(np.abs(np.diff(theta[::20])) > 0.01)[-1] / 5
     (run,) = pendmap.read_experiment(write(tmp_path, Released(time, theta, []))).runs

@@ -1,4 +1,4 @@
-"""Slips of time: readings that are lost without a gap in the times; told from missed counts."""
+"""Time slips: readings lost without a gap in the stamps; distinguished from missed counts."""
 
 from __future__ import annotations
 
@@ -28,25 +28,23 @@ def readings(time: Floats, seed: int) -> Floats:
 
 
 def late(rate: float, seed: int, length: int = 1) -> tuple[Floats, Floats]:
-    """Stamps without gaps, and the times at which the readings were really taken."""
+    """Return stamps without gaps, and the true times of the readings."""
     stamps = np.arange(round(40 * rate)) / rate
     missing = np.zeros(stamps.size)
-    # One in each fifth second: none where the pendulum rests already.
+    # One every five seconds, and none after the pendulum has come to rest.
     at = np.arange(2, 33, 5) * rate + np.random.default_rng(seed).integers(0, 3 * rate, 7)
     missing[at.astype(int)] = length / rate
     return stamps, stamps + np.cumsum(missing)
 
 
 def taken(run: pendmap.Run, true: Floats) -> Floats:
-    """How far each time is from the one at which the reading was taken, s."""
+    """Return the distance of each time from the true time of the reading, s."""
     return np.abs((run.time - run.time[0]) - (true - true[0]))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("rate", "length"), [(100.0, 1), (100.0, 2), (60.0, 1)])
-def test_slips_of_time_are_mended_by_the_clock(
-    tmp_path: Path, rate: float, length: int, seed: int
-) -> None:
+def test_time_slips_are_corrected(tmp_path: Path, rate: float, length: int, seed: int) -> None:
     stamps, true = late(rate, seed, length)
     run = read(tmp_path, text((stamps, readings(true, seed))))
     slips = found(run)["time-slips"]
@@ -54,13 +52,13 @@ def test_slips_of_time_are_mended_by_the_clock(
     assert "missed-counts" not in found(run)
     assert run.trusted.sum() > 0.9 * run.time.size
     off = taken(run, true)[run.trusted]
-    # What is nearly at rest when a reading is lost shows nothing; all large swings are right.
+    # A slip near rest cannot be located; all large swings are right.
     assert np.mean(off > 0.1 / rate) < 0.25
     assert off[np.abs(np.gradient(run.theta, run.time))[run.trusted] > 2.0].max() < 0.1 / rate
 
 
 @pytest.mark.parametrize("size", [1, 25, 60])
-def test_missed_counts_are_no_slips_of_time(tmp_path: Path, size: int) -> None:
+def test_missed_counts_are_no_time_slips(tmp_path: Path, size: int) -> None:
     stamps, _ = late(100.0, 1)
     theta = readings(stamps, 1)
     at = (120, 431, 777, 1115, 1490)
@@ -72,7 +70,7 @@ def test_missed_counts_are_no_slips_of_time(tmp_path: Path, size: int) -> None:
     assert size == 1 or "missed-counts" in found(run)
 
 
-def test_a_count_missed_beside_slips_is_still_one(tmp_path: Path) -> None:
+def test_a_missed_count_is_found_in_a_record_with_slips(tmp_path: Path) -> None:
     stamps, true = late(100.0, 2)
     theta = readings(true, 2)
     theta[550:] += 30 * COUNT
@@ -81,7 +79,7 @@ def test_a_count_missed_beside_slips_is_still_one(tmp_path: Path) -> None:
     assert found(run)["missed-counts"].text.startswith("1 jump of the reading (+0.046")
 
 
-def test_a_sound_clock_has_no_slips(tmp_path: Path) -> None:
+def test_a_regular_clock_has_no_slips(tmp_path: Path) -> None:
     stamps, _ = late(100.0, 1)
     run = read(tmp_path, text((stamps, readings(stamps, 1))))
     assert not {"time-slips", "missed-counts"} & set(found(run))

@@ -1,4 +1,4 @@
-"""The noise of a sensor at rest, from the shares of the counts that it shows."""
+"""The noise of a sensor at rest, from the frequencies of the counts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TIME = np.arange(6000) / 100.0
 
 
 def shown(noise: float, place: float, seed: int) -> np.ndarray:
-    """Readings of an angle that lies ``place`` counts beside one, noise in counts."""
+    """Return readings of an angle ``place`` counts from a count, with noise in counts."""
     moved = place + noise * np.random.default_rng(seed).standard_normal(TIME.size)
     return COUNT * np.round(moved)
 
 
 @pytest.mark.parametrize("noise", [0.07, 0.14, 0.28, 0.5])
-def test_the_noise_is_that_of_the_sensor_wherever_the_angle_lies(noise: float) -> None:
+def test_the_noise_does_not_depend_on_the_position_between_counts(noise: float) -> None:
     expected = COUNT * math.hypot(noise, 1 / math.sqrt(12))
     ratios = []
     for seed, place in enumerate(np.linspace(-0.5, 0.5, 9)):
@@ -31,7 +31,7 @@ def test_the_noise_is_that_of_the_sensor_wherever_the_angle_lies(noise: float) -
     assert np.abs(np.array(ratios) - 1).max() < 0.15
 
 
-def test_three_counts_show_the_noise_to_a_few_percent() -> None:
+def test_three_counts_give_the_noise_to_a_few_percent() -> None:
     found = still_noise(shown(0.3, 0.1, 1), COUNT)
     assert found is not None
     expected = COUNT * math.hypot(0.3, 1 / math.sqrt(12))

@@ -1,4 +1,4 @@
-"""The trigger: where a release is, and what frequency and phase a drive has."""
+"""The trigger: instants of releases, frequency and phase of a drive."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ OTHER_PHASE = 0.7
 
 
 def pulses(time: Floats, at: Floats, width: float = 0.05) -> Floats:
-    """1 for a while from each instant on, else 0."""
+    """Return 1 for a while from each instant on, otherwise 0."""
     after = np.searchsorted(at, time, side="right") - 1
     return np.where((after >= 0) & (time - at[np.maximum(after, 0)] < width), 1.0, 0.0)
 
 
 def driven(phase: float = OTHER_PHASE) -> tuple[Floats, Floats, Floats]:
-    """A forced run with a pulse whenever Omega t + phi is ``phase``."""
+    """Return a forced run with a pulse whenever Omega t + phi is ``phase``."""
     time, theta, _ = motion(start=0.5, duration=30.0, drive=DRIVE)
     first = (phase - DRIVE[2]) / DRIVE[1]
     edges = first + 2 * math.pi / DRIVE[1] * np.arange(-2, 70)
@@ -49,7 +49,7 @@ def forced(folder: Path, trigger: Floats, drive: str, column: str = "") -> pendm
     return run
 
 
-def test_edges_between_two_levels() -> None:
+def test_edges_between_two_levels_are_found() -> None:
     rng = np.random.default_rng(1)
     level = np.repeat([0.2, 3.4, 0.2, 3.4, 0.2], [50, 3, 100, 40, 30])
     values = level + 0.1 * rng.standard_normal(level.size)
@@ -68,13 +68,13 @@ def test_edges_between_two_levels() -> None:
 @pytest.mark.parametrize("edge", ["rising", "falling"])
 @pytest.mark.parametrize("form", ["ttl", "bool", "voltage", "bouncing"])
 def test_an_edge_marks_the_release(tmp_path: Path, edge: str, form: str) -> None:
-    # The pendulum swings a little in the hand before, which only the trigger tells from a release.
+    # The pendulum swings in the hand before; only the trigger distinguishes this from a release.
     made = released((1.2, 2.0), (12.0, 15.0), tremor=0.02)
     held = np.ones(made.time.size, bool)
     for low, high in made.spans:
         held[(made.time >= low) & (made.time <= high)] = False
     high = held if edge == "falling" else ~held
-    # Before the first release nothing is recorded but a hold of 0.1 s.
+    # Before the first release there is only a hold of 0.1 s.
     column = high.astype(float)
     lead = np.full(10, float(edge == "falling"))
     theta = np.r_[np.full(10, made.theta[0]), made.theta]
@@ -127,7 +127,9 @@ def test_nothing_before_the_edge_is_used(tmp_path: Path) -> None:
         (lambda t: pulses(t, np.sort(np.random.default_rng(1).uniform(0, 20, 30)), 0.02), "three"),
     ],
 )
-def test_what_marks_no_release_is_reported(tmp_path: Path, trigger: object, says: str) -> None:
+def test_a_trigger_that_marks_no_release_is_reported(
+    tmp_path: Path, trigger: object, says: str
+) -> None:
     time, theta = clean()
     path = tmp_path / "a.csv"
     path.write_text(text((time, theta, trigger(time)), NAMES), encoding="utf-8")  # type: ignore[operator]
@@ -141,7 +143,7 @@ def test_a_drive_s_frequency_lies_within_its_error() -> None:
     rng = np.random.default_rng(3)
     misses = []
     for _ in range(300):
-        # Also periods that are nearly whole numbers of samples: there edges repeat their errors.
+        # Periods near whole numbers of samples are included: their edges repeat the same error.
         period = rng.choice([0.5, 0.52]) + rng.choice([0, 1e-5, 1e-4, 3e-3]) * rng.uniform(-1, 1)
         time = np.arange(3000) / 100
         trigger = pulses(time, rng.uniform(0, period) + period * np.arange(80), 0.1)
@@ -152,7 +154,7 @@ def test_a_drive_s_frequency_lies_within_its_error() -> None:
         misses.append((beat.omega - 2 * math.pi / period) / beat.stderr)
     assert (
         np.max(np.abs(misses)) < 1.8
-    )  # bounds of an even distribution are sqrt(3) from its middle
+    )  # bounds of a uniform distribution are sqrt(3) from its middle
     assert 0.3 < np.std(misses) < 1.2
 
 
@@ -169,7 +171,7 @@ def test_a_drive_is_compared_with_its_trigger(tmp_path: Path) -> None:
     assert "trigger-drive" not in said
 
 
-def test_a_phase_is_taken_where_it_is_stated(tmp_path: Path) -> None:
+def test_a_stated_phase_is_used(tmp_path: Path) -> None:
     _, _, trigger = driven()
     run = forced(tmp_path, trigger, "Omega = 12.1", ", phase = 0.7")
     assert run.drive is not None

@@ -1,4 +1,4 @@
-"""Columns of turning points that nobody declared, and motions that are none."""
+"""Undeclared columns of turning points, and motions that have none."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def turns(start: float, noise: float) -> tuple[Floats, Floats]:
-    """Times and angles of the turning points of a decay, read with some noise."""
+    """Return times and angles of the turning points of a decay, read with noise."""
     time, theta, speed = motion(start=start, duration=30.0, rate=1000.0)
     at = np.r_[0, np.flatnonzero(speed[1:-1] * speed[2:] < 0) + 1]
     rng = np.random.default_rng(1)
@@ -40,7 +40,7 @@ def test_turning_points_are_recognised(tmp_path: Path, start: float, every: int)
         pendmap.read_experiment(tmp_path / run.file).refuse_still([run])
 
 
-def test_declared_turning_points_are_taken(tmp_path: Path) -> None:
+def test_declared_turning_points_are_used(tmp_path: Path) -> None:
     time, theta = turns(1.2, 1e-3)
     description = '[columns]\npeaks = "theta_rad"\n[[run]]\nfile = "a.csv"\n'
     (run,) = experiment(tmp_path, description, a=text((time, theta))).runs

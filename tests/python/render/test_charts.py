@@ -1,4 +1,4 @@
-"""A chart is built once: both renderers draw whatever a builder returns."""
+"""Charts: one builder per result, and both renderers draw any chart."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CELLS = marks.Colours("height", "viridis", 0.0, 1.0)
 
 
 def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> charts.Chart:
-    """Every mark that there is, over plain and logarithmic axes."""
+    """Return every kind of mark, over linear and logarithmic axes."""
     y = dataset["p"].values
     size = min(cells, 4)
     across, up = charts.Axis("x (s)", (1.0, 100.0), "log"), charts.Axis("y (rad)", (-2.0, 2.0))
@@ -64,7 +64,7 @@ def dataset(monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
     return xr.Dataset({"p": ("x", np.sin(X))}, attrs={"kind": "example", "summary": "An example."})
 
 
-def test_a_builder_is_all_that_a_figure_needs(dataset: xr.Dataset, tmp_path: Path) -> None:
+def test_a_builder_is_enough_for_a_figure(dataset: xr.Dataset, tmp_path: Path) -> None:
     figure = made(dataset)
     assert named(figure) == ["a line", "points", "a band", "a span", "an area", "no", "yes"]
     for said in ("An example", "of every mark", "words", "height", "x (s)", "(a) curves"):
@@ -80,12 +80,12 @@ def test_a_builder_is_all_that_a_figure_needs(dataset: xr.Dataset, tmp_path: Pat
         render.draw(dataset, tmp_path / "b.png", layer="other")
 
 
-def test_and_all_that_a_recording_needs(dataset: xr.Dataset, tmp_path: Path) -> None:
+def test_a_builder_is_enough_for_a_recording(dataset: xr.Dataset, tmp_path: Path) -> None:
     back = recorded(dataset, tmp_path)
     drawn = {f"/curves/data/{name}" for name in ("line", "points", "band", "level")}
     images = {"/classes/data/cells", "/heights/data/heights"}
     assert drawn | images | {"/bins/data/bins", "/legend", "/summary"} <= set(back.columns)
-    # Views have no logarithmic axes: powers of ten stand there.
+    # Views have no logarithmic axes: they show powers of ten.
     at = np.array(back.one("/curves/data/points", "Points2D:positions"))
     assert np.allclose(at, np.stack([np.log10(X[::9]), np.sin(X)[::9]], axis=1), atol=1e-6)
     cells = back.image("/classes/data/cells", "SegmentationImage", np.uint8)
@@ -94,7 +94,7 @@ def test_and_all_that_a_recording_needs(dataset: xr.Dataset, tmp_path: Path) -> 
     assert back.views["/curves"] == "Curves"
 
 
-def test_without_a_builder_there_is_neither(tmp_path: Path) -> None:
+def test_without_a_builder_there_is_no_figure_and_no_recording(tmp_path: Path) -> None:
     unknown = xr.Dataset(attrs={"kind": "example"})
     for write, name in ((render.draw, "a.png"), (viewer.record, "a.rrd")):
         with pytest.raises(InputError, match=r"kind 'example'; kinds that can be: basins, .*traj"):

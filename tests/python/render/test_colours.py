@@ -1,4 +1,4 @@
-"""Colours: told apart with every kind of sight, and by names alone."""
+"""Colours: distinguishable with every kind of colour vision, and assigned by name alone."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ COEXISTING = (
 
 
 def perceived(name: str, deficiency: str) -> npt.NDArray[np.float64]:
-    """Return a colour in Ottosson's OKLab, times 100, as it is seen."""
+    """Return the perceived colour in Ottosson's OKLab, times 100."""
     channel = np.array(palette.rgb(name)) / 255
     linear = np.where(channel <= 0.04045, channel / 12.92, ((channel + 0.055) / 1.055) ** 2.4)
     seen = np.clip(DEFICIENCIES[deficiency] @ linear, 0, 1)
@@ -71,13 +71,13 @@ def perceived(name: str, deficiency: str) -> npt.NDArray[np.float64]:
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
 @pytest.mark.parametrize("names", COEXISTING, ids=lambda names: names[0])
-def test_colours_that_coexist_are_told_apart(names: tuple[str, ...], deficiency: str) -> None:
+def test_colours_that_coexist_are_distinguishable(names: tuple[str, ...], deficiency: str) -> None:
     for one, other in itertools.combinations(names, 2):
         gap = np.linalg.norm(perceived(one, deficiency) - perceived(other, deficiency))
         assert gap > 5.0, (one, other, gap)
 
 
-def test_colours_go_by_name_alone() -> None:
+def test_colours_depend_on_names_alone() -> None:
     assert palette.colour("rest") == "#474747"
     assert palette.colour("rotation 1:\N{MINUS SIGN}1") == palette.colour("rotation 1:-1")
     assert palette.colour("inverted_rest") == palette.colour("inverted rest")
@@ -99,7 +99,7 @@ def test_signed_colours_are_white_at_zero_and_symmetric_in_lightness() -> None:
 
 
 @pytest.mark.parametrize("name", ["oscillation {}:0", "oscillation {}:0 (+)", "rotation {0}:-{0}"])
-def test_no_two_periods_that_are_looked_for_look_the_same(name: str) -> None:
+def test_colours_of_all_periods_differ(name: str) -> None:
     names = [name.format(n) for n in range(1, 33)]
     assert len({palette.colour(one) for one in names}) == len(names)
     for one, other in itertools.combinations(names, 2):
@@ -107,7 +107,7 @@ def test_no_two_periods_that_are_looked_for_look_the_same(name: str) -> None:
         assert gap > 1.0 or palette.lap(one) != palette.lap(other), (one, other, gap)
 
 
-def test_what_begins_again_is_darker_or_lighter() -> None:
+def test_a_repeated_colour_is_darker_or_lighter() -> None:
     assert palette.lap("oscillation 2:0") == palette.lap("rotation 5:+1") == 0
     assert palette.lap("oscillation 14:0") == 2
     assert palette.describe("oscillation 14:0") == "lighter yellow"

@@ -1,4 +1,4 @@
-"""The figure of a comparison: no higher than a screen, whatever the number of runs."""
+"""The figure of a comparison: no higher than a screen for any number of runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MODEL = Rig(w0=6.2, c_over_m=0.0496, Tr=0.08)
 
 
 def compared(count: int, seconds: float = 10.0) -> Comparison:
-    """``count`` runs; the third has more friction, the last is held out."""
+    """Compare ``count`` runs; the third has more friction, the last is held out."""
     runs = []
     for k in range(count):
         made = decay(tr=0.3 if k == 2 else 0.08, release=1.0, until=40.0)
@@ -36,7 +36,7 @@ def compared(count: int, seconds: float = 10.0) -> Comparison:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
-def test_it_fits_a_screen_and_no_text_covers_another(count: int) -> None:
+def test_a_comparison_fits_a_screen_without_overlapping_text(count: int) -> None:
     with rc_context(style.RC):
         figure = drawing.draw(comparison.sheet(compared(count)), dpi=100.0)
         figure.canvas.draw()
@@ -50,7 +50,7 @@ def test_it_fits_a_screen_and_no_text_covers_another(count: int) -> None:
         assert box.y0 > -1
         assert box.y1 < figure.bbox.y1 + 1
     drawn = written(figure)
-    if count > comparison.ALL:  # all in one panel; the one held out and the one missed most
+    if count > comparison.ALL:  # all in one panel; the held-out run and that of largest misfit
         ratios = figure.axes[0].get_lines()
         points = sum(len(line.get_xdata()) for line in ratios[1:])  # type: ignore[arg-type]
         assert points == count
@@ -61,7 +61,7 @@ def test_it_fits_a_screen_and_no_text_covers_another(count: int) -> None:
         assert all(f"run_{k:02d}" in drawn for k in range(count))
 
 
-def test_a_run_without_peaks_says_so() -> None:
+def test_a_run_without_peaks_is_marked() -> None:
     with rc_context(style.RC):
         figure = drawing.draw(comparison.sheet(compared(1, seconds=0.4)), dpi=50.0)
     assert "Fewer than three peaks" in written(figure)
@@ -70,7 +70,7 @@ def test_a_run_without_peaks_says_so() -> None:
 
 @pytest.mark.parametrize("seconds", [20.0, 70.0])
 def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_path: Path) -> None:
-    """One that tumbles, one that settles within 70 s; the sheet and the paper's two figures."""
+    """Figures are drawn of a run that tumbles and of one that settles within 70 s."""
     plans = (
         RunPlan("forced", 1.0, 3.0, seconds, p=1.5, frequency=11.0),
         RunPlan("forced", 0.9, 0.0, seconds, p=0.6, frequency=12.0, phase=0.4),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 
-def test_labels_lead_and_settle_time_stands_beside_them() -> None:
+def test_labels_come_first_and_settle_time_second() -> None:
     figure = made(synthetic.painted(synthetic.USUAL[:4]))
     assert titles(figure) == ["basins of attraction", "settle time"]
     assert "periods to settle" in written(figure)
@@ -112,7 +112,7 @@ def test_unreliable_labels_come_last_small_and_marked() -> None:
     assert "unreliable" not in written(made(synthetic.painted()))
 
 
-def test_chaos_that_takes_all_shows_turns_exponent_and_its_points() -> None:
+def test_a_single_chaotic_attractor_shows_turns_exponent_and_its_points() -> None:
     dataset = motions.chaotic(cells=24, periods=4)
     figure = made(dataset)
     assert titles(figure) == [

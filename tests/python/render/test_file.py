@@ -1,4 +1,4 @@
-"""Files of figures: whole or absent, the same each time, bad input refused."""
+"""Files of figures: complete or absent, reproducible; bad input is refused."""
 
 from __future__ import annotations
 
@@ -28,9 +28,7 @@ if TYPE_CHECKING:
 @pytest.mark.parametrize(
     ("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
 )
-def test_files_are_written_whole_and_the_same_each_time(
-    tmp_path: Path, suffix: str, magic: bytes
-) -> None:
+def test_files_are_complete_and_reproducible(tmp_path: Path, suffix: str, magic: bytes) -> None:
     dataset = synthetic.painted()
     first = render.draw(dataset, tmp_path / f"a.{suffix}")
     second = render.draw(dataset, str(tmp_path / f"b.{suffix}"))
@@ -39,13 +37,13 @@ def test_files_are_written_whole_and_the_same_each_time(
     assert sorted(p.name for p in tmp_path.iterdir()) == [f"a.{suffix}", f"b.{suffix}"]
 
 
-def test_size_and_resolution_are_kept(tmp_path: Path) -> None:
+def test_size_and_resolution_are_as_requested(tmp_path: Path) -> None:
     file = render.draw(synthetic.painted(), tmp_path / "a.png", size=(7.5, 5.0), dpi=80)
     assert struct.unpack(">II", file.read_bytes()[16:24]) == (600, 400)
 
 
 @pytest.mark.parametrize("layer", ["labels", "label", "settle", "net_turns", "turns"])
-def test_one_layer_alone(tmp_path: Path, layer: str) -> None:
+def test_one_layer_is_drawn_alone(tmp_path: Path, layer: str) -> None:
     render.draw(synthetic.painted(), tmp_path / "a.png", layer=layer, dpi=50)
     assert len(titles(made(synthetic.painted(), layer))) == 1
 
@@ -97,7 +95,7 @@ def test_a_trajectory_has_its_own_layers(tmp_path: Path) -> None:
         render.draw(dataset, tmp_path / "b.png", layer="labels")
 
 
-def test_an_absent_folder_or_a_folder_in_the_way(tmp_path: Path) -> None:
+def test_an_absent_folder_or_a_folder_of_the_file_s_name_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="folder does not exist"):
         render.draw(synthetic.painted(), tmp_path / "no" / "a.png")
     (tmp_path / "b.png").mkdir()
@@ -120,7 +118,7 @@ def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mo
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_large_maps_are_never_converted_whole(tmp_path: Path) -> None:
+def test_large_maps_are_converted_in_parts(tmp_path: Path) -> None:
     peaks = []
     for side in (1200, 4000):
         dataset = enlarged(synthetic.painted(synthetic.USUAL[:3], (10, 10), undecided=4), side)
@@ -133,7 +131,7 @@ def test_large_maps_are_never_converted_whole(tmp_path: Path) -> None:
 
 
 def enlarged(dataset: xr.Dataset, side: int) -> xr.Dataset:
-    """Return a map of ``side`` squared cells, its arrays in memory."""
+    """Return a map of ``side`` squared cells, with its arrays in memory."""
     index = np.arange(side) * dataset.sizes["theta"] // side
     return (
         dataset.isel(theta=index, velocity=index)

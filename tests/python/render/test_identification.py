@@ -1,4 +1,4 @@
-"""The figure of an identification: what it shows of which record, and that every word has room."""
+"""The figure of an identification: its content for each kind of record, and room for all text."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def drawn(name: str, size: tuple[float, float] | None = None, **given: Any) -> F
 
 
 def assert_room(figure: Figure) -> None:
-    """No word is cut, none covers another, none stands in another's panel."""
+    """Assert that no text is cut, covers another, or extends into another's panel."""
     boxes = []
     for part in figure.findobj(Text):
         assert isinstance(part, Text)
@@ -100,16 +100,16 @@ def assert_room(figure: Figure) -> None:
 
 
 @pytest.mark.parametrize("name", RECORDS)
-def test_every_word_has_its_place(name: str) -> None:
+def test_no_text_is_cut_or_covered(name: str) -> None:
     assert_room(drawn(name))
 
 
 @pytest.mark.parametrize("part", list(identification.PARTS))
-def test_every_part_alone(part: str) -> None:
+def test_every_part_is_drawn_alone(part: str) -> None:
     assert_room(drawn("ends above 12 degrees", parts=(part,), title="Figure", subtitle=""))
 
 
-def test_sizes_that_may_be_chosen() -> None:
+def test_text_has_room_at_all_allowed_sizes() -> None:
     with pytest.raises(pendmap.InputError, match=r"at least \d+\.\d x \d+\.\d inches"):
         drawn("whole", size=(4.0, 4.0))
     figure = drawn("whole", size=(16.0, 12.0))
@@ -123,7 +123,7 @@ def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
         drawn("whole", parts=parts)
 
 
-def test_files_are_whole(tmp_path: Path) -> None:
+def test_files_are_complete(tmp_path: Path) -> None:
     for suffix in render.SUFFIXES:
         path = render.draw_identification(
             report("begins under 12 degrees"), tmp_path / f"a{suffix}", parts=("errors",)
@@ -134,7 +134,7 @@ def test_files_are_whole(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == len(render.SUFFIXES)
 
 
-def test_the_pendulum() -> None:
+def test_the_pendulum_is_drawn() -> None:
     for size in (None, (9.0, 5.6), (5.6, 8.0)):
         with rc_context(style.RC):
             figure = drawing.draw(pendulum.chart(size), size=size, dpi=100.0)
@@ -179,7 +179,7 @@ def test_half_cycles_are_numbered_by_their_peaks() -> None:
         found = report(name)
         course = half_cycles.course_of(found.run, found.peaks)
         assert abs(float(np.mean(course.theta))) < 0.1
-        # Between an odd peak, which is low here, and the next one the angle grows.
+        # Between an odd peak, which is negative here, and the next one the angle increases.
         inner = course.half == 7
         assert np.sum(inner) > 40
         assert course.theta[inner][-1] > course.theta[inner][0]
@@ -203,12 +203,12 @@ def test_only_methods_that_apply_are_drawn() -> None:
     assert methods.drawn(["combined_odd_ends", "de_paula"])[0] == "combined_odd_ends"
 
 
-def test_colours_differ() -> None:
+def test_colours_of_methods_differ() -> None:
     looks = [methods.look(name) for name in report("whole").methods]
     assert len({one.colour for one in looks}) == len({one.label for one in looks}) == len(looks)
 
 
-def test_the_table_says_what_was_found() -> None:
+def test_the_table_has_the_estimates() -> None:
     found = report("whole")
     rows = identification.rows(found)
     assert [len(row) for row in rows] == [len(identification.columns(found))] * len(rows)

@@ -1,4 +1,4 @@
-"""Figures at the sizes and windows that a user may ask for: ticks, titles, least sizes."""
+"""Figures at all allowed sizes and windows: ticks, titles, least sizes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def least_size(dataset: Any) -> tuple[float, float]:  # noqa: ANN401
 
 @pytest.mark.parametrize("least", [False, True], ids=["own size", "least size"])
 @pytest.mark.parametrize("name", MAPS)
-def test_every_word_has_its_place(name: str, *, least: bool) -> None:
+def test_no_text_is_cut_or_covered(name: str, *, least: bool) -> None:
     figure = figure_of(MAPS[name], least_size(MAPS[name]) if least else None)
     whole = figure.bbox
     panels = [axes.get_window_extent() for axes in figure.axes]
@@ -96,14 +96,14 @@ def test_there_is_a_handful_of_ticks_whatever_the_window(low: float, high: float
     assert all(low - slack <= shift + at <= high + slack for at, _ in ticks)
 
 
-def test_copies_are_left_out_where_nobody_could_tell_them_apart() -> None:
+def test_indistinguishable_copies_are_left_out() -> None:
     circle = xr.Dataset()
     points = synthetic.USUAL[1].points
     assert len(plane.copies(circle, points, -10 * math.pi, 10 * math.pi)) == 10
     assert len(plane.copies(circle, points, 1e300, 2e300)) == 0
 
 
-def test_what_nothing_settles_on_is_not_titled_so() -> None:
+def test_the_title_names_no_settling_without_attractors() -> None:
     result = pendmap.basins(pendmap.Pendulum(), pendmap.Grid.square(8), max_periods=1)
     assert layers.what(result, "turns") == "net turns after 1 period"
     assert result.net_turns.attrs["long_name"] == "net turns after 1 period"

@@ -1,4 +1,4 @@
-"""Results as a notebook shows them: a line, a table, no arrays."""
+"""Representations of results in a notebook: a line and a table, no arrays."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ THERE = Experiment(Path("lab"), RUNS[:1])
 
 
 def rows(page: str) -> list[list[str]]:
-    """The cells of all tables of a page, which must be well formed."""
+    """Return the cells of all tables of a page, which must be well formed."""
     whole = ET.fromstring(f"<page>{page.replace('<br>', '')}</page>")  # noqa: S314 (our own page)
     return [[cell.text or "" for cell in row] for row in whole.iter("tr")]
 

@@ -1,4 +1,4 @@
-"""Figures of all kinds of maps: no text is cut or covers anything."""
+"""Figures of all kinds of maps: no text is cut or overlaps anything."""
 
 from __future__ import annotations
 

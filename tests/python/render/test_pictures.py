@@ -1,4 +1,4 @@
-"""The pieces of pictures: thinning, wrapped curves, ticks, percents, layers, legend."""
+"""Components of figures: thinning, wrapped curves, ticks, percents, layers, legend."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import synthetic
 from pendmap.charts import basins, legend, plane
 
 
-def test_a_pixel_has_the_cell_that_its_centre_lies_in() -> None:
+def test_a_pixel_shows_the_cell_at_its_centre() -> None:
     axes = {"velocity": np.arange(1000.0), "theta": np.arange(70.0)}
     cells = np.arange(1000 * 70).reshape(1000, 70)
     dataset = xr.Dataset({"label": (("velocity", "theta"), cells)}, coords=axes)
@@ -41,7 +41,7 @@ def test_a_curve_is_cut_exactly_at_the_wrap() -> None:
     assert len(plane.broken_at_wrap([], [])) == 0
 
 
-def test_angles_are_wrapped_as_far_as_numbers_go() -> None:
+def test_angles_of_any_size_are_wrapped() -> None:
     far = np.array([math.pi, -math.pi, 1e16, -1e300, 1.7e308])
     within = plane.wrapped(far)
     assert (np.abs(within) <= math.pi).all()
@@ -60,7 +60,9 @@ def test_angles_are_wrapped_as_far_as_numbers_go() -> None:
         ((0.1, 0.2), "0.1 0.12 0.14 0.16 0.18 0.2"),
     ],
 )
-def test_angle_ticks(window: tuple[float, float], labels: str) -> None:
+def test_angle_ticks_depend_on_the_width_of_the_window(
+    window: tuple[float, float], labels: str
+) -> None:
     ticks = plane.angle_ticks(*window)
     assert " ".join(label for _, label in ticks) == labels.replace("-", "\N{MINUS SIGN}")
     assert all(window[0] - 1e-9 <= at <= window[1] + 1e-9 for at, _ in ticks)
@@ -80,7 +82,7 @@ def test_percent_has_the_digits_its_error_supports(share: float, stderr: float, 
     assert legend.percent(share, stderr) == text
 
 
-def test_layers_lead_as_the_map_demands() -> None:
+def test_the_first_layers_depend_on_the_map() -> None:
     assert basins.layers(synthetic.painted()) == ("labels", "settle", "turns")
     assert basins.layers(synthetic.painted(**synthetic.UNRELIABLE)) == ("settle", "turns", "labels")
     assert basins.layers(motions.chaotic(cells=16, periods=3)) == ("turns", "exponent")

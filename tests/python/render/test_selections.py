@@ -1,4 +1,4 @@
-"""Whatever is selected from a result is drawn where its coordinates say, with its own shares."""
+"""Selections of a result are drawn at their coordinates, with their own shares."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 FEW = (Phase.explicit, Phase.generate)
-"""A figure takes half a second: what fails is not made smaller."""
+"""Settings for few examples without shrinking: a figure takes half a second."""
 
 SIDE = 9
 MAP = pendmap.basins(Pendulum(p=0.6), pendmap.Grid.square(SIDE))
@@ -42,7 +42,7 @@ parts = st.one_of(
     ),
     st.lists(st.integers(0, 6), min_size=1, max_size=5, unique=True),
 )
-"""Places along an axis: a slice, every k-th, reversed, or any."""
+"""Selections along an axis: a slice, every k-th, reversed, or any."""
 
 
 def selected(result: xr.Dataset, *, turned: bool, **places: list[int]) -> xr.Dataset:
@@ -52,13 +52,13 @@ def selected(result: xr.Dataset, *, turned: bool, **places: list[int]) -> xr.Dat
 
 
 def ends(low: float, high: float, count: int, kept: list[int]) -> tuple[float, float]:
-    """Return the outer edges of the cells that are kept, of ``count`` between low and high."""
+    """Return the outer edges of the selected cells, of ``count`` between low and high."""
     edge = np.linspace(low, high, count + 1)
     return edge[min(kept)], edge[max(kept) + 1]
 
 
 def at(image: npt.NDArray[Any], extent: list[float], x: float, y: float) -> Any:  # noqa: ANN401
-    """Return an image's value, row 0 lowest, at a place."""
+    """Return an image's value at a position, row 0 lowest."""
     rows, columns = image.shape[:2]
     left, right, bottom, top = extent
     return image[
@@ -75,7 +75,9 @@ def colour(part: xr.Dataset, theta: float, velocity: float) -> tuple[int, int, i
 
 @settings(max_examples=5, phases=FEW)
 @given(theta=parts, velocity=parts, turned=st.booleans())
-def test_a_basin_map(*, theta: list[int], velocity: list[int], turned: bool) -> None:
+def test_a_selection_of_a_basin_map_is_drawn(
+    *, theta: list[int], velocity: list[int], turned: bool
+) -> None:
     part = selected(MAP, turned=turned, theta=theta, velocity=velocity)
     figure = made(part)
     wide, high = ends(-math.pi, math.pi, SIDE, theta), ends(-3, 3, SIDE, velocity)
@@ -132,7 +134,9 @@ def _extent(back: Any, entity: str, shape: tuple[int, ...]) -> list[float]:  # n
     turned=st.booleans(),
 )
 @pytest.mark.usefixtures("strict_recordings")
-def test_a_parameter_map(*, p: list[int], omega: list[int], turned: bool, tmp_path: Path) -> None:
+def test_a_selection_of_a_parameter_map_is_drawn(
+    *, p: list[int], omega: list[int], turned: bool, tmp_path: Path
+) -> None:
     part = selected(PLANE, turned=turned, p=p, omega=omega)
     half = 1.5 / (SIDE - 1) / 2, 1.0 / (SIDE - 3) / 2
     wide = ends(0.5 - half[0], 2 + half[0], SIDE, p)
@@ -168,7 +172,9 @@ def test_a_parameter_map(*, p: list[int], omega: list[int], turned: bool, tmp_pa
 @settings(max_examples=4, phases=FEW)
 @given(p=st.lists(st.integers(0, 23), min_size=1, max_size=24, unique=True), turned=st.booleans())
 @pytest.mark.usefixtures("strict_recordings")
-def test_a_bifurcation_diagram(*, p: list[int], turned: bool, tmp_path: Path) -> None:
+def test_a_selection_of_a_bifurcation_diagram_is_drawn(
+    *, p: list[int], turned: bool, tmp_path: Path
+) -> None:
     part = selected(DIAGRAM, turned=turned, p=p)
     values = part["p"].values
     half = 1.2 / 23 / 2
@@ -176,7 +182,7 @@ def test_a_bifurcation_diagram(*, p: list[int], turned: bool, tmp_path: Path) ->
     wide = ends(0.6 - half, 1.8 + half, 24, p)
     assert figure.axes[0].get_xlim() == pytest.approx(wide)
     lines = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
-    top = figure.axes[0].get_ylim()[1]  # what recordings show above it is cut off
+    top = figure.axes[0].get_ylim()[1]  # recordings clip above it
     drawn = {tuple(row) for line in lines for row in line if len(row) and row[1] <= top}
     whole = zip(DIAGRAM["point_value"].values, DIAGRAM["point_theta"].values, strict=True)
     loose = zip(DIAGRAM["loose_value"].values, DIAGRAM["loose_theta"].values, strict=True)
@@ -222,7 +228,7 @@ def test_curves_of_lifetimes_and_exponents(tmp_path: Path) -> None:
 
 
 def assert_on(part: Line2D, whole: Line2D) -> None:
-    """Every point of a curve is one of the other's."""
+    """Assert that every point of a curve lies on the other."""
     own = dict(np.asarray(whole.get_xydata()).tolist())
     shown = np.asarray(part.get_xydata())
     for x, y in shown:
@@ -241,7 +247,7 @@ def test_critical_curves_of_some_frequencies() -> None:
     made(part)
 
 
-def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
+def test_a_selection_that_cannot_be_drawn_is_refused_in_one_line(tmp_path: Path) -> None:
     for part, says in (
         (MAP.isel(theta=3), "theta must be a range here, got a single value"),
         (MAP.sel(theta=slice(7, 8)), "theta must have one value at least in a selection, got none"),
@@ -264,7 +270,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_part_says_what_its_summary_is_of(tmp_path: Path) -> None:
+def test_a_selection_states_that_its_summary_is_of_the_whole(tmp_path: Path) -> None:
     part = MAP.isel(theta=slice(0, 4))
     assert part.attrs["summary"].startswith(
         "theta = -3.14159 to 3.14159 rad, velocity = -3 to 3 (the default window): 81 starts."
@@ -288,7 +294,7 @@ TIMES = RUN["time"].values
     count=st.integers(2, TIMES.size // 2),
     step=st.integers(-3, 3).filter(bool),
 )
-def test_a_part_of_a_trajectory(first: int, count: int, step: int) -> None:
+def test_a_part_of_a_trajectory_is_drawn(first: int, count: int, step: int) -> None:
     part = RUN.isel(time=slice(first, first + count)).isel(time=slice(None, None, step))
     low, high = float(part["time"].min()), float(part["time"].max())
     figure = made(part)
@@ -297,18 +303,18 @@ def test_a_part_of_a_trajectory(first: int, count: int, step: int) -> None:
     points = [line.get_xydata() for line in figure.axes[3].lines]
     inside = (low <= RUN["section_time"]) & (RUN["section_time"] <= high)
     assert sum(map(len, points)) == int(inside.sum())
-    # At rest is what has not moved at all: friction holds it from one event to the next.
+    # Rest means no motion at all: friction holds the pendulum from one event to the next.
     held = resting(shown(part))
     middle = 0.5 * (TIMES[:-1] + TIMES[1:])
     still = np.diff(RUN["theta"].values) == 0.0
     within = np.any([(begin < middle) & (middle < end) for begin, end in held], axis=0)
     seen = (low < middle) & (middle < high)
-    # In the samples in which a stick begins or ends it moves as well.
+    # In the samples in which a stick begins or ends the pendulum also moves.
     assert np.count_nonzero((within != still)[seen]) <= 2 * max(len(held), 1)
 
 
 @pytest.mark.usefixtures("strict_recordings")
-def test_inverted_rest_is_stable_at_the_frequencies_that_are_there(tmp_path: Path) -> None:
+def test_inverted_rest_is_stable_at_the_selected_frequencies(tmp_path: Path) -> None:
     found = pendmap.tongues(Pendulum(), np.linspace(4.0, 9.0, 11), 20.0)
     part = shown(found.isel(omega=slice(None, 3, -2)))
     own = part["omega"].values[part["inverted_index"].values]

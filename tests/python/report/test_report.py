@@ -1,4 +1,4 @@
-"""Reports of diagnoses: one for each verdict, with the numbers of the JSON, well formed."""
+"""Reports of diagnoses, one for each verdict: numbers equal to the JSON, well-formed pages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ VOID = {"meta", "img", "br"}
 
 
 class Page(HTMLParser):
-    """The text of a page, its images, and whether every tag that opens is closed."""
+    """Text and images of a page, with a check that every opened tag is closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class Page(HTMLParser):
         assert self.open == []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note a tag that opens, and images."""
+        """Record an opened tag, and images."""
         self.tags.add(tag)
         if tag == "img":
             self.images.append(str(dict(attrs)["src"]))
@@ -55,11 +55,11 @@ class Page(HTMLParser):
             self.open.append(tag)
 
     def handle_endtag(self, tag: str) -> None:
-        """Expect the tag that opened last."""
+        """Assert that the closed tag is the last one opened."""
         assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        """Collect what is read."""
+        """Collect the text."""
         if self.open and self.open[-1] not in {"style", "title", "figcaption"}:
             self.words += data.split()
 
@@ -74,14 +74,14 @@ def of_verdict(verdict: str) -> Discrepancy:
     named = once("quadratic_drag")
     if verdict == "named":
         return named
-    # Only the words of the report depend on these.
+    # Only the text of the report depends on them.
     assessment = dataclasses.replace(named.assessment, verdict="partial", left=12.0)
     nearly = tuple(dataclasses.replace(effect, approximate=True) for effect in named.effects)
     return dataclasses.replace(named, assessment=assessment, effects=nearly)
 
 
 @pytest.mark.parametrize("verdict", ["none", "named", "partial", "ambiguous", "unknown"])
-def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
+def test_each_verdict_has_a_report(verdict: str, tmp_path: Path) -> None:
     found = of_verdict(verdict)
     assert found.verdict == verdict
     folder = render.write_report(found, tmp_path / "report")
@@ -94,7 +94,7 @@ def test_every_verdict_has_its_report(verdict: str, tmp_path: Path) -> None:
         kind, content = image.split(",")
         assert kind == "data:image/png;base64"
         assert (folder / name).read_bytes() == base64.b64decode(content)
-    # One file that needs no other, and runs nothing.
+    # One file without external references or scripts.
     assert not page.tags & {"script", "link", "iframe"}
     claims = verdict in {"named", "partial", "ambiguous"}
     assert ("after" in page.words) == claims
@@ -144,7 +144,7 @@ def test_the_numbers_of_a_report_are_those_of_the_json() -> None:
         assert any(r[0] == f"`{run.name}`" and r[2] == number(each["stderr"], 2) for r in rows)
 
 
-def test_numbers_are_written_alike_and_errors_with_two_digits() -> None:
+def test_numbers_have_one_format_and_errors_two_digits() -> None:
     assert [number(v, 2) for v in (0.00085, 6.3e-7, -190.4, 0.0, 1e-9, 3200.0)] == [
         "0.00085",
         "6.3 \N{MULTIPLICATION SIGN} 10⁻⁷",
@@ -185,7 +185,7 @@ def test_the_band_of_all_runs_is_the_interval_that_is_stated(size: float) -> Non
     (effect,) = found.effects
     low, high = effect.ci95["q"]
     if size < 0:
-        # A size below 0 is stated as one above 0.
+        # A negative size is stated as a positive one.
         parameters = {"q": -effect.parameters["q"]}
         turned = dataclasses.replace(effect, parameters=parameters, ci95={"q": (-high, -low)})
         found = dataclasses.replace(found, effects=(turned,))
@@ -205,7 +205,7 @@ NASTY = "a|b <script>alert(1)</script> *c* _d_ `e` [f](g) # & \\ $h$ ``i"
 
 
 def test_text_of_a_user_is_shown_unchanged() -> None:
-    """HTML of each block, and Markdown of the whole file, have the words that were given."""
+    """HTML of each block, and Markdown of the whole file, contain the given text."""
     formula = "th'' = -a |v| <b>"
     document = Document(
         f"Title {NASTY}",
@@ -229,7 +229,7 @@ def test_text_of_a_user_is_shown_unchanged() -> None:
     assert Page(read).words == page.words
 
 
-def test_a_file_of_each_kind(tmp_path: Path) -> None:
+def test_a_report_is_written_in_each_format(tmp_path: Path) -> None:
     found = once("quadratic_drag")
     assert render.write_report(found, tmp_path / "a.html") == tmp_path / "a.html"
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
@@ -243,11 +243,11 @@ def test_a_file_of_each_kind(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["new", "there", "a.md", "a.html"])
-def test_a_report_that_does_not_fit_leaves_nothing(name: str, tmp_path: Path) -> None:
+def test_a_report_that_exceeds_the_disk_leaves_no_file(name: str, tmp_path: Path) -> None:
     found = once("quadratic_drag")
     (tmp_path / "there").mkdir()
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))  # most figures fit
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))  # enough for most figures
     try:
         with pytest.raises(OSError, match="File too large"):
             render.write_report(found, tmp_path / name)
@@ -257,7 +257,9 @@ def test_a_report_that_does_not_fit_leaves_nothing(name: str, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("report", ["a.pdf", "absent/report", "file"])
-def test_bad_places_are_refused_at_once(report: str, tmp_path: Path, pendmap_command: Run) -> None:
+def test_invalid_paths_are_refused_at_once(
+    report: str, tmp_path: Path, pendmap_command: Run
+) -> None:
     (tmp_path / "file").touch()
     (tmp_path / "hidden").mkdir()
     run = pendmap_command("diagnose", "hidden", "--report", report)
@@ -269,7 +271,7 @@ def test_bad_places_are_refused_at_once(report: str, tmp_path: Path, pendmap_com
 
 @pytest.mark.thorough
 def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command: Run) -> None:
-    """Stretches are held back within the run, no drive has a phase, and nothing is compared."""
+    """Stretches are held out within the run; there is no phase of a drive and no comparison."""
     made = pendmap_command("rig", "free_decay", "--out", "decay")
     assert made.returncode == 0, made.stderr
     run = pendmap_command("diagnose", "decay", "--report", "report", "--quiet")
@@ -280,7 +282,7 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
     assert "| forced |" not in text
 
 
-def test_figures_of_a_report_are_within_their_pages() -> None:
+def test_figures_of_a_report_fit_their_pages() -> None:
     found = once("quadratic_drag")
     with rc_context(style.RC):
         drawn = [*figures(found).values(), drawing.draw(diagnosis.sheet(found), dpi=60.0)]

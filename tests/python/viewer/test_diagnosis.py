@@ -1,4 +1,4 @@
-"""Recordings of diagnoses, read back: the record beside both models, residuals, the report."""
+"""Recordings of diagnoses, read back: the record and both models, residuals, the report."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def scalars(back: ReadBack, entity: str) -> Floats:
 
 
 def hanging(back: ReadBack, bob: str, pivot: float) -> Floats:
-    """The angle of a pendulum whose arm is 1 long."""
+    """Return the angle of a pendulum whose arm has length 1."""
     at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
     assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
     return np.arctan2(at[:, 0], -at[:, 1])
 
 
-def test_the_file_is_whole(file: Path) -> None:
+def test_the_file_is_complete(file: Path) -> None:
     command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
 
 
-def test_two_recordings_of_one_diagnosis_are_the_same(found: Discrepancy, file: Path) -> None:
+def test_two_recordings_of_one_diagnosis_are_equal(found: Discrepancy, file: Path) -> None:
     other = viewer.record_discrepancy(found, file.with_name("b.rrd"))
     command = [window._program(), "rrd", "compare", "--unordered", str(file), str(other)]  # noqa: SLF001
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
@@ -65,7 +65,7 @@ def test_two_recordings_of_one_diagnosis_are_the_same(found: Discrepancy, file: 
 
 
 def test_residuals_are_those_of_the_gap(found: Discrepancy, back: ReadBack) -> None:
-    """All runs, those held out last; in mrad, beside two standard deviations of the noise."""
+    """All runs are shown, held-out ones last, in mrad with two standard deviations of the noise."""
     for number, row in enumerate(found.gap.by_run, 1):
         root = f"/run_{number}/residual"
         for name, rms in (("before", row.before), ("after", row.after)):
@@ -77,7 +77,7 @@ def test_residuals_are_those_of_the_gap(found: Discrepancy, back: ReadBack) -> N
 
 
 def test_three_pendulums_hang_side_by_side(found: Discrepancy, back: ReadBack) -> None:
-    """The models' deviations are drawn larger by the factor that the file names."""
+    """The deviations of the models are magnified by the factor stated in the file."""
     larger = float(back.one("/__properties/pendmap", "deviations_drawn_larger"))
     assert larger >= 1
     run = found.data.fitted[0]
@@ -97,11 +97,11 @@ def test_three_pendulums_hang_side_by_side(found: Discrepancy, back: ReadBack) -
 
 
 def turned(angle: Floats) -> Floats:
-    """An angle in the turn about 0."""
+    """Wrap an angle to the turn about 0."""
     return np.angle(np.exp(1j * angle))
 
 
-def test_torque_and_forecasts_are_drawn_where_they_are(found: Discrepancy, back: ReadBack) -> None:
+def test_torque_and_forecasts_have_their_coordinates(found: Discrepancy, back: ReadBack) -> None:
     for over in ("angle", "velocity", "amplitude", "drive_phase", "lab_time"):
         for name, torque in (("before", found.torque_before), ("after", found.torque_after)):
             line = np.array(back.one(f"/torque/{over}/data/{name}", "LineStrips2D:strips"))
@@ -113,7 +113,7 @@ def test_torque_and_forecasts_are_drawn_where_they_are(found: Discrepancy, back:
         np.testing.assert_allclose(line.reshape(-1, 2)[:, 1], 1e3 * forecast.after, rtol=1e-6)
 
 
-def test_every_view_has_something_to_show(found: Discrepancy, back: ReadBack) -> None:
+def test_no_view_is_empty(found: Discrepancy, back: ReadBack) -> None:
     runs = len(found.gap.by_run)
     for number in range(1, runs + 1):
         for view in ("pendulum", "angle", "residual"):
@@ -123,7 +123,7 @@ def test_every_view_has_something_to_show(found: Discrepancy, back: ReadBack) ->
         assert any(entity.startswith(origin) for entity in back.columns), origin
 
 
-def test_the_report_lies_beside(found: Discrepancy, back: ReadBack) -> None:
+def test_the_report_is_in_the_recording(found: Discrepancy, back: ReadBack) -> None:
     text = back.one("/summary", "TextDocument:text")
     assert text == report.as_markdown(report.diagnosis(found), {})
     assert back.one("/__properties/pendmap", "verdict") == "named"

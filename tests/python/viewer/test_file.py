@@ -1,4 +1,4 @@
-"""Files of recordings: whole or absent, the same for the same map, bad input refused."""
+"""Files of recordings: complete or absent, reproducible; bad input is refused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 
-def test_a_recording_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "a.rrd"
     file.write_bytes(b"old")
 
@@ -33,7 +33,7 @@ def test_a_recording_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.Monk
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_the_same_map_is_the_same_recording(tmp_path: Path) -> None:
+def test_recordings_of_one_map_are_equal(tmp_path: Path) -> None:
     other = synthetic.painted()
     other["label"][4, 5] = 0
     ids = [

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 OFFSET = 0.05
-"""Of the sensor's zero, rad: large enough to be seen if a model's reading lacked it."""
+"""Zero of the sensor, rad: large enough to show if a model's reading lacked it."""
 
 
 def write(file: Path, time: Floats, theta: Floats, name: str = "theta_rad") -> Path:
@@ -63,13 +63,13 @@ def scalars(back: ReadBack, entity: str) -> Floats:
 
 
 def hanging(back: ReadBack, bob: str) -> Floats:
-    """The angle of a pendulum whose arm is 1 long."""
+    """Return the angle of a pendulum whose arm has length 1."""
     at = back.rows(bob, "Points2D:positions")
     assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
     return np.arctan2(at[:, 0], -at[:, 1])
 
 
-def test_the_file_is_whole(report: IdentificationReport, tmp_path: Path) -> None:
+def test_the_file_is_complete(report: IdentificationReport, tmp_path: Path) -> None:
     file = viewer.record_identification(report, tmp_path / "a.rrd")
     assert file == tmp_path / "a.rrd"
     assert list(tmp_path.iterdir()) == [file]
@@ -122,7 +122,7 @@ def test_the_phase_plane(back: ReadBack, report: IdentificationReport) -> None:
     assert noise < 0.08, "differences of readings 0.04 s apart, each with 0.00175 rad of noise"
 
 
-def test_what_was_found_is_said(back: ReadBack, report: IdentificationReport) -> None:
+def test_the_estimates_are_in_the_text(back: ReadBack, report: IdentificationReport) -> None:
     page = back.one("/summary", "TextDocument:text")
     best = report.methods["trajectory"]
     for name in ("w0", "c_over_m", "Tr", "offset"):
@@ -145,7 +145,7 @@ def test_the_views(back: ReadBack) -> None:
     assert back.views["/run_1/residual"] == "Record less model (mrad)"
 
 
-def test_runs_stand_apart(tmp_path: Path) -> None:
+def test_runs_have_separate_views(tmp_path: Path) -> None:
     lines = []
     for number in (1, 2):
         write(tmp_path / f"run_{number}.csv", *swings(number, seconds=8.0 + number))
@@ -185,7 +185,7 @@ def test_nothing_is_drawn_across_a_gap(tmp_path: Path) -> None:
     assert np.isfinite(hanging(back, "/run_1/pendulum/data/record/bob")).all()
 
 
-def test_samples_that_do_not_count_are_marked(report: IdentificationReport, tmp_path: Path) -> None:
+def test_unused_samples_are_marked(report: IdentificationReport, tmp_path: Path) -> None:
     out = np.zeros(report.run.time.size, bool)
     out[100:110] = True
     run = dataclasses.replace(report.run, trusted=~out)
@@ -247,7 +247,7 @@ def test_where_no_method_can_be_applied_the_record_is_shown(tmp_path: Path) -> N
     assert "No method could be applied" in back.one("/summary", "TextDocument:text")
 
 
-def test_the_same_report_is_the_same_recording(
+def test_recordings_of_one_report_are_equal(
     report: IdentificationReport, back: ReadBack, tmp_path: Path
 ) -> None:
     again = ReadBack(viewer.record_identification(report, tmp_path / "b.rrd"))
@@ -257,7 +257,7 @@ def test_the_same_report_is_the_same_recording(
     assert ids[0] == ids[1] != ids[2]
 
 
-def test_a_recording_is_whole_or_absent(
+def test_a_recording_is_complete_or_absent(
     report: IdentificationReport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "a.rrd"

@@ -1,4 +1,4 @@
-"""Trajectories sent to a viewer while they are computed: a receiver without a window keeps them."""
+"""Trajectories streamed to a viewer during the computation; a receiver saves them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ MODEL = ("--p", "1.7", "--omega", "0.87", "--theta", "1")
 
 @contextlib.contextmanager
 def receiver(folder: Path) -> Iterator[tuple[str, Path, subprocess.Popen[bytes]]]:
-    """The viewer's own program without a window: it writes what it is sent when it ends."""
+    """Start the viewer's program without a window; it writes the received data when it ends."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -60,12 +60,12 @@ def receiver(folder: Path) -> Iterator[tuple[str, Path, subprocess.Popen[bytes]]
 
 
 def ended(process: subprocess.Popen[bytes]) -> None:
-    time.sleep(1.0)  # what is under way arrives
+    time.sleep(1.0)  # time for data in transit to arrive
     process.send_signal(signal.SIGINT)
     process.wait(timeout=30)
 
 
-def test_what_is_sent_is_the_trajectory(tmp_path: Path) -> None:
+def test_the_sent_data_are_the_trajectory(tmp_path: Path) -> None:
     pendulum, start = Pendulum(p=1.7, omega=0.87), (1.0, 0.0)
     with receiver(tmp_path) as (address, file, process):
         live = viewer.Live(pendulum, start, address)
@@ -91,7 +91,7 @@ def test_what_is_sent_is_the_trajectory(tmp_path: Path) -> None:
     bob = back.rows("/pendulum/data/bob", "Points2D:positions")
     trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
     assert np.allclose(trail[:, -1], bob)
-    # Blocks join: the trail behind the first samples of a block lies in the one before.
+    # Blocks join: the trail behind the first samples of a block is in the preceding one.
     ago = behind(run.attrs, run["time"].values)
     later = np.arange(ago[0], len(bob))
     assert np.allclose(trail[later], bob[later[:, None] - ago])
@@ -131,7 +131,7 @@ def test_ctrl_c_ends_it_with_what_was_computed(tmp_path: Path) -> None:
     assert ReadBack(file).seconds("/state/theta")[-1] == pytest.approx(float(kept["time"][-1]))
 
 
-def test_without_a_viewer_it_says_what_to_start_before_it_computes(
+def test_a_missing_viewer_is_reported_before_the_computation(
     tmp_path: Path, pendmap_command: Run
 ) -> None:
     with socket.socket() as probe:
@@ -147,12 +147,12 @@ def test_without_a_viewer_it_says_what_to_start_before_it_computes(
 
 
 @pytest.mark.parametrize("address", ["nowhere", "host:0", "host:99999", ":9876", "host:many"])
-def test_what_is_no_address_is_refused(address: str) -> None:
+def test_an_invalid_address_is_refused(address: str) -> None:
     with pytest.raises(pendmap.InputError, match="HOST:PORT"):
         viewer.check_address(address)
 
 
-def test_a_viewer_that_goes_away_costs_nothing_but_the_picture(tmp_path: Path) -> None:
+def test_a_viewer_that_quits_does_not_end_the_computation(tmp_path: Path) -> None:
     pendulum = Pendulum(p=1.7, omega=0.87)
     with receiver(tmp_path) as (address, _, process):
         live = viewer.Live(pendulum, (1.0, 0.0), address)

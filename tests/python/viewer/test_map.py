@@ -1,4 +1,4 @@
-"""Recordings of maps, read back: images, names, places, legend, layout."""
+"""Recordings of maps, read back: images, names, positions, legend, layout."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 
-def test_a_map_read_back(tmp_path: Path) -> None:
+def test_a_map_is_read_back(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4], (13, 9), undecided=3, failed=2)
     back = recorded(dataset, tmp_path)
     wanted = {
@@ -75,7 +75,7 @@ def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:
         assert int(label) in turns
 
 
-def test_attractors_lie_at_their_points_and_are_named(tmp_path: Path) -> None:
+def test_attractors_are_drawn_at_their_points_and_named(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4])
     back = recorded(dataset, tmp_path)
     at = np.array(back.one("/basin/data/attractors", "Points2D:positions"))
@@ -137,12 +137,12 @@ def test_every_view_has_an_origin_and_a_name(tmp_path: Path) -> None:
 
 
 def tabs_of(dataset: xr.Dataset) -> list[Any]:
-    """Return the tabs of the layout, the one in front first."""
+    """Return the tabs of the layout, the active one first."""
     screen: Any = basins.blueprint(dataset)
     return list(screen.root_container.contents[0].contents)
 
 
-def test_chaos_that_takes_all(tmp_path: Path) -> None:
+def test_a_single_chaotic_attractor_is_recorded(tmp_path: Path) -> None:
     dataset = motions.chaotic(cells=20, periods=4)
     back = recorded(dataset, tmp_path)
     assert "/basin/data/labels" not in back.columns
@@ -156,7 +156,7 @@ def test_chaos_that_takes_all(tmp_path: Path) -> None:
     assert [str(part.origin) for part in tabs_of(dataset)] == ["/turns", "/exponent", "/basin"]
 
 
-def test_without_damping(tmp_path: Path) -> None:
+def test_a_map_without_damping_is_recorded(tmp_path: Path) -> None:
     dataset = motions.chaotic(gamma=0.0, p=0.6, omega=2.0, cells=20, periods=4)
     back = recorded(dataset, tmp_path)
     assert "No attractors." in back.one("/legend", "TextDocument:text")
@@ -174,7 +174,7 @@ def test_without_damping(tmp_path: Path) -> None:
     ],
     ids=["none", "one cell", "twelve in six cells", "two chaotic", "attractors outside"],
 )
-def test_odd_maps(tmp_path: Path, dataset: xr.Dataset) -> None:
+def test_unusual_maps_are_recorded(tmp_path: Path, dataset: xr.Dataset) -> None:
     back = recorded(dataset, tmp_path)
     labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
     assert (labels == dataset["label"].values + 1).all()

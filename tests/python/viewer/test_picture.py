@@ -1,4 +1,4 @@
-"""The viewer's own picture of recordings: needs a Vulkan driver, if only a software one."""
+"""The viewer's own screenshots of recordings, with a Vulkan driver, which may be a software one."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PICTURES: dict[str, tuple[Callable[[], xr.Dataset], float | None]] = {
 
 @contextlib.contextmanager
 def headless(folder: Path) -> Iterator[Any]:
-    from rerun.experimental import ViewerClient  # noqa: PLC0415 (only where it is wanted)
+    from rerun.experimental import ViewerClient  # noqa: PLC0415 (used only here)
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -72,12 +72,12 @@ def headless(folder: Path) -> Iterator[Any]:
 
 
 def shares_of_colours(file: Path, folder: Path, cursor: float | None) -> dict[Colour, float]:
-    """Let the viewer draw a recording, all of its views without complaint."""
+    """Return shares of colours in the viewer's screenshot; it must report no problem."""
     with headless(folder) as client:
         client.open(str(file))
         if cursor is not None:
             client.set_time("sim_time", duration=cursor, play_state="paused")
-        time.sleep(8)  # the viewer's own notices fade
+        time.sleep(8)  # the viewer's notifications fade
         state = client.get_state()
         picture = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
     assert {view.origin for view in state.views} == set(ReadBack(file).views)

@@ -32,7 +32,7 @@ def swing() -> xr.Dataset:
     return motions.swing(periods=12, steps=200, p=1.7, omega=0.87)
 
 
-def test_a_trajectory_read_back(tmp_path: Path, swing: xr.Dataset) -> None:
+def test_a_trajectory_is_read_back(tmp_path: Path, swing: xr.Dataset) -> None:
     back = recorded(swing, tmp_path)
     theta, velocity = swing["theta"].values, swing["velocity"].values
     assert np.allclose(back.rows("/state/theta", "Scalars:scalars"), theta)
@@ -60,7 +60,9 @@ def test_the_pendulum_hangs_on_its_pivot(tmp_path: Path, swing: xr.Dataset) -> N
     assert np.allclose(np.cos(hanging - swing["theta"].values), 1.0, atol=1e-6)
 
 
-def test_the_pivot_accelerates_as_the_equation_says(tmp_path: Path, swing: xr.Dataset) -> None:
+def test_the_pivot_s_acceleration_is_that_of_the_equation(
+    tmp_path: Path, swing: xr.Dataset
+) -> None:
     back = recorded(swing, tmp_path)
     height = back.rows("/pendulum/data/pivot", "Points2D:positions")[:, 1]
     h = float(swing["time"][1] - swing["time"][0])
@@ -89,19 +91,19 @@ def test_the_trail_ends_at_the_bob(tmp_path: Path, swing: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize("periods", [0, 1])
-def test_the_shortest_trajectories(tmp_path: Path, periods: int) -> None:
+def test_the_shortest_trajectories_are_recorded(tmp_path: Path, periods: int) -> None:
     back = recorded(motions.swing(periods=periods, steps=3, p=0.0), tmp_path)
     assert len(back.rows("/state/theta", "Scalars:scalars")) == 3 * periods + 1
 
 
 @pytest.mark.parametrize("theta", [1e16, -1e300, 1.7e308])
-def test_angles_as_large_as_numbers_get(tmp_path: Path, theta: float) -> None:
+def test_the_largest_angles_are_recorded(tmp_path: Path, theta: float) -> None:
     back = recorded(pendmap.simulate(pendmap.Pendulum(), theta, 0.0, 9.0), tmp_path)
     now = back.rows("/phase/data/now", "Points2D:positions")
     assert np.abs(now[:, 0]).max() <= math.pi + 1e-6
 
 
-def test_what_no_recording_holds_is_refused(tmp_path: Path) -> None:
+def test_a_trajectory_that_no_recording_can_hold_is_refused(tmp_path: Path) -> None:
     run = motions.swing(periods=1, steps=3)
     run["velocity"][1] = 1e40
     with pytest.raises(InputError, match=r"velocity reaches 1e\+40: a recording holds"):
@@ -145,7 +147,7 @@ def test_a_thinned_curve_keeps_its_lowest_and_highest(count: int, bins: int, see
     assert (at[0], at[-1]) == (0, count - 1)
     assert (np.diff(at) > 0).all()
     assert np.array_equal(values[at.astype(int)], kept)
-    # Between two neighbours that are kept nothing lies beyond the bins' ends.
+    # Between two adjacent kept samples no sample is beyond the extrema of their bins.
     if count > 2 * bins:
         edges = np.linspace(0, count, bins + 1).astype(int)
         for low, high in itertools.pairwise(edges):

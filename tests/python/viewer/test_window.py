@@ -40,7 +40,7 @@ def test_only_recordings_are_opened(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a display")
-def test_without_a_display_it_says_what_to_do(
+def test_without_a_display_the_error_names_the_remedy(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
@@ -70,7 +70,7 @@ def program(folder: Path, script: str) -> Path:
         ),
     ],
 )
-def test_a_viewer_that_ends_at_once(
+def test_a_viewer_that_ends_at_once_is_reported(
     recording: Path,
     monkeypatch: pytest.MonkeyPatch,
     script: str,

@@ -40,8 +40,8 @@ EFFECTS = {
 }
 
 
-def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> float:  # noqa: C901 (a case an effect)
-    """Textbook formula of the acceleration, w0 = 1."""
+def acceleration(name: str, tau: float, theta: float, v: float, sign: float) -> float:  # noqa: C901 (one case per effect)
+    """Return the acceleration by its textbook formula, w0 = 1."""
     values = EFFECTS[name]
     phase, tilt, carried, inertia, own = OMEGA * tau, 0.0, 0.0, 1.0, 0.0
     friction = THETA_R
@@ -88,7 +88,7 @@ def test_trajectories_agree_with_scipy(name: str) -> None:
     until = 12.0
     found = pendmap.simulate(model, 2.5, 0.0, until, tol=1e-12)
     state, begin, turns = np.array([2.5, 0.0]), 0.0, 0
-    # From turn to turn; at each the load is far greater than the friction, which never holds.
+    # Integrated from turn to turn; at each turn the load far exceeds the friction, so none sticks.
     while begin < until:
         sign = math.copysign(1.0, acceleration(name, begin, state[0], 0.0, 0.0))
 
@@ -120,7 +120,7 @@ def test_a_contact_that_yields_agrees_with_scipy(
     def load(tau: float, theta: float, z: float) -> float:
         return -(1 + p * math.cos(omega * tau)) * math.sin(theta) - f * z
 
-    # The friction's own equation beside the motion's, from turn to turn.
+    # The equation of the friction is integrated together with that of the motion, turn by turn.
     state, now, met = [1.2, 0.0, 0.0], 0.0, [0, 0]
     while now < until:
         pull = load(now, state[0], state[2])
@@ -162,7 +162,7 @@ def test_a_contact_that_barely_yields_is_a_spring() -> None:
     dahl = pendmap.Effect("dahl_friction", {"f": f, "zc": zc})
     model = pendmap.Pendulum(gamma=0.0, p=0.0, effects=(dahl,))
     run = pendmap.simulate(model, start, 0.0, 20.0, tol=1e-13)
-    # th'' = -th - (f/zc) (th - start), but for terms of the size start/zc.
+    # th'' = -th - (f/zc) (th - start), up to terms of the order start/zc.
     stiff = 1 + f / zc
     middle = start * (f / zc) / stiff
     expected = middle + (start - middle) * np.cos(math.sqrt(stiff) * run.time.values)
@@ -170,7 +170,7 @@ def test_a_contact_that_barely_yields_is_a_spring() -> None:
 
 
 def clean(folder: Path, effect: str) -> tuple[DataSplit, dict[str, float]]:
-    """Evidence without noise, as if read to a microradian, and the truth."""
+    """Return evidence without noise, with a resolution of a microradian, and the truth."""
     request = virtual_rig.Request(
         "hidden", seed=5, effects=(effect,), free=2, forced=2, noise=0.0, counts=0
     )
@@ -184,7 +184,7 @@ def clean(folder: Path, effect: str) -> tuple[DataSplit, dict[str, float]]:
 
 
 def whole(data: DataSplit) -> Windows:
-    """Each run a window, begun at rest."""
+    """Return one window per run, starting from rest."""
     runs = enumerate(data.fitted)
     return tuple((k, 0, len(run.time), float(run.angle[0]), 0.0) for k, run in runs)
 
@@ -212,7 +212,7 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     if unit.phase is not None:
         start[f"{name}.{unit.phase}"] = truth[unit.phase]
     model, free = add_candidates(base.fit.model, [unit]), [*base.free, *unit.free]
-    # What has units is found beside the size, from elsewhere.
+    # Parameters with units are fitted together with the size, from other starting values.
     elsewhere = {
         "eddy_brake": {"vc": 0.8},
         "pivot_compliance": {"wx": 0.95, "z": 0.5},
@@ -222,18 +222,18 @@ def test_records_of_the_virtual_rig_are_fitted_exactly(name: str, tmp_path: Path
     if elsewhere is not None:
         free += unit.adapted
         start |= {f"{name}.{n}": part * truth[n] for n, part in elsewhere.items()}
-    # The mode is at rest where a run begins, not where a window within it does.
+    # The mode is at rest at the start of a run, not at that of a window within it.
     windows = whole(data) if name == "pivot_compliance" else None
     found = fit_model(data, model, free, (unit,), start=start, windows=windows).fit
-    # Of a lag the second power of tau is left. Each window begins with a contact that has not
-    # yielded and a sensor in the middle of its play.
-    # A knock of the rig takes no time.
+    # The error of a lag is of order tau^2. Each window starts with a contact that has not yielded
+    # and a sensor in the middle of its backlash.
+    # An impulse of the rig is instantaneous.
     left = {"sensor_lag": 1e-5, "dahl_friction": 1e-6, "encoder_backlash": 1e-4, "impulses": 1e-4}
     assert found.rms < left.get(name, 1e-8)
     assert base.fit.rms > 10 * found.rms
     reached = found[f"{name}.{size}"]
     if unit.phase is not None:
-        # A negative size is a positive one half a turn on.
+        # A negative size is a positive one shifted by half a turn.
         reached *= math.cos(found[f"{name}.{unit.phase}"] - truth[unit.phase])
     close = {"sensor_lag": 0.02, "dahl_friction": 1e-3, "encoder_backlash": 0.005, "impulses": 0.01}
     assert reached == pytest.approx(truth[size], rel=close.get(name, 1e-4))

@@ -1,4 +1,4 @@
-"""A pivot that gives way sideways, against scipy and the virtual rig."""
+"""A horizontally compliant pivot, against scipy and the virtual rig."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ W0 = 6.2
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A pendulum on a pivot that gives way, SI, and a start."""
+    """A pendulum on a compliant pivot, SI, and a start."""
 
     theta: float
     velocity: float
@@ -30,7 +30,7 @@ class Case:
     drive: tuple[float, float] = (0.0, 1.0)
 
     def simulated(self, until: float) -> pendmap.Trajectory:
-        """The library's motion, in its own units."""
+        """Return the motion by the library, in its own units."""
         values = {"mu": self.mu, "wx": self.wx / W0, "z": self.z}
         model = pendmap.Pendulum(
             gamma=self.c / W0,
@@ -42,7 +42,7 @@ class Case:
         return pendmap.simulate(model, self.theta, self.velocity / W0, until * W0, tol=1e-12)
 
     def rig(self, until: float) -> Run:
-        """The virtual rig's run."""
+        """Return the run by the virtual rig."""
         plan = RunPlan("forced", self.theta, self.velocity, until, *self.drive)
         request = Request(
             "hidden",
@@ -93,7 +93,7 @@ def test_a_compliant_pivot_agrees_with_its_lagrangian(theta: float, velocity: fl
         a, b = np.linalg.solve(matrix, [-case.c * v - W0**2 * math.sin(th), pull])
         return [v, a, u, b]
 
-    # The rod has pulled the pivot aside.
+    # The rod has displaced the pivot.
     pull = math.sin(theta) * (W0**2 * math.cos(theta) + velocity**2)
     begin = [theta, velocity, case.mu * pull / case.wx**2, 0]
     other = solve_ivp(rate, (0, 4), begin, "DOP853", rtol=1e-12, atol=1e-13)
@@ -102,14 +102,14 @@ def test_a_compliant_pivot_agrees_with_its_lagrangian(theta: float, velocity: fl
     assert float(found.velocity[-1]) * W0 == pytest.approx(other.y[1, -1], abs=1e-7)
 
 
-def test_a_stiffer_pivot_gives_way_less() -> None:
+def test_a_stiffer_pivot_is_displaced_less() -> None:
     fixed = pendmap.simulate(pendmap.Pendulum(gamma=0.05 / W0, p=0.0), 2.8, 0.0, 5 * W0, tol=1e-12)
     softer, stiffer = (
         Case(2.8, 0.0, mu=0.01, wx=wx * W0, z=0.5).simulated(5.0).theta.values - fixed.theta.values
         for wx in (15.0, 30.0)
     )
     assert np.abs(stiffer).max() < 2e-3
-    # Displacements fall with the square of wx, what their damping takes with its cube.
+    # Displacements scale with wx^-2, the loss to their damping with wx^-3.
     assert np.abs(softer).max() > 4 * np.abs(stiffer).max()
 
 

@@ -42,7 +42,7 @@ def test_rotations_and_oscillations_are_both_among_forced_runs() -> None:
     assert max(turns) > 10
 
 
-def test_noise_and_counts_are_as_asked() -> None:
+def test_noise_and_counts_are_as_requested() -> None:
     clean = short(counts=0)
     for noise, counts in ((0.3, 0), (0.1, 4096), (0.0, 1024)):
         noisy = short(noise=noise, counts=counts)
@@ -54,7 +54,7 @@ def test_noise_and_counts_are_as_asked() -> None:
                 assert run.angle / steps == pytest.approx(np.round(run.angle / steps), abs=1e-8)
 
 
-def test_coloured_noise_dropouts_outliers_and_jitter() -> None:
+def test_coloured_noise_dropouts_outliers_and_jitter_are_as_requested() -> None:
     settings = {"counts": 0, "duration": 60.0, "free": 1, "forced": 0}
     clean = short(**settings).runs[0]
     red = short(**settings, noise=0.2, correlation=0.7).runs[0].angle - clean.angle
@@ -74,7 +74,7 @@ def test_coloured_noise_dropouts_outliers_and_jitter() -> None:
 
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_each_effect_changes_the_record_by_what_the_truth_states(name: str) -> None:
-    # Runs of a second are not set back on the true motion: the gap is the plain difference.
+    # Runs of a second are not fitted to the true motion: the gap is the plain difference.
     given = {"free": 4, "forced": 3, "duration": 1.0, "counts": 0, "seed": 11}
     seen_so_soon = {
         "added_mass:late": ",t0=20",
@@ -93,7 +93,7 @@ def test_each_effect_changes_the_record_by_what_the_truth_states(name: str) -> N
     assert clean.gap == 0
 
 
-def test_size_scales_and_parameters_are_taken() -> None:
+def test_size_scales_and_given_parameters_are_used() -> None:
     plain, twice = (short(effects=("quadratic_drag",), size=size) for size in (1.0, 2.0))
     (small,), (large,) = plain.effects, twice.effects
     assert large.q == pytest.approx(2 * small.q)  # type: ignore[attr-defined]
@@ -144,7 +144,7 @@ def test_requests_are_checked() -> None:
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_no_parameter_of_an_effect_is_without_bound(name: str) -> None:
+def test_every_parameter_of_an_effect_has_bounds(name: str) -> None:
     for field in dataclasses.fields(EFFECTS[name]):
         with pytest.raises(InputError, match=rf"{field.name} must be .*, got 1e\+300"):
             make(Request("forced", effects=(f"{name},{field.name}=1e300",)))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-def test_an_experiment_is_a_folder_with_its_truth_beside(
+def test_an_experiment_is_a_folder_and_a_separate_file_of_its_truth(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
     run = pendmap_command("rig", "hidden", "--seed", 1, "--out", "lab", "--json")
@@ -215,7 +215,7 @@ def test_an_interrupt_leaves_no_partial_file(tmp_path: Path, moment: str) -> Non
         assert len(list((tmp_path / "lab").iterdir())) == 10
 
 
-def test_of_each_kind_with_three_runs_one_is_held_out(rig: Run, tmp_path: Path) -> None:
+def test_one_run_is_held_out_of_each_kind_with_three(rig: Run, tmp_path: Path) -> None:
     counts = {(5, 4): (1, 1), (3, 2): (1, 0), (2, 2): (0, 0), (0, 3): (0, 1)}
     for (free, forced), held in counts.items():
         words = ("--free", free, "--forced", forced, "--duration", 1, "--replace")
@@ -240,7 +240,7 @@ def test_records_are_drawn(rig: Run, tmp_path: Path) -> None:
     assert not (tmp_path / "other").exists()
 
 
-def test_a_panel_a_run_and_gaps_where_samples_are_lost() -> None:
+def test_each_run_has_a_panel_with_gaps_at_lost_samples() -> None:
     time = np.delete(np.arange(100) / 100, [40, 41, 42])
     runs = [render.RunPanel(f"run {k}", time, np.sin(k * time)) for k in range(5)]
     runs.append(render.RunPanel("alone", np.zeros(1), np.ones(1)))

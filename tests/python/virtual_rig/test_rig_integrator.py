@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LOW = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 
 
-def run(  # noqa: PLR0913, PLR0917 (a run has that many numbers)
+def run(  # noqa: PLR0913, PLR0917 (the parameters of a run)
     parameters: Parameters,
     drive: tuple[float, float, float],
     theta: float,
@@ -49,9 +49,9 @@ def scipy_with_events(
     velocity: float,
     end: float,
 ) -> tuple[float, float, int]:
-    """Integrate with DOP853, turn by turn, sticks by events; end state and number of sticks.
+    """Integrate with DOP853, turn by turn, sticks by events; return the end and number of sticks.
 
-    An event that comes and goes between two of its steps is missed: they are kept short.
+    An event that appears and disappears within one step is missed, so steps are kept short.
     """
     p, frequency, phase = drive
     w0, c, limit = parameters.w0, parameters.c_over_m, parameters.friction
@@ -133,7 +133,7 @@ def test_trajectories_of_the_truths(truths: dict[str, Any]) -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_random_models_against_scipy_with_events(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    heavy = seed % 2 == 0  # friction like a brake: it sticks again and again
+    heavy = seed % 2 == 0  # strong friction: it sticks again and again
     parameters = Parameters(
         rng.uniform(3, 8), rng.uniform(0, 0.5), rng.uniform(8, 14) if heavy else rng.uniform(0, 0.3)
     )
@@ -165,8 +165,8 @@ def test_energy_without_friction_is_kept() -> None:
     assert np.ptp(energy) < 1e-10
 
 
-def test_a_pivot_that_gives_way_against_its_lagrangian() -> None:
-    # Cart and pendulum from the Lagrangian: M x'' + m l (th'' cos - th'^2 sin) = -k x - d x'.
+def test_a_compliant_pivot_against_its_lagrangian() -> None:
+    # Cart and pendulum, from the Lagrangian: M x'' + m l (th'' cos - th'^2 sin) = -k x - d x'.
     w0, mu, wx, z, c = 6.2, 0.05, 30.0, 0.02, 0.1
 
     def rate(_: float, y: np.ndarray) -> list[float]:
@@ -187,7 +187,7 @@ def test_a_pivot_that_gives_way_against_its_lagrangian() -> None:
 
 
 def test_an_inertia_that_varies_keeps_its_energy() -> None:
-    # (1 + e cos(n th + psi)) v^2 / 2 - w0^2 cos th is what a Lagrangian with that inertia keeps.
+    # The Lagrangian with this inertia conserves (1 + e cos(n th + psi)) v^2 / 2 - w0^2 cos th.
     effect = EFFECTS["inertia_ripple"](e=0.3, n=2, psi=0.7)
     path = run(Parameters(6.2, 0, 0), (0, 1, 0), 2.0, 0, 20, [effect])
     time = np.linspace(0, 20, 300)
@@ -197,7 +197,7 @@ def test_an_inertia_that_varies_keeps_its_energy() -> None:
 
 
 def test_corners_and_cusps_against_scipy_in_pieces() -> None:
-    # All signs written out: scipy crosses them with steps that it has to shorten.
+    # With all signs written out scipy has to shorten its steps across them.
     w0, friction = 6.2, 0.3
     load = EFFECTS["load_dependent_friction"](k=0.1)
     sharp = EFFECTS["stribeck_friction:sharp"](a=0.1, vs=0.5)
@@ -219,7 +219,7 @@ def test_corners_and_cusps_against_scipy_in_pieces() -> None:
 
 
 def test_dahl_friction_yields_before_it_slips() -> None:
-    # Well inside the yield, the contact is a spring f/zc: the small swing is that much quicker.
+    # Well below the yield the contact is a spring f/zc, and the small swing is faster by it.
     effect = EFFECTS["dahl_friction"](f=0.5, zc=0.05)
     path = run(Parameters(6.2, 0, 0), (0, 1, 0), 1e-5, 0, 3, [effect])
     turns = [event.time for event in path.events if event.what == "turn"]

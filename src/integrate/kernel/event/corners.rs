@@ -1,18 +1,18 @@
-//! Corners of the formula on a piece of the motion: the first zero of a switching function, where the
-//! equation goes on as another one.
+//! Corners of the formula on a piece of the motion: the first zero of a switching function, from
+//! which another analytic equation holds.
 
 use super::cubic::Cubic;
 use super::{EventSearch, LEAST_GUESS, MOST_NEWTON, Progress, Reached, Stage, closeness};
 use crate::integrate::kernel::block::Scratch;
 use crate::integrate::kernel::corner::REACH;
 
-/// Integrations after which corners are no longer looked for: where many crowd they are as good as
-/// none, since the equation is continuous.
+/// Number of integrations after which corners are no longer located: many close ones are
+/// negligible, since the equation is continuous.
 const MOST_CORNERED: u32 = 100;
-/// Integrations that a hollow of the switching function may take.
+/// Number of integrations that a minimum of the switching function may take.
 const MOST_HOLLOWS: u32 = 6;
 
-/// The switching function of a corner over an integration; all 0 where there is none.
+/// The switching function of a corner over an integration; all 0 if there is none.
 #[derive(Clone, Copy, Debug)]
 pub struct Switching {
     /// The side held.
@@ -40,7 +40,8 @@ impl EventSearch {
         if self.crossed { [0.0, s1, r0.max(0.0), r1] } else { [s0, s1, r0, r1] }
     }
 
-    /// Asks on if the switching function passes zero in the first `h` of the piece, or may do so.
+    /// Requests an integration if the switching function passes zero in the first `h` of the piece,
+    /// or may do so.
     pub(super) fn look_for_corner(
         &mut self,
         reached: &Reached,
@@ -89,7 +90,7 @@ impl EventSearch {
         Some(Progress::Asks)
     }
 
-    /// Asks for the state at the first zero of the switching function over a piece of length `h`.
+    /// Requests the state at the first zero of the switching function over a piece of length `h`.
     fn seek_corner(&mut self, h: f64) {
         self.piece = h;
         self.close = closeness(h);
@@ -111,7 +112,7 @@ impl EventSearch {
         } else {
             high = t;
         }
-        // After a corner the begin is a zero itself, and is divided out.
+        // After a corner the beginning is itself a zero, which is divided out.
         let slope = if self.crossed { r - s / t } else { r };
         let step = if s == 0.0 { 0.0 } else { -s / slope };
         if step.abs() <= self.close || high <= self.close {

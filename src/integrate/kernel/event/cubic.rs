@@ -1,4 +1,4 @@
-//! A function over a piece of a trajectory, from its ends.
+//! Cubic interpolation of a function over a piece of a trajectory.
 
 /// Steps of Newton's method on the cubic.
 const POLISHINGS: usize = 3;
@@ -20,7 +20,7 @@ impl Cubic {
         a + x * (b + x * (c + x * d))
     }
 
-    /// Where it is least, inside.
+    /// The position of its interior minimum.
     pub(super) fn lowest(&self) -> f64 {
         let [_, b, c, d] = self.0;
         // b + 2 c x + 3 d x^2 = 0 with rising slope, without cancellation.
@@ -29,10 +29,10 @@ impl Cubic {
         if (0.0..=1.0).contains(&x) { x } else { 0.5 }
     }
 
-    /// Its passage from above to below zero, which its ends promise: near enough to begin Newton's
-    /// method on the motion itself.
+    /// The zero at which it falls, which exists by its values at the ends: accurate enough to start
+    /// Newton's method on the motion itself.
     pub(super) fn zero(&self) -> f64 {
-        // After a reversal the begin is a zero itself, and is divided out.
+        // After a reversal the beginning is itself a zero, which is divided out.
         let [a, b, c, d] = match self.0 {
             [0.0, b, c, d] => [b, c, d, 0.0],
             whole => whole,

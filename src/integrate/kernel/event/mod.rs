@@ -1,10 +1,10 @@
 //! Turns, sticks and releases of one trajectory within one step of the block that it belongs to.
 //!
-//! An [`EventSearch`] asks for integrations from where its trajectory last was on an analytic piece of the
-//! motion, each over its own length; [`super::block`] runs those of many searches in lanes. From their
-//! ends it finds the first zero of the velocity, to rounding, and what comes after it; and the first
-//! zero of the switching function of a corner, where only the formula changes. The velocity's zero is
-//! found first, and then whether a corner comes before it.
+//! An [`EventSearch`] requests integrations from the last state of its trajectory on an analytic
+//! piece of the motion, each over its own length; [`super::block`] runs those of many searches in
+//! lanes. From their ends it finds the first zero of the velocity, to rounding, and its
+//! continuation; and the first zero of the switching function of a corner, at which only the
+//! formula changes. The velocity's zero is found first, then any corner before it.
 
 use crate::model::Equation;
 use crate::model::rest::{Release, release};
@@ -15,26 +15,27 @@ mod cubic;
 pub use corners::Switching;
 use cubic::Cubic;
 
-/// Integrations after which a search gives up; its trajectory counts as failed.
+/// Number of integrations after which a search fails, and its trajectory with it.
 const MOST_ROUNDS: u32 = 400;
-/// A zero is found when Newton's step falls below this part of the piece, at a step of a quarter; it
-/// falls with the fourth power of the step, so that its square stays below the error of the step. The
-/// change of the acceleration is taken into account, so that little more than the third power is left.
+/// A zero is found when Newton's step falls below this part of the piece, at a step of a quarter;
+/// it falls with the fourth power of the step, so that its square stays below the error of the
+/// step. The change of the acceleration is taken into account, which leaves little more than the
+/// third power.
 const CLOSE: f64 = 1e-3;
-/// The bounds within which it stays.
+/// The bounds of that part.
 const CLOSEST: [f64; 2] = [1e-7, 1e-3];
 /// Steps of Newton's method that a root may take before the bracket is halved.
 const MOST_NEWTON: u32 = 8;
 /// Where the velocity's least value, as its cubic gives it, is below this part of its change over the
 /// piece, the integration decides.
 const GRAZING: f64 = 0.1;
-/// A first guess is at least this part of the piece.
+/// Least first guess, as a part of the piece.
 const LEAST_GUESS: f64 = 1e-6;
-/// After a release the next one is at least this part of the period away: at the stick's edge a slip
-/// may be shorter than rounding can tell.
+/// Least time from a release to the next one, as a part of the period: at the limit of the stick a
+/// slip may be shorter than rounding can resolve.
 const LEAST_SLIP: f64 = 1e-7;
 
-/// The state that a search waits for.
+/// The state that a search has requested.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     /// The end of the piece.
@@ -66,9 +67,9 @@ pub struct Reached {
 /// State of a search after an integration.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// The search asks for another integration.
+    /// The search requests another integration.
     Asks,
-    /// The step's end is reached.
+    /// The end of the step has been reached.
     Arrived {
         /// Angle, rad.
         theta: f64,
@@ -89,19 +90,19 @@ pub enum Progress {
 /// A trajectory whose velocity passes zero, or may do so, within a step.
 #[derive(Clone, Copy, Debug)]
 pub struct EventSearch {
-    /// Its place in the block.
+    /// Its index in the block.
     pub lane: usize,
-    /// Angle where the piece begins, rad.
+    /// Angle at the start of the piece, rad.
     pub theta: f64,
-    /// Velocity there.
+    /// Velocity at the start.
     pub velocity: f64,
     /// Sense of the motion on the piece.
     pub sense: f64,
-    /// When the piece begins.
+    /// Time of the start.
     pub begin: f64,
-    /// The length asked for.
+    /// The requested length.
     pub length: f64,
-    /// The side of a corner on the piece; 0 where the first integration tells.
+    /// The side of a corner on the piece; 0 if the first integration determines it.
     pub side: f64,
     /// Whether the piece begins at a corner.
     crossed: bool,
@@ -111,7 +112,7 @@ pub struct EventSearch {
     whole: Option<Reached>,
     /// The length of the whole piece.
     piece: f64,
-    /// Which Newton step is small enough.
+    /// The size of Newton's step that is small enough.
     close: f64,
     rounds: u32,
 }
@@ -138,7 +139,7 @@ impl EventSearch {
         }
     }
 
-    /// Continues where the end of the piece is known already.
+    /// Continues if the end of the piece is known already.
     #[must_use]
     pub fn known(
         lane: usize,
@@ -152,8 +153,8 @@ impl EventSearch {
         matches!(search.ended(whole), Progress::Asks).then_some(search)
     }
 
-    /// Takes the end of the integration that it asked for; `holds` is the equation where friction can
-    /// hold the trajectory.
+    /// Receives the end of the requested integration; `holds` is the equation if friction can hold
+    /// the trajectory.
     #[must_use]
     pub fn take(
         &mut self,
@@ -183,7 +184,7 @@ impl EventSearch {
 
     /// Velocity and acceleration in the sense of the motion at both ends of the whole piece.
     fn ends(&self, whole: &Reached) -> [f64; 4] {
-        // A piece that begins at rest begins in its sense, whatever rounding says.
+        // A piece that begins at rest begins in its sense, whatever the rounding errors.
         let [first, last] = whole.acceleration.map(|a| self.sense * a);
         let first = if self.velocity == 0.0 { first.max(0.0) } else { first };
         [self.sense * self.velocity, self.sense * whole.velocity, first, last]
@@ -210,7 +211,7 @@ impl EventSearch {
         self.look_for_corner(whole, h, None).unwrap_or_else(|| self.arrived())
     }
 
-    /// The piece as a whole is right.
+    /// The piece is valid as a whole.
     fn arrived(&self) -> Progress {
         match self.whole {
             Some(whole) => Progress::Arrived { theta: whole.theta, velocity: whole.velocity },
@@ -218,7 +219,7 @@ impl EventSearch {
         }
     }
 
-    /// The least velocity is on the other side of zero, or above it: then the piece goes on.
+    /// The least velocity is on the other side of zero, or above it: then the piece continues.
     fn dipped(&mut self, reached: &Reached) -> Progress {
         let high = self.length;
         if self.sense * reached.velocity < 0.0 {
@@ -233,7 +234,7 @@ impl EventSearch {
         cornered.unwrap_or_else(|| self.arrived())
     }
 
-    /// Asks for the state at the first zero of the cubic over a piece of length `h`.
+    /// Requests the state at the first zero of the cubic over a piece of length `h`.
     fn seek(&mut self, h: f64) {
         self.piece = h;
         self.close = closeness(h);
@@ -257,10 +258,10 @@ impl EventSearch {
         } else {
             high = t;
         }
-        // After a reversal the begin is a zero itself, and is divided out.
+        // After a reversal the beginning is itself a zero, which is divided out.
         let slope = if self.velocity == 0.0 { b - u / t } else { b };
         let step = if u == 0.0 { 0.0 } else { -u / slope };
-        // The begin may be a zero itself: the series must not reach back to it.
+        // The beginning may be a zero itself: the series must not reach back to it.
         let near = step.abs() <= self.close.min(CLOSE * t);
         if near || high - low <= 1e-15 * self.end.abs().max(period) {
             let [first, last] = reached.acceleration;
@@ -298,7 +299,7 @@ impl EventSearch {
         }
     }
 
-    /// The velocity is zero at `tau`: what comes next.
+    /// Determines the continuation at a zero of the velocity at `tau`.
     fn stopped(
         &mut self,
         theta: f64,
@@ -308,7 +309,7 @@ impl EventSearch {
     ) -> Progress {
         let released = self.velocity == 0.0 && tau - self.begin < LEAST_SLIP * period;
         let at = if released { tau + LEAST_SLIP * period } else { tau };
-        // Where nothing can hold it the motion turns.
+        // If nothing can hold it the motion turns.
         let next = match holds {
             Some(equation) => release(equation, at, theta, at + period),
             None => Release::Now(-self.sense),
@@ -322,7 +323,7 @@ impl EventSearch {
             if at > tau || begin > at {
                 return Progress::Held { theta, until: begin, sense };
             }
-            // The rest of the step is lost in rounding: the motion goes on in its sense.
+            // The remaining step is below rounding: the motion continues in its sense.
             return Progress::Arrived { theta, velocity: sense * f64::MIN_POSITIVE };
         }
         let next = Self::new(self.lane, [theta, 0.0], sense, begin, self.end);

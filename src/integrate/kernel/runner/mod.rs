@@ -20,7 +20,7 @@ mod queue;
 
 use queue::keep;
 
-/// How much further than its first acceleration takes it a velocity may go within a step.
+/// Largest change of a velocity within a step, relative to that by its first acceleration.
 const REACH: f64 = 1.25;
 
 /// Steps of a block without events or effects.
@@ -153,7 +153,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         }
     }
 
-    /// Lanes at rest are held, or begin to move.
+    /// Holds lanes at rest, or starts their motion.
     #[inline(never)]
     fn begin(&self, block: &mut Block) {
         block.held.clear();
@@ -200,7 +200,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         }
     }
 
-    /// A step with effects that depend on the velocity by its sign only.
+    /// A step with effects that depend only on the sign of the velocity.
     #[inline(always)]
     fn step_with_effects(&self, block: &mut Block, k: usize, time: [f64; 2]) {
         let schedule = &self.strobe.schedule;

@@ -54,7 +54,7 @@ impl<L: Lane, Q: Lane> Runner<'_, L, Q> {
         }
     }
 
-    /// Runs the queue until every search has arrived or is held.
+    /// Runs the queue until every search has reached the end of the step or is held.
     #[inline(always)]
     pub(super) fn work_off(&self, block: &mut Block, stages: &mut Stages<Q>) {
         let token = self.tokens.1;
