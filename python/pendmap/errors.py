@@ -47,7 +47,7 @@ def core_errors(lost: type[Exception] = InputError) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+        from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
         kind = lost if isinstance(error, _core.Diverged) else InputError
         raise kind(str(error)) from None

@@ -61,7 +61,7 @@ def command(  # noqa: PLR0913 (an option each)
     from pendmap.comparison.free import as_json as fields
     from pendmap.comparison.free import as_text, tables
     from pendmap.records import files_of, read_experiment
-    from pendmap.records.summary import doubts_said
+    from pendmap.records.summary import doubt_lines
 
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
@@ -74,7 +74,7 @@ def command(  # noqa: PLR0913 (an option each)
         more = {"model": str(model), "simd": instruction_set()}
         write_json(fields(comparison) | more)
     elif not outputs.quiet:
-        doubts = list(doubts_said(experiment, *(one.run for one in comparison.every)))
+        doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
         for line in doubts:
             click.echo(line)
         for table in tables(comparison):

@@ -104,19 +104,19 @@ def split_records(experiment: Experiment) -> DataSplit:
     made = [run for run in runs if run.accelerometer is not None]
     if made:
         raise InputError(
-            f"{made[0].name}: its angle is made of an acceleration, whose own errors are not among"
-            " the effects: it must be a record with an angle"
+            f"{made[0].name}: its angle is computed from an acceleration, whose own errors are not"
+            " among the effects: it must be a record with an angle"
         )
     rated = [run for run in runs if run.gyroscope is not None]
     if rated:
         raise InputError(
-            f"{rated[0].name}: its angle is a velocity integrated, whose errors add up: it must be"
+            f"{rated[0].name}: its angle is an integrated velocity, whose errors add up: it must be"
             " a record with an angle"
         )
     adrift = [run for run in runs if run.kind == "forced" and not (run.drive or run.pivot)]
     if adrift:
         raise InputError(
-            f"{adrift[0].name}: a forced run must have drive or pivot, nothing says what drives it"
+            f"{adrift[0].name}: a forced run must have drive or pivot, neither is given"
         )
     readings = _readings(runs)
     every = [
@@ -205,8 +205,8 @@ def _hold_stretches(
             held_of.append(k)
     if not held:
         raise InputError(
-            f"{experiment.path}: one run must have {LEAST} samples or more: there are too few, "
-            "none of them can be held back"
+            f"{experiment.path}: at least one run must have {LEAST} samples, "
+            "so that part of it can be held out"
         )
     of = tuple(range(len(runs))), tuple(held_of)
     return DataSplit(experiment, runs, readings, tuple(fitted), tuple(held), *of, inside=inside)

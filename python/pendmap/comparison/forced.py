@@ -137,7 +137,7 @@ def simulated_readings(
     ``starts`` are M angles and velocities (rad, rad/s) at the first of N times (s, on the run's
     clock). Readings are not wrapped, and NaN after an overflow.
     """
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+    from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
     units = Units(model.w0, si=True)
     theta, velocity = starts
@@ -277,7 +277,7 @@ def compare_forced(
 
     made, kept = _members(simulated, (theta, velocity), time, ruler, progress)
     if not kept.any():
-        raise InputError(f"{run.name}: the model leaves the range of numbers from every start")
+        raise InputError(f"{run.name}: the model overflows from every start")
     theta, velocity = theta[kept], velocity[kept]
     statistics = tuple(
         Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))

@@ -99,24 +99,24 @@ def lines(one: ForcedComparison, fits: float) -> Iterator[str]:
     """Yield the lines on a run's residual, steady state and improbable statistics."""
     name = one.run.name
     ratio = one.rms / one.sigma if one.sigma else math.inf
-    missing = ": something is missing in the model" if ratio > fits else ""
+    missing = ": the model does not describe this run" if ratio > fits else ""
     yield (
         f"{name}: in {counted(one.windows, 'window')} of up to three swings the residual is "
         f"{one.rms:.3g} "
         f"rad, {ratio:.3g} times the noise{missing}"
     )
     if one.phase is not None:
-        yield f"{name}: the drive's phase is not stated: {one.phase.value:.4g} rad was found"
+        yield f"{name}: the drive's phase is not given: {one.phase.value:.4g} rad was fitted"
     if one.steady is not None:
         yield from _of_steady(name, one.steady)
     for each in one.unlike:
         unit = f" {each.unit}" if each.unit and math.isfinite(each.measured) else ""
         yield (
-            f"{name}: {each.name}: {written(each, each.measured)}{unit} is not what the model does "
-            f"(chance {each.chance:.2g})"
+            f"{name}: {each.name}: {written(each, each.measured)}{unit} is improbable under the "
+            f"model (p-value {each.chance:.2g})"
         )
     if one.lost:
-        yield f"{name}: {one.lost} of {one.ensemble.members} members left the range of numbers"
+        yield f"{name}: {one.lost} of {one.ensemble.members} members overflowed"
 
 
 def _of_steady(name: str, found: Steady) -> Iterator[str]:

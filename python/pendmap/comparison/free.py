@@ -28,7 +28,7 @@ from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.records.experiment import Experiment
-from pendmap.records.summary import doubts, doubts_said, findings_said
+from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -213,13 +213,13 @@ def _why_not(model: Rig, run: Run) -> str:
     seconds = float(np.ptp(time)) if time.size else 0.0
     why = ""
     if run.peaks_only:
-        why = "it holds peaks alone"
+        why = "it has peaks only"
     elif run.copied:
         why = "it is a copy of another run"
     elif not run.moves:
         why = "nothing moves in it"
     elif run.kind == "forced" and run.drive is None and run.pivot is None:
-        why = "what drives it is not known"
+        why = "neither its drive nor its pivot is given"
     elif run.kind == "forced" and (time.size < FEWEST or seconds < swing):
         why = (
             f"it is too short: {counted(time.size, 'sample')} over {seconds:.3g} s; {FEWEST} over "
@@ -324,7 +324,7 @@ def tables(comparison: Comparison) -> list[tuple[list[str], list[list[str]]]]:
 def as_text(comparison: Comparison) -> Iterator[str]:
     """Yield the lines printed with the tables: doubts, table 1, quality of fit, findings."""
     runs = [one.run for one in comparison.every]
-    yield from doubts_said(comparison.experiment, *runs)
+    yield from doubt_lines(comparison.experiment, *runs)
     for one in comparison.runs:
         for row in one.table.rows:
             unit = "s" if row.what == "period" else "rad"
@@ -338,10 +338,10 @@ def as_text(comparison: Comparison) -> Iterator[str]:
         if one.rms > FITS * one.sigma:
             yield (
                 f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
-                "something is missing in the model"
+                "the model does not describe this run"
             )
     for forced in comparison.forced:
         yield from forced_summary.lines(forced, FITS)
     for name, why in comparison.left_out:
         yield f"{name}: not compared: {why}"
-    yield from findings_said(comparison.experiment, *runs)
+    yield from finding_lines(comparison.experiment, *runs)

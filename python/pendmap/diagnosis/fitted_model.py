@@ -12,7 +12,7 @@ import numpy as np
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.valley import nearer
+from pendmap.identification.valley import refine_exponent
 from pendmap.model.effects import opposes
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
@@ -272,7 +272,7 @@ def _adjust_exponents(
     fit = sized.fit
     for candidate in added:
         for size, exponent in candidate.exponents.items():
-            fit = nearer(fit, data.fitted, size, exponent, again)
+            fit = refine_exponent(fit, data.fitted, size, exponent, again)
     return dataclasses.replace(sized, fit=fit)
 
 

@@ -14,7 +14,7 @@ from pendmap.diagnosis.scores import Scores
 from pendmap.formatting import Readable
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
-from pendmap.records.summary import doubts_said, findings_said
+from pendmap.records.summary import doubt_lines, finding_lines
 from pendmap.residuals.torque import Torque
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
 def as_text(found: Discrepancy) -> Iterator[str]:
     """Yield the lines of a summary: doubts about a unit, then the verdict and its details."""
     runs = found.data.runs
-    yield from doubts_said(found.data.experiment, *runs)
+    yield from doubt_lines(found.data.experiment, *runs)
     gap, assessment = found.gap, found.assessment
     yield f"Verdict: {SAID[found.verdict]}"
     for effect in found.effects:
@@ -237,7 +237,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
         )
     yield from _further(found)
-    yield from findings_said(found.data.experiment, *runs)
+    yield from finding_lines(found.data.experiment, *runs)
 
 
 def _between(found: Discrepancy) -> Iterator[str]:

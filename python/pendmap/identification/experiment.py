@@ -221,7 +221,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     try:
         return dataclasses.replace(report.model, notes=notes)
     except InputError as error:
-        raise InputError(f"{report.run.name}: what was found is no model: {error}") from None
+        raise InputError(f"{report.run.name}: the result is no valid model: {error}") from None
 
 
 def provenance(

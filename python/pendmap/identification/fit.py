@@ -102,7 +102,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     the search ends when the expected gain of a step is below ``least_gain``, or, with ``windows``,
     when the sum ``target`` is out of reach.
     """
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+    from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
     unknown, given = prepared(runs, model, free, start or {})
     names, units = unknown.names, unknown.units
@@ -131,7 +131,7 @@ def prepared(
 ) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs in the core's format."""
     if not runs:
-        raise InputError("runs must hold one record or more, got none")
+        raise InputError("runs must have one record or more, got none")
     units = Units(model.w0, si=True)
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
@@ -168,7 +168,7 @@ def _result(
     try:
         found_model = _found_model(model, estimates)
     except InputError as error:
-        raise FitDiverged(f"the fit ends at values that no model may have: {error}") from None
+        raise FitDiverged(f"the fit ends at values that are invalid in a model: {error}") from None
     curves, residuals, squares = [], [], 0.0
     for curve in found.runs:
         curves.append(np.stack([curve.theta, units.given(curve.velocity, 1)]))
@@ -231,8 +231,8 @@ def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> Non
         scatter = float(np.std(run.theta[counted]))
         if rms > min(MISSED * scatter, FAR):
             raise InputError(
-                f"{path}: no model follows these records: of {run.name or 'a run'} {rms:.3g} rad "
-                f"rms are missed, of a motion of {scatter:.3g}: they must be free decays of one "
-                "pendulum, and a run under a drive must have the drive, in an experiment.toml: "
-                'kind = "forced"'
+                f"{path}: no model can be fitted to these records: the residual of "
+                f"{run.name or 'a run'} is {rms:.3g} rad rms, its motion {scatter:.3g} rad rms: "
+                "they must be free decays of one pendulum, and a forced run must have "
+                'kind = "forced" and its drive in an experiment.toml'
             )

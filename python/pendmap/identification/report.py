@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError
 from pendmap.formatting import Readable, counted, estimate_text, interval, percent
 from pendmap.identification.methods.base import Identification
-from pendmap.records.summary import doubts, findings_said
+from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -261,7 +261,7 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
             yield f"{name}: {warning}"
         if name in report.table.lost:
             yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
-    yield from findings_said(report.experiment, *report.runs)
+    yield from finding_lines(report.experiment, *report.runs)
 
 
 def foremost(report: IdentificationReport) -> list[str]:

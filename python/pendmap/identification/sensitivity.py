@@ -81,7 +81,7 @@ def window_slopes(
     fit: TrajectoryFit, runs: Sequence[FitRun], candidates: Sequence[str], model: Rig
 ) -> tuple[tuple[str, ...], list[WindowSlopes]]:
     """Return the parameters' names and the derivatives in each window."""
-    from pendmap import _core  # noqa: PLC0415 (the core is loaded where it works)
+    from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
     start = {name: fit.estimates[name].value for name in fit.names}

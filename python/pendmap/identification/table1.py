@@ -28,8 +28,8 @@ PERIODS: Final = (0.26, 1.54)
 PEAKS: Final = (1.2, 2.53)  # Peaks of the paper's table, rad
 
 ROUGH: Final = (
-    "no errors of periods and peaks: the angle is made of an acceleration, too roughly to judge a "
-    "model; the residual of the acceleration does"
+    "no errors of periods and peaks: the angle is computed from an acceleration, too inaccurate "
+    "to judge a model: use the residual of the acceleration"
 )
 """Reason why a record of an acceleration alone has no table."""
 

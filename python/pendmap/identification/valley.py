@@ -38,7 +38,7 @@ PROMISED: Final = 0.01  # Expected gain in the sum of squares below which the se
 HOPE: Final = 3.0  # Upper bound on the gain of a step, as a multiple of the expected gain
 
 
-def nearer(  # noqa: PLR0913 (what to fit, and how)
+def refine_exponent(  # noqa: PLR0913 (what to fit, and how)
     fit: TrajectoryFit,
     runs: Sequence[FitRun],
     size: str,

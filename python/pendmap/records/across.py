@@ -37,7 +37,7 @@ MOST_THINNED: Final = 10  # Greatest decimation factor of a duplicate that is se
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs without duplicated readings, and the findings across runs."""
-    made, found = once_each(runs), list[Finding]()
+    made, found = without_duplicates(runs), list[Finding]()
     swings = {
         run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
         for run in made
@@ -74,7 +74,7 @@ class _Motion:
         return cls(part.start, theta, _digit(theta), tick, interval)
 
 
-def once_each(runs: Sequence[Run]) -> list[Run]:
+def without_duplicates(runs: Sequence[Run]) -> list[Run]:
     """Return runs without duplicated readings.
 
     Of two runs that share readings, the held-out run loses them, else the shorter, else the later.
@@ -192,12 +192,12 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
         trusted[:] = False
     text = (
         f"{run.name} is a copy of {other.name}: {before - int(trusted.sum())} of its"
-        f" {counted(before, 'reading')} are readings of that run, and count once"
+        f" {counted(before, 'reading')} are readings of that run, and are used once"
     )
     segments = run.segments
     if not trusted.any():
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
-        text += ": held out, it would test nothing" if run.hold_out else ""
+        text += ": a held-out duplicate is no independent test" if run.hold_out else ""
     low, high = float(run.time[first]), float(run.time[first + count - 1])
     found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
     findings = (*run.findings, found)

@@ -42,7 +42,7 @@ def make(work: Work) -> None:
                 "the turning points have one sign: they are taken as one each half swing; if all"
                 " are of one side, w0 comes out half as large"
             )
-            work.say("peaks-one-sign", text)
+            work.report("peaks-one-sign", text)
     elif "angle" not in work.columns:
         _derived(work)
     _finite(work, "angle", work.theta)
@@ -51,7 +51,7 @@ def make(work: Work) -> None:
         largest = float(np.max(np.abs(work.theta)))
         raise InputError(
             f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
-            " large for a pendulum; a scale may stand in [columns] of experiment.toml"
+            " large for a pendulum; a scale can be given in [columns] of experiment.toml"
         )
     work.leave_out(huge, "angle-huge", "number", f"beyond {LARGEST_ANGLE:g} rad left out")
     work.refuse_short()
@@ -79,10 +79,10 @@ def _derived(work: Work) -> None:
         work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
         work.integrated = True
         text = (
-            "the angle is the velocity integrated; its zero is the middle of the swing: for"
-            " pictures and the methods of peaks; the trajectory method fits the velocity itself"
+            "the angle is the integrated velocity; its zero is the middle of the swing: for"
+            " figures and the methods of peaks; the trajectory method fits the velocity itself"
         )
-        work.say("angle-integrated", text, mended=True)
+        work.report("angle-integrated", text, mended=True)
     else:
         _accelerated(work)
 
@@ -101,11 +101,11 @@ def _accelerated(work: Work) -> None:
             "a radial acceleration alone cannot tell left from right: it must be the tangential one"
         )
     elif work.plan.kind == "forced":
-        why = "an acceleration alone on a forced run holds the pivot's own: it must be a free decay"
+        why = "an acceleration alone on a forced run includes the pivot's: it must be a free decay"
     if sensor is None or why:
         raise InputError(
-            f"{work.where}: {why}, or an angle, a velocity (gyroscope) or pixel_x and pixel_y"
-            " beside it"
+            f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
+            " or pixel_x and pixel_y"
         )
     _finite(work, "acceleration", work.extra["acceleration"])
     doubt = angle_from(work, sensor)
@@ -114,12 +114,12 @@ def _accelerated(work: Work) -> None:
         removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
         place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
     text = (
-        f"the angle is made of {place}, without the damping's part in it: roughly right, for"
-        " pictures and the methods of peaks; the trajectory method fits the acceleration itself"
+        f"the angle is computed from {place}, without the part of the damping: approximate,"
+        " for figures and the methods of peaks; the trajectory method fits the acceleration itself"
     )
-    work.say("angle-from-acceleration", text, mended=True)
+    work.report("angle-from-acceleration", text, mended=True)
     if doubt:
-        work.say("acceleration-weak", doubt)
+        work.report("acceleration-weak", doubt)
 
 
 def _unwrap(work: Work) -> None:
@@ -131,11 +131,11 @@ def _unwrap(work: Work) -> None:
         return
     work.theta = np.unwrap(work.theta)
     text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"
-    work.say("angle-wrapped", text, mended=True, at=jumps + 1)
+    work.report("angle-wrapped", text, mended=True, at=jumps + 1)
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
     if fastest > math.pi / 2:
         text = f"up to {fastest:.2g} rad from sample to sample: turns may be miscounted"
-        work.say("unwrapping-uncertain", text)
+        work.report("unwrapping-uncertain", text)
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
@@ -161,7 +161,8 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
         kept = away <= limit
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
-            f"{work.where}: pixel_x and pixel_y must be places of a bob, they lie on no circle"
+            f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
+            " they lie on none"
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
@@ -173,13 +174,13 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
         f" {radius * size:.5g}, y counted {'down' if down > 0 else 'up'}ward; the places are"
         f" {rms * size:.2g} from it, rms"
     )
-    work.say("angle-from-pixels", text, mended=True)
+    work.report("angle-from-pixels", text, mended=True)
     if error > RADIUS_DOUBT * radius:
         text = (
             f"the radius is uncertain by {100 * error / radius:.0f} %, and so is every angle: the"
             " arc is short"
         )
-        work.say("circle-uncertain", text)
+        work.report("circle-uncertain", text)
 
 
 def _geometric(
@@ -214,10 +215,10 @@ def check_peaks(work: Work) -> None:
     work.peaks_only = True
     work.trusted[:] = False
     text = (
-        f"{found}, ever smaller: turning points alone? Then [columns] of experiment.toml says so,"
-        f' peaks = "{work.columns["angle"]}", one for each half swing'
+        f"{found}, ever smaller: if these are turning points only, one each half swing, "
+        f'give peaks = "{work.columns["angle"]}" in [columns] of experiment.toml'
     )
-    work.say("peaks-undeclared", text)
+    work.report("peaks-undeclared", text)
 
 
 def _pattern(time: Floats, theta: Floats) -> str:

@@ -61,7 +61,7 @@ def channels_of(  # noqa: C901 (a step each)
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
     rate, known = description.rate_hz, description.known
-    findings = pictured(table, places, asked)
+    findings = use_pixels(table, places, asked)
     findings += guess(table, places, timed=rate is None)
     values, heads = {}, {}
     if rate and "time" not in places:
@@ -107,7 +107,9 @@ def channels_of(  # noqa: C901 (a step each)
         pivot_unit=pivot_unit,
     )
     if plan.pivot and "unit" not in plan.pivot:
-        work.say("pivot-unit", 'the pivot has no unit: taken for an acceleration, unit = "m/s2"')
+        work.report(
+            "pivot-unit", 'the pivot has no unit: assumed to be an acceleration, unit = "m/s2"'
+        )
     return work
 
 
@@ -194,7 +196,7 @@ def _pivot(
     return found, unit, list(places.values())
 
 
-def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
+def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
     """Assign the pixel coordinates of a table whose angle column is constant."""
     found = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
     place = places.get("angle", found.get("angle"))
@@ -207,7 +209,7 @@ def pictured(table: Table, places: dict[str, int], asked: Mapping[str, Column]) 
     places.pop("angle", None)
     places.update(pair)
     x, y = (table.names[k] for k in pair.values())
-    text = f"{head_of(table, place)!r} never changes: the angle is made of {x!r} and {y!r}"
+    text = f"{head_of(table, place)!r} never changes: the angle is computed from {x!r} and {y!r}"
     return [Finding("angle-constant", text, mended=True)]
 
 
@@ -338,12 +340,12 @@ def _unused(
     findings = [Finding("columns-unused", f"not used: {_listed(names, MOST_UNUSED)}")]
     for k in rest:
         if changes(table.values[:, k]):
-            findings += _asked(head_of(table, k), channels, plan)
+            findings += _suggestion(head_of(table, k), channels, plan)
     seen = {found.what: found for found in reversed(findings)}  # the first of each kind
     return names, list(reversed(seen.values()))
 
 
-def _asked(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
+def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
     name, unit = name_and_unit(head)
     name, unit = plain(name), spelling(unit or "")
@@ -354,13 +356,13 @@ def _asked(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]
     bare = "angle" not in channels and "peaks" not in channels
     if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
         text = f"{head!r} may be the angle itself: angle = {{ name = {head!r} }} in [columns]"
-        return [Finding("angle-column", f"{text} of experiment.toml takes it")]
+        return [Finding("angle-column", f"{text} of experiment.toml reads it")]
     if PIVOT_NAMES.search(said) and plan.pivot is None:
         kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, said)), "m")
         unit = unit if unit in PIVOT_UNITS else kind
         text = (
             f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'
-            " (or vertical) in [[run]] of experiment.toml takes it"
+            " (or vertical) in [[run]] of experiment.toml reads it"
         )
         return [Finding("pivot-column", text)]
     return []

@@ -80,7 +80,7 @@ def cut_at_pauses(work: Work) -> None:
             f"a pause of {pause:.3g} s, longer than the rest of the record: the part {side} it is"
             " used; from_s and to_s choose another"
         )
-        work.say("time-pause", text, at=np.array([at]))
+        work.report("time-pause", text, at=np.array([at]))
         work.keep(places < at if side == "before" else places >= at)
 
 
@@ -101,7 +101,7 @@ def _stopped(work: Work) -> None:
         f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
         " without own times left out"
     )
-    work.say("time-stops", text, mended=True, at=begin)
+    work.report("time-stops", text, mended=True, at=begin)
     work.keep(np.delete(np.arange(work.time.size), out))
 
 
@@ -115,7 +115,7 @@ def _wrapped(work: Work) -> None:
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
             work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
             text = f"the counter of the clock wrapped {counted(at.size, 'time')}: continued"
-            work.say("time-wrapped", text, mended=True, at=at + 1)
+            work.report("time-wrapped", text, mended=True, at=at + 1)
             return
 
 
@@ -141,7 +141,7 @@ def _restarted(work: Work) -> None:
         f"the clock starts again {counted(starts.size, 'time')}: of {starts.size + 1} parts the"
         f" longest is used, rows {work.rows[low]} to {work.rows[high - 1]}"
     )
-    work.say("time-restarts", text, at=starts)
+    work.report("time-restarts", text, at=starts)
     work.keep(np.arange(low, high))
 
 
@@ -154,7 +154,7 @@ def _coarse(work: Work) -> None:
     if logs_edges(work.theta):
         work.time = spread_stamps(work.time)
         text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
-        work.say("time-coarse", text, mended=True)
+        work.report("time-coarse", text, mended=True)
         return
     rows = np.diff(np.stack([work.theta, *work.extra.values(), *work.pivot.values()]), axis=1)
     repeated = np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9  # samples and stamps
@@ -168,7 +168,7 @@ def _coarse(work: Work) -> None:
         work.time = work.time[0] + start + slope * place
         share = f"{100 * same:.0f} % of the stamps repeat the one before"
         text = f"{share}: spread evenly, {1 / slope:.6g} Hz"
-        work.say("time-coarse", text, mended=True)
+        work.report("time-coarse", text, mended=True)
 
 
 def _ordered(work: Work) -> None:
@@ -180,7 +180,7 @@ def _ordered(work: Work) -> None:
         return
     if np.all(steps < -near):
         work.keep(np.arange(work.time.size)[::-1])
-        work.say("time-backwards", "the rows run backwards in time: turned round", mended=True)
+        work.report("time-backwards", "the rows run backwards in time: reversed", mended=True)
         return
     again = np.append(False, np.abs(steps) <= near)
     alike = np.sum(np.diff(work.theta, prepend=np.nan)[again] == 0)
@@ -192,16 +192,16 @@ def _ordered(work: Work) -> None:
         return
     order = np.argsort(work.time, kind="stable")
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
-        text = f"{counted(out.size, 'row')} out of order in time: put where the times say"
+        text = f"{counted(out.size, 'row')} out of order in time: sorted by time"
         kept = order
     elif out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
             f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
-            " of order, and in order the angles make no motion"
+            " of order, and sorted by time the angles are no smooth motion"
         )
     else:
         text = f"{counted(out.size, 'time stamp')} out of order, left out"
-    work.say("time-backwards", text, mended=True, at=out)
+    work.report("time-backwards", text, mended=True, at=out)
     work.keep(kept)
     work.keep(np.append(True, np.diff(work.time) > near))
 
@@ -245,7 +245,7 @@ def _spacing(work: Work) -> None:
     usual, gaps = found.tick, found.gaps
     if gaps.size > steps.size / 4:
         text = f"the samples are uneven: intervals from {steps.min():.3g} to {steps.max():.3g} s"
-        work.say("time-uneven", text)
+        work.report("time-uneven", text)
         return
     if gaps.size:
         worst = gaps[int(np.argmax(steps[gaps]))]
@@ -254,12 +254,12 @@ def _spacing(work: Work) -> None:
             f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
             f" longest {steps[worst]:.3g} s at {moment(low)} s"
         )
-        work.say("time-gap", text, at=gaps, span=(low, high))
+        work.report("time-gap", text, at=gaps, span=(low, high))
     spread = math.sqrt(float(np.mean((np.delete(steps, gaps) - usual) ** 2)))
     if spread > REPORTED_JITTER * usual:
         share = 100 * spread / usual
         text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
-        work.say("time-jitter", text)
+        work.report("time-jitter", text)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -312,12 +312,12 @@ def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
 
     gain, power = _tried(values, reach)
     inside = slice(2 * reach, -2 * reach)
-    told = power > SLOW_POWER * float(np.median(power[inside]))
-    told[: 2 * reach] = told[-2 * reach :] = False
-    score = np.where(told, np.abs(gain) / np.sqrt(np.maximum(power, 1e-300)), 0.0)
-    noise = normal_scale(gain[told] / np.sqrt(power[told]))
+    resolved = power > SLOW_POWER * float(np.median(power[inside]))
+    resolved[: 2 * reach] = resolved[-2 * reach :] = False
+    score = np.where(resolved, np.abs(gain) / np.sqrt(np.maximum(power, 1e-300)), 0.0)
+    noise = normal_scale(gain[resolved] / np.sqrt(power[resolved]))
     highest = maximum_filter1d(score, 2 * reach + 1, mode="nearest")
-    at = np.flatnonzero((score > limit * noise) & (score >= highest) & told)
+    at = np.flatnonzero((score > limit * noise) & (score >= highest) & resolved)
     return at, gain[at] / power[at]
 
 

@@ -56,7 +56,7 @@ def check(work: Work) -> None:
         span = float(np.ptp(good)) if good.size else 0.0
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
             text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
-            work.say("pivot-unit", f"{text}: its unit is another")
+            work.report("pivot-unit", f"{text}: its unit is wrong")
     _drive_sign(work)
 
 
@@ -66,7 +66,7 @@ def _velocity(work: Work) -> None:
     missing = int(np.count_nonzero(~np.isfinite(velocity)))
     if missing:
         text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
-        work.say("velocity-missing", text)
+        work.report("velocity-missing", text)
         del work.extra["velocity"]
         return
     if work.integrated:
@@ -81,7 +81,7 @@ def _velocity(work: Work) -> None:
     alike = float(np.corrcoef(slope, seen)[0, 1])
     if abs(alike) < SAME_MOTION:
         text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
-        work.say("velocity-unlike", text)
+        work.report("velocity-unlike", text)
         del work.extra["velocity"]
         return
     gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
@@ -90,16 +90,16 @@ def _velocity(work: Work) -> None:
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
         text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
-        work.say("velocity-unit", text, mended=True)
+        work.report("velocity-unit", text, mended=True)
     elif abs(gain - 1) > GAIN_OFF:
-        work.say("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+        work.report("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
 
 
 def _turn(work: Work, channel: str) -> None:
     """Invert a channel with the opposite sign of the angle, and report it."""
     work.extra[channel] = -work.extra[channel]
-    text = f"the {channel} has the other sign than the angle: turned round, the angle counts"
-    work.say("sign-turned", text, mended=True)
+    text = f"the {channel} has the opposite sign to the angle: inverted to agree with the angle"
+    work.report("sign-turned", text, mended=True)
 
 
 def _drive_sign(work: Work) -> None:
@@ -138,9 +138,9 @@ def _drive_sign(work: Work) -> None:
     for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
             said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
-            text = f"{said} acts with the other sign than the angle shows: turned by 180 degrees?"
-            text += "" if name == "drive" else " sign = -1 in pivot turns it"
-            work.say("sign-turned", text)
+            text = f"by the angle, {said} acts with the opposite sign: turned by 180 degrees?"
+            text += "" if name == "drive" else " sign = -1 in pivot reverses it"
+            work.report("sign-turned", text)
 
 
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
@@ -181,14 +181,14 @@ class _Motion:
 
 def _acceleration(work: Work) -> None:
     """Compare an acceleration with the angle; invert it if it has the opposite sign."""
-    if work.made_of is not None:
+    if work.angle_source is not None:
         return
     motion = None if work.plan.kind == "forced" else _motion(work)
     if motion is None:
-        forced = "on a forced run it holds the pivot's own"
-        short = "too few samples beside the angle to compare it"
+        forced = "on a forced run it includes the pivot's"
+        short = "too few samples have an angle to compare it with"
         why = forced if work.plan.kind == "forced" else short
-        work.say("acceleration-unused", f"the acceleration is not used: {why}")
+        work.report("acceleration-unused", f"the acceleration is not used: {why}")
     elif work.accelerometer is None:
         _unplaced(work, motion)
     else:
@@ -252,15 +252,15 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
     if abs(alike) < SAME_MOTION:
         text = (
             f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
-            f"{where}): direction or column is another, or its noise hides the swing"
+            f"{where}): direction or column is wrong, or its noise hides the swing"
         )
-        work.say("acceleration-unlike", text)
+        work.report("acceleration-unlike", text)
         return
     if gain < 0:
         _turn(work, "acceleration")
-    text = f"the acceleration is {abs(gain):.3g} times what the angle says{where}"
+    text = f"the acceleration is {abs(gain):.3g} times that computed from the angle{where}"
     if abs(abs(gain) - 1) <= GAIN_OFF:
-        work.say("acceleration-agrees", f"{text}: {CHECK_ONLY}")
+        work.report("acceleration-agrees", f"{text}: {CHECK_ONLY}")
         return
     other = "its unit, or a distance"
     if not angular:
@@ -269,7 +269,7 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
             f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
         )
         other += " or gravity_removed is wrong"
-    work.say("acceleration-scale", f"{text}: {other}; not used")
+    work.report("acceleration-scale", f"{text}: {other}; not used")
 
 
 def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
@@ -287,7 +287,7 @@ def _unplaced(work: Work, motion: _Motion) -> None:
     radial = _alike(motion.velocity**2, motion.measured)
     if max(abs(sine), abs(radial)) < SAME_MOTION:
         text = "the acceleration is not used: it follows neither the angle nor the velocity squared"
-        work.say("acceleration-unlike", text)
+        work.report("acceleration-unlike", text)
         return
     if abs(radial) > abs(sine):
         sign = math.copysign(1.0, radial)
@@ -304,7 +304,7 @@ def _unplaced(work: Work, motion: _Motion) -> None:
             f" {without:.3g} if gravity is removed"
         )
     use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
-    work.say("acceleration-unused", f"the acceleration looks {said}; {use}")
+    work.report("acceleration-unused", f"the acceleration looks {said}; {use}")
 
 
 def smooth_pivot(work: Work) -> None:
@@ -334,7 +334,7 @@ def smooth_pivot(work: Work) -> None:
         f"the pivot's {what} come in steps: its acceleration is that of cubics through"
         f" {max(windows)} readings, {max(windows) * interval:.3g} s"
     )
-    work.say("pivot-smoothed", text, mended=True)
+    work.report("pivot-smoothed", text, mended=True)
     work.pivot_unit = "m/s2"
 
 

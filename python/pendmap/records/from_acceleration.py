@@ -57,8 +57,8 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     waves = [wave for part in each for wave in part]
     if len(waves) < FEWEST_HALF_SWINGS:
         raise InputError(
-            f"{where}: the acceleration must show {FEWEST_HALF_SWINGS} half swings or more where no"
-            f" angle is beside it, got {len(waves)}"
+            f"{where}: the acceleration must show {FEWEST_HALF_SWINGS} half swings or more if"
+            f" there is no angle, got {len(waves)}"
         )
     found = dataclasses.replace(accelerometer, w0=_frequency(waves, accelerometer))
     largest = max(wave.top for wave in waves)
@@ -134,7 +134,7 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
         raise InputError(
             f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
             " g/w0^2 from the pivot, where gravity and the swing cancel: only damping is"
-            " measured there; it must be another place on the rod, or have an angle beside it"
+            " measured there; it must be another place on the rod, or an angle must be recorded too"
         )
     if away > WEAK_SPOT:
         return ""
@@ -165,7 +165,7 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
         if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
             raise InputError(
                 f"{where}: the pendulum turns over the top, which an acceleration alone does not"
-                " show: it must have an angle or a velocity beside it, or a later from_s"
+                " show: it must also have an angle or a velocity, or a later from_s"
             )
 
 

@@ -16,7 +16,7 @@ from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.scale import middle_of, periods_of
-from pendmap.records.swinging import let_go, swinging
+from pendmap.records.swinging import release_after_hold, swinging
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches
@@ -44,7 +44,7 @@ def moves(work: Work) -> bool:
     still = good.size < 4 or (work.noise > 0.7 * float(np.std(good)) and spread < NOISE_SPAN)
     if not still and spread > work.limit:
         return True
-    work.say("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
+    work.report("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
     work.segments = [Segment("rest", low, high, used=False)]
     work.trusted[:] = False
     return False
@@ -69,7 +69,7 @@ def check(work: Work) -> None:
     if work.plan.kind != "free":
         return
     # An angle computed from an acceleration is folded: its readings over the gain are used.
-    told = work if work.made_of is None else _felt(work, work.made_of)
+    told = work if work.angle_source is None else _with_readings(work, work.angle_source)
     _measure_noise(told)
     good = told.theta[told.trusted]
     middle = middle_of(told.time[told.trusted], good)
@@ -78,11 +78,11 @@ def check(work: Work) -> None:
     span = (int(ends[0]), int(ends[-1]) + 1)
     period = _period(work, told.middle)
     if period is None:
-        work.say("no-swing", "too few whole swings: little can be checked")
+        work.report("no-swing", "too few whole swings: little can be checked")
         return
     work.period, work.middle = period, told.middle
-    if work.made_of is not None:
-        parts = _let_swing(told, span)
+    if work.angle_source is not None:
+        parts = _free_swings(told, span)
     else:
         parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
         parts = releases(work, parts)
@@ -91,7 +91,7 @@ def check(work: Work) -> None:
             parts[0] = (held, parts[0][1])
     if not parts:
         return
-    parts = trigger.begun(work, parts, period)
+    parts = trigger.after_edges(work, parts, period)
     used = [enough(told, part) for part in parts]
     if not any(used):
         longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
@@ -100,7 +100,7 @@ def check(work: Work) -> None:
     _settle(work, parts, used, span)
 
 
-def _felt(work: Work, sensor: Accelerometer) -> Work:
+def _with_readings(work: Work, sensor: Accelerometer) -> Work:
     """Return a record with accelerometer readings over the gain in place of the angle."""
     readings = work.extra["acceleration"].copy()
     bad = ~work.trusted
@@ -108,22 +108,26 @@ def _felt(work: Work, sensor: Accelerometer) -> Work:
     return dataclasses.replace(work, theta=readings / sensor.gain)
 
 
-def _let_swing(told: Work, span: Stretch) -> list[Stretch]:
+def _free_swings(told: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches of free swings in accelerometer readings."""
     time, readings = told.time[slice(*span)], told.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
     free, _ = swinging(time, readings, noise)
     pieces = [piece for low, high in free for piece in grown(told, (span[0] + low, span[0] + high))]
     return [
-        (low + let_go(told.time[low:high], told.theta[low:high] - told.middle, noise), high)
+        (
+            low
+            + release_after_hold(told.time[low:high], told.theta[low:high] - told.middle, noise),
+            high,
+        )
         for low, high in pieces
     ]
 
 
 def _period(work: Work, middle: float) -> float | None:
     """Return the approximate period of small swings, s."""
-    if work.made_of is not None:
-        return 2 * math.pi / work.made_of.w0
+    if work.angle_source is not None:
+        return 2 * math.pi / work.angle_source.w0
     if (found := periods_of(work, middle)) is not None:
         return found.small
     w0 = work.known.get("w0")
@@ -171,10 +175,10 @@ def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -
     if first.what == "held":
         begin = moment(segments[1].from_s)
         text = f"held at first: used from {begin} s, where the angle has clearly left the hold"
-        work.say("held-start", text, span=(first.from_s, first.to_s))
+        work.report("held-start", text, span=(first.from_s, first.to_s))
     if last.what == "rest" and len(segments) > 1:
         text = f"at rest from {moment(last.from_s)} s, not for fitting"
-        work.say("rest-tail", text, span=(last.from_s, last.to_s))
+        work.report("rest-tail", text, span=(last.from_s, last.to_s))
 
 
 def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
@@ -188,7 +192,7 @@ def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
     if short:
         text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
     low, high = work.releases[0][0], work.releases[-1][1] - 1
-    work.say("several-releases", text, span=(float(work.time[low]), float(work.time[high])))
+    work.report("several-releases", text, span=(float(work.time[low]), float(work.time[high])))
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
@@ -210,14 +214,19 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
 
 def check_zero(work: Work) -> None:
     """Report a rest angle, or middle of the swings, of a free run that is not 0."""
-    if work.plan.kind != "free" or not work.releases or work.made_of is not None or work.integrated:
+    if (
+        work.plan.kind != "free"
+        or not work.releases
+        or work.angle_source is not None
+        or work.integrated
+    ):
         return  # an angle from a sensor on the rod has its zero at the middle
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]
         value = float(np.mean(tail))
         error = max(float(np.std(tail)) / math.sqrt(tail.size), work.count / math.sqrt(12))
-        said = f"it rests at {_folded(value):+.3g} rad: an offset, or what friction holds"
+        said = f"it rests at {_folded(value):+.3g} rad: an offset, or held there by friction"
     else:
         _measure_noise(work)
         time, theta = work.time[work.trusted], work.theta[work.trusted]
@@ -235,7 +244,7 @@ def check_zero(work: Work) -> None:
         said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
     known = any(finding.what == "zero-offset" for finding in work.findings)
     if abs(_folded(value)) > max(CERTAIN_OFFSET * error, 1e-5) and not known:
-        work.say("zero-offset", f"{said}; left to the fit")
+        work.report("zero-offset", f"{said}; left to the fit")
 
 
 def _folded(angle: float) -> float:

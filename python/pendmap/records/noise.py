@@ -172,13 +172,13 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
     first = fitted()
     if first.middle.size < FEWEST_RESIDUALS:
         return None
-    fit = followed(fitted, first) if slow else first
+    fit = raise_degree(fitted, first) if slow else first
     next_fit = fitted(degree=6, points=11)
     enough = next_fit.middle.size >= FEWEST_RESIDUALS
     colour = first.rms / max(next_fit.rms, 1e-300) if enough else 1.0
     least, slowest, law = count / math.sqrt(12), 0.0, None
     if count and fit.rms < DITHERED * count:
-        far = apart(fitted, count, interval, swing, fit if slow else None)
+        far = fit_with_stride(fitted, count, interval, swing, fit if slow else None)
         if far is None:
             still = still_noise(theta if bad.all() else theta[~bad], count)
             if still is not None:
@@ -254,7 +254,7 @@ def check(work: Work) -> None:
     law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
     if law is not None:
         share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
-        work.say("noise-grows-with-speed", f"{law} ({share} of the interval)")
+        work.report("noise-grows-with-speed", f"{law} ({share} of the interval)")
 
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
@@ -287,7 +287,7 @@ def less(fit: LocalFit, other: LocalFit) -> bool:
     return other.rms > (CLEARLY_LESS + 2 * fit.stderr / max(fit.rms, 1e-300)) * fit.rms
 
 
-def followed(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
+def raise_degree(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
     """Return the fit of the lowest degree whose residual the next degree does not reduce."""
     chosen = first
     for degree, points in DEGREES[1:]:
@@ -298,7 +298,7 @@ def followed(fitted: Callable[..., LocalFit], first: LocalFit) -> LocalFit:
     return chosen
 
 
-def apart(
+def fit_with_stride(
     fitted: Callable[..., LocalFit],
     count: float,
     interval: float,

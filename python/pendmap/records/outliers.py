@@ -73,9 +73,11 @@ def find(work: Work) -> None:
         at, scale = at[~seen[at]], scale[~seen[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
             share = f"{100 * MOST_OUTLIERS:.0f} %"
-            work.say("not-smooth", f"more than {share} of the samples contradict their neighbours")
+            work.report(
+                "not-smooth", f"more than {share} of the samples contradict their neighbours"
+            )
             return
-        told = _told(work, theta, at, scale)
+        told = _judged(work, theta, at, scale)
         if not told:
             break
         for k, group, jump in told:
@@ -108,7 +110,7 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
 
-def _told(
+def _judged(
     work: Work, theta: Floats, at: Indices, scale: Floats
 ) -> list[tuple[int, _Group, _Jump | None]]:
     """Return the suspects that can be judged, with their outliers and jumps.
@@ -235,7 +237,7 @@ def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
         f" {1e3 * found.slip:.4g} +- {1e3 * found.stderr:.1g} ms, an interval, and not by counts:"
         " the times after each are moved by whole intervals"
     )
-    work.say("time-slips", text, mended=True, at=found.places)
+    work.report("time-slips", text, mended=True, at=found.places)
     work.time = found.time
     return [j for j in jumps if np.min(np.abs(found.places - j.at)) > SIDE]
 
@@ -247,7 +249,7 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
     places = np.asarray([jump.at for jump in jumps], np.intp)
     many = f"{counted(len(jumps), 'jump')} of the reading"
     if len(jumps) > MOST_JUMPS:
-        work.say("missed-counts", f"{many} that stay: the zero wanders", at=places)
+        work.report("missed-counts", f"{many} that stay: the zero drifts", at=places)
         return
     turns = [round(jump.size / TURN) for jump in jumps]
     off = [abs(j.size - n * TURN) for j, n in zip(jumps, turns, strict=True)]
@@ -260,7 +262,7 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
     if all(numbers):
         for at, number in zip(places, numbers, strict=True):
             work.theta[at:] -= number * step
-        work.say(what, f"{many} by {said}, taken back", mended=True, at=places)
+        work.report(what, f"{many} by {said}, undone", mended=True, at=places)
         return
     edges = [0, *places.tolist(), work.time.size]
     longest = int(np.argmax(np.diff(edges)))
@@ -272,7 +274,7 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
         f"{many} ({said} rad) that stay{', or another recording begins' if other else ''}:"
         f" {moment(work.time[low])} to {moment(work.time[high - 1])} s is for fitting"
     )
-    work.say("missed-counts", text, at=places)
+    work.report("missed-counts", text, at=places)
 
 
 def _whole(jump: _Jump, count: float) -> int:

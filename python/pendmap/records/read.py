@@ -198,8 +198,8 @@ def _runs(  # noqa: C901 (a step each)
     table, digest = tables[plan.file]
     work = channels_of(table, description, plan, str(path))
     if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
-        text = 'kind is "forced" and there is neither drive nor pivot: what drives it is not known'
-        work.say("drive-missing", text)
+        text = 'kind is "forced" but neither drive nor pivot is given'
+        work.report("drive-missing", text)
     clock.mend(work)
     work.cut(plan.from_s, plan.to_s)
     if not work.peaks_only:
@@ -218,7 +218,7 @@ def _runs(  # noqa: C901 (a step each)
         samples.keep_readings(work)
     samples.check(work)
     moves = motion.moves(work)
-    if moves and work.made_of is None:
+    if moves and work.angle_source is None:
         scale.check(work)
     samples.say_steps(work)
     if moves:
@@ -228,7 +228,7 @@ def _runs(  # noqa: C901 (a step each)
         resolution.check(work)
     cross_checks.smooth_pivot(work)
     work.refuse_short()
-    works, shared = work.apart()
+    works, shared = work.split_by_release()
     runs = []
     for k, part in enumerate(works, 1):
         if moves:
@@ -256,7 +256,7 @@ def _run(work: Work, name: str, digest: str) -> Run:
         hold_out=plan.hold_out,
         velocity=work.extra.get("velocity"),
         acceleration=work.extra.get("acceleration"),
-        accelerometer=work.made_of,
+        accelerometer=work.angle_source,
         gyroscope=gyroscope,
         drive=plan.drive,
         pivot=work.pivot or None,

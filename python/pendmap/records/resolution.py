@@ -46,10 +46,10 @@ def check(work: Work) -> None:
     used, whole = int(work.trusted.sum()), int((moving | work.trusted).sum())
     if 0 < used < LEAST_USED * whole:
         text = (
-            f"only {used} of {counted(whole, 'reading')} in motion are for fitting: what is fitted "
-            "says little about the others"
+            f"only {used} of {counted(whole, 'reading')} in motion are for fitting: the fit "
+            "may not describe the others"
         )
-        work.say("few-used", text)
+        work.report("few-used", text)
     rate = 1 / float(np.median(np.diff(work.time)))
     drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
     if rate < NYQUIST * drive:
@@ -58,17 +58,18 @@ def check(work: Work) -> None:
             f" period do not resolve it, {NYQUIST:g} and more would; it looks like one of"
             f" {abs(drive - rate * round(drive / rate)):.3g} Hz"
         )
-        work.say("drive-unresolved", text)
-    free = work.plan.kind == "free" and work.made_of is None and not work.integrated
+        work.report("drive-unresolved", text)
+    free = work.plan.kind == "free" and work.angle_source is None and not work.integrated
     gain = gain_of(work) if free else None
     if gain is not None and gain[1] - gain[0] > 2 * GAIN_KNOWN:
         low, high = gain
         between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
         text = (
-            f"swings so small hardly show the gain of the sensor: the readings are {between} times"
-            " the angle (95 %), by how the period grows with the swing; friction is as uncertain"
+            f"swings so small hardly determine the gain of the sensor: by the growth of the period"
+            f" with the swing, the readings are {between} times the angle (95 %); friction is as"
+            " uncertain"
         )
-        work.say("gain-unknown", text)
+        work.report("gain-unknown", text)
 
 
 def step_of(theta: Floats) -> float:
@@ -162,9 +163,9 @@ def put_on_edges(work: Work) -> None:
     """Shift the readings of a log of edges by half a count to the edges."""
     if work.plan.pivot is not None or not logs_edges(work.theta):
         return
-    work.edges, work.seen = True, step_of(work.theta)
-    way = np.sign(np.round(np.diff(work.theta) / work.seen))
+    work.edges, work.estimated_step = True, step_of(work.theta)
+    way = np.sign(np.round(np.diff(work.theta) / work.estimated_step))
     # A log of the edges themselves shows an edge twice at a turning point.
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
-        work.theta -= 0.5 * work.seen * np.append(way[0], way)
+        work.theta -= 0.5 * work.estimated_step * np.append(way[0], way)
         work.trusted[0] = False  # it may be the initial count, not an edge

@@ -46,11 +46,11 @@ _EVEN: Final = 1e-3  # Greatest relative deviation of an interval in an evenly s
 
 def check(work: Work) -> None:
     """Mark clipped and frozen samples and outliers, correct missed counts, and report all."""
-    if work.made_of is not None:
+    if work.angle_source is not None:
         # The acceleration is checked, since the angle computed from it has corners.
         readings = work.extra["acceleration"]
         free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        find_spikes(work, readings, work.made_of.unit, free)
+        find_spikes(work, readings, work.angle_source.unit, free)
     elif work.integrated:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))
@@ -58,7 +58,7 @@ def check(work: Work) -> None:
         find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
     else:
-        work.seen = work.seen if work.edges else step_of(work.theta)
+        work.estimated_step = work.estimated_step if work.edges else step_of(work.theta)
         work.count = _count(work)
         _clipped(work, "rad")
         _frozen(work)
@@ -69,31 +69,35 @@ def _count(work: Work) -> float:
     """Return the step of the readings, rad, from the description or the readings."""
     counts = work.known.get("encoder_counts")
     if counts is None:
-        return work.seen
+        return work.estimated_step
     count = 2 * math.pi / float(counts)
-    return work.seen if work.seen > 1.5 * count and work.theta.size > 200 else count
+    return (
+        work.estimated_step
+        if work.estimated_step > 1.5 * count and work.theta.size > 200
+        else count
+    )
 
 
 def say_steps(work: Work) -> None:
     """Report the step of the readings, or that they are edges; called once the unit is certain."""
     if work.integrated:
         return  # an integral has no steps
-    turn = f"{2 * math.pi / (work.seen or math.inf):.5g}"
+    turn = f"{2 * math.pi / (work.estimated_step or math.inf):.5g}"
     if work.edges:
         text = (
             f"an encoder of {turn} counts a turn writes a line at each edge: the angles are those"
             f" of {counted(work.theta.size, 'edge')}, their errors those of the stamps; none is"
             " missing between two of them"
         )
-        work.say("edges-logged", text, mended=True)
+        work.report("edges-logged", text, mended=True)
         return
-    counts, seen = work.known.get("encoder_counts"), work.seen
+    counts, seen = work.known.get("encoder_counts"), work.estimated_step
     work.count = _count(work)
     text = f"the readings come in steps of {seen:.4g} rad"
     if counts is None and seen > FINEST:
-        work.say("counts-seen", f"{text} ({turn} a turn)")
+        work.report("counts-seen", f"{text} ({turn} a turn)")
     elif counts is not None and work.count == seen > 3 * math.pi / float(counts):
-        work.say("counts-differ", f"{text}, {turn} a turn: encoder_counts says {counts}")
+        work.report("counts-differ", f"{text}, {turn} a turn: encoder_counts says {counts}")
 
 
 def _clipped(work: Work, unit: str) -> None:
@@ -113,8 +117,9 @@ def _clipped(work: Work, unit: str) -> None:
             ends.append(f"{end:.4g}")
             marked |= ended  # including shorter plateaus
     at = np.flatnonzero(marked)
-    text = f"the sensor ends at {' and '.join(ends)} {unit}: {counted(at.size, 'clipped sample')}"
-    work.distrust(at, "clipped", f"{text} not for fitting")
+    text = f"the sensor's range ends at {' and '.join(ends)} {unit}"
+    count = counted(at.size, "clipped sample")
+    work.distrust(at, "clipped", f"{text}: {count} not for fitting")
 
 
 def _cut_off(work: Work, low: int, high: int) -> bool:
@@ -262,11 +267,11 @@ def keep_readings(work: Work) -> None:
     text = f"the record repeats {_hertz(rate / found.ratio)} at {_hertz(rate)}, {how}"
     if work.pivot:
         # The pivot may have been read at every sample.
-        work.say("interpolated", f"{text}: errors that count samples are too small")
+        work.report("interpolated", f"{text}: errors from the number of samples are too small")
         return
     work.keep(found.places)
     kept = counted(found.places.size, "reading")
-    work.say("interpolated", f"{text}: {kept} kept of {samples} samples", mended=True)
+    work.report("interpolated", f"{text}: {kept} kept of {samples} samples", mended=True)
 
 
 def _hertz(rate: float) -> str:

@@ -130,17 +130,20 @@ def _seconds(work: Work, found: Periods) -> Periods:
         if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
             continue
         if "time" in work.declared:
-            text = f"a period of {small:.4g} s: times look like {name}, [columns] says otherwise"
-            work.say("time-unit", text)
+            text = f"a period of {small:.4g} s: times look like {name}, contrary to [columns]"
+            work.report("time-unit", text)
             return found
         text = f"the times are {name}: as seconds the period would be {small:.4g} s"
-        work.say("time-unit", text, mended=True)
+        work.report("time-unit", text, mended=True)
         size = factor if work.integrated else 1.0
         work.time *= factor
         work.theta *= size
         return Periods(found.amplitude * size, found.period * factor)
     if not SHORTEST_PERIOD < small < LONGEST_PERIOD:
-        work.say("time-unit", f"a period of {small:.4g} s is no pendulum's: the unit is doubtful")
+        work.report(
+            "time-unit",
+            f"a period of {small:.4g} s is implausible for a pendulum: is the unit right?",
+        )
     return found
 
 
@@ -151,17 +154,17 @@ def _radians(work: Work, found: Periods) -> Periods:
         _curvature(work, found, largest)
         return found
     channel = "velocity" if work.integrated else "angle"
-    text = f"swings of {largest:.4g} rad are no pendulum's"
+    text = f"swings of {largest:.4g} rad are impossible for a pendulum"
     if largest * DEGREE > math.pi or channel in work.declared:
-        work.say("angle-unit", f"{text}: the unit or the scale is wrong")
+        work.report("angle-unit", f"{text}: the unit or the scale is wrong")
         return found
     work.theta *= DEGREE
     if work.integrated:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
     work.count *= DEGREE
-    work.seen *= DEGREE
+    work.estimated_step *= DEGREE
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
-    work.say("angle-unit", f"the {read}: {text}", mended=True)
+    work.report("angle-unit", f"the {read}: {text}", mended=True)
     return Periods(found.amplitude * DEGREE, found.period)
 
 
@@ -184,7 +187,7 @@ def _curvature(work: Work, found: Periods, largest: float) -> None:
     if not flat:
         channel = "velocity" if work.integrated else "angle"
         text += f"; --effect encoder_gain fits it, or scale the {channel} in [columns]"
-    work.say("angle-unit" if flat else "angle-scale", text)
+    work.report("angle-unit" if flat else "angle-scale", text)
 
 
 def _share(found: Periods, grown: Floats) -> tuple[float, float]:
@@ -263,8 +266,8 @@ def _known(work: Work, found: Periods) -> None:
     seen = found.smallest
     for said, period in expected.items():
         if abs(seen / period - 1) > UNLIKE_RIG:
-            text = f"small swings take {seen:.4g} s, by {said} {period:.4g} s: one of them is wrong"
-            work.say("period-unlike-rig", text)
+            text = f"small swings take {seen:.4g} s, but {period:.4g} s by {said}: one is wrong"
+            work.report("period-unlike-rig", text)
 
 
 def _slow_sampling(work: Work, found: Periods | None) -> None:
@@ -272,11 +275,11 @@ def _slow_sampling(work: Work, found: Periods | None) -> None:
     number = found.small / float(np.median(np.diff(work.time))) if found else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
     if number < SAMPLES_A_PERIOD:
-        text = f"{number:.1f} samples a period: the shape of the swing is lost"
-        work.say("sampling-slow", text)
+        text = f"{number:.1f} samples a period: the shape of the swing is not resolved"
+        work.report("sampling-slow", text)
     elif fastest > 1.0:
         text = f"up to {fastest:.2g} rad from sample to sample: too slow for this motion"
-        work.say("sampling-slow", text)
+        work.report("sampling-slow", text)
 
 
 def middle_of(time: Floats, theta: Floats) -> float | None:
@@ -301,18 +304,18 @@ def turn_to_rest(work: Work) -> None:
     quarters = round(off / (math.pi / 2))
     gauge = quarters * math.pi / 2
     if not _certain(work.time[good], work.theta[good] - middle):
-        text = "too few whole swings to tell what it swings about: the zero is left to the fit"
-        work.say("zero-uncertain", text)
+        text = "too few whole swings to determine their middle: the zero is left to the fit"
+        work.report("zero-uncertain", text)
     elif "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
-        work.say("zero-offset", f"{text}: the zero that is given is off")
+        work.report("zero-offset", f"{text}: the zero that is given is wrong")
     elif quarters and abs(off - gauge) < OFF_QUARTER:
         work.theta -= turns + gauge
         text = f"the gauge is turned by {90 * quarters} degrees: {text}, turned back"
-        work.say("gauge-turned", text, mended=True)
+        work.report("gauge-turned", text, mended=True)
     else:
         work.theta -= turns + off
         text = f"{text}, not about its zero: subtracted"
-        work.say("zero-offset", text, mended=True)
+        work.report("zero-offset", text, mended=True)
 
 
 def _certain(time: Floats, theta: Floats) -> bool:

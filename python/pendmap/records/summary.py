@@ -141,7 +141,7 @@ def doubts(experiment: Experiment, *runs: Run) -> list[str]:
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
 
-def doubts_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
+def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a warning for each of :func:`doubts`."""
     return (f"Warning: {text}" for text in doubts(experiment, *runs))
 
@@ -158,7 +158,7 @@ def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
     return bool(said & UNIT_FINDINGS - {SCALE_FINDING})
 
 
-def findings_said(experiment: Experiment, *runs: Run) -> Iterator[str]:
+def finding_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a line for each finding that is not in :func:`doubts`."""
     for where, found in _findings(experiment, runs):
         if not _doubted(found):

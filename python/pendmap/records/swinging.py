@@ -51,7 +51,7 @@ def swinging(time: Floats, reading: Floats, noise: float) -> tuple[list[Stretch]
         if swings(time[edge:high], part, least=least).peak.size < FEWEST_HALF_SWINGS:
             continue
         largest = max(largest, float(np.max(np.abs(part))))
-        low = edge + let_go(time[edge:high], part, noise)
+        low = edge + release_after_hold(time[edge:high], part, noise)
         part = reading[low:high] - middle_over(time[low:high], reading[low:high], least)
         small = DECAYED * largest
         end = _untouched(time[low:high], part, least, small, more=high < time.size)
@@ -115,7 +115,7 @@ def _all_of(middles: Mask, width: int) -> Mask:
     return np.asarray(binary_dilation(middles, iterations=half), bool)
 
 
-def let_go(time: Floats, values: Floats, noise: float) -> int:
+def release_after_hold(time: Floats, values: Floats, noise: float) -> int:
     """Return the end of a hold too short for :func:`_quiet`; 0 if there is none."""
     crossing = swings(time, values, least=max(LEAST_SWING * noise, 1e-12)).crossing
     if crossing.size < FEWEST_HALF_SWINGS + 3:

@@ -345,7 +345,7 @@ def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str,
         alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
         if sum(_row(line, *alone) is not None for line in sample) > least:
             return alone
-    advice = "; what it is separated by may stand in [reader] of experiment.toml" if found else ""
+    advice = "; the delimiter can be given in [reader] of experiment.toml" if found else ""
     raise InputError(
         f"{where}: must be CSV with a time and an angle, got no rows of numbers{advice}"
     )

@@ -74,13 +74,13 @@ def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
     return kept
 
 
-def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
+def after_edges(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
     """Return the motion after each edge of the trigger; ``parts`` if it marks no release."""
     if "trigger" not in work.extra or not parts:
         return parts
     found = edges_of(work.extra["trigger"], work.edge)
     if found is None or not found[0].size:
-        work.say("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
+        work.report("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
         return parts
     edges, edge = found
     kept = _debounced(work.time, edges, period)
@@ -90,7 +90,7 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
             f"the trigger's {counted(len(kept), f'{edge} edge')} recur after"
             f" {np.median(apart):.3g} s, three swings and less: it marks no release"
         )
-        work.say("trigger-unlike", text)
+        work.report("trigger-unlike", text)
         return parts
     motions = []
     for low, high in itertools.pairwise([*kept, work.time.size]):
@@ -100,11 +100,11 @@ def begun(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
             # The trigger locates the release to a sample, the angle to a fraction of a swing.
             motions.append((low if work.time[a] - work.time[low] < period else a, b))
     if not motions:
-        work.say("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
+        work.report("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
         return parts
     times = listed([f"{work.time[k]:.6g}" for k in kept], 6)
     text = f"the trigger's {edge} edge marks {counted(len(kept), 'release')}, at {times} s"
-    work.say("trigger-release", text + _bounces(edges.size - len(kept)))
+    work.report("trigger-release", text + _bounces(edges.size - len(kept)))
     return motions
 
 
@@ -115,7 +115,7 @@ def _bounces(number: int) -> str:
 
 def _none(found: tuple[Indices, str] | None) -> str:
     """Return the reason why there is no edge, as text."""
-    return "has no two levels" if found is None else f"has no {found[1]} edge"
+    return "does not have two levels" if found is None else f"has no {found[1]} edge"
 
 
 def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat | None:
@@ -170,16 +170,16 @@ def check_drive(work: Work) -> None:
             edges = counted(found[0].size, f"{found[1]} edge")
             uneven = f"the trigger's {edges} do not recur evenly"
             why = uneven if found[0].size >= FEWEST_EDGES else f"the trigger has {edges}"
-        work.say("trigger-unlike", f"{why}: it shows no drive")
+        work.report("trigger-unlike", f"{why}: it shows no drive")
         return
     said = (
         f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
         f" {counted(beat.time.size, f'{found[1]} edge')}{_bounces(beat.left_out)}"
     )
     if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
-        work.say("trigger-differs", f"{said}: the drive is given with {given:.7g}")
+        work.report("trigger-differs", f"{said}: the drive is given with {given:.7g}")
         return
-    work.say("trigger-drive", said)
+    work.report("trigger-drive", said)
     if given is not None and work.phase is not None:
         _phase(work, beat, given, work.phase)
 
@@ -195,7 +195,7 @@ def _phase(work: Work, beat: Beat, omega: float, phase: float) -> None:
     if told is None:
         work.plan = dataclasses.replace(work.plan, drive={**drive, "phi": phi})
         text = f"phi = {phi:.4g} +- {error:.1g} rad by the trigger, phase {phase:g} at its edges"
-        work.say("trigger-phase", text)
+        work.report("trigger-phase", text)
     elif abs(math.remainder(told - phi, 2 * math.pi)) > DIFFERENT * error:
         text = f"by the trigger phi = {phi:.4g} +- {error:.1g} rad: it is given as {told:.4g}"
-        work.say("trigger-differs", text)
+        work.report("trigger-differs", text)

@@ -44,7 +44,7 @@ class Work:
     unused: tuple[str, ...]  # headings of columns without a channel
     segments: list[Segment] = dataclasses.field(default_factory=list)
     count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
-    seen: float = 0.0  # step estimated from the readings, rad; 0 for none
+    estimated_step: float = 0.0  # step estimated from the readings, rad; 0 for none
     peaks_only: bool = False
     accelerometer: Accelerometer | None = None
     integrated: bool = False  # the angle is the integral of the velocity
@@ -60,12 +60,12 @@ class Work:
     limit: float = 0.0  # range of readings below which there is no motion, rad
 
     @property
-    def made_of(self) -> Accelerometer | None:
+    def angle_source(self) -> Accelerometer | None:
         """Accelerometer from which the angle was computed; None if it was not."""
         made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
         return self.accelerometer if made else None
 
-    def say(
+    def report(
         self,
         what: str,
         text: str,
@@ -96,16 +96,16 @@ class Work:
         """Remove samples, if any, and report their number and the reason."""
         at = np.flatnonzero(which)
         if at.size:
-            self.say(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
+            self.report(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
             self.keep(~which)
 
     def distrust(self, at: Indices, what: str, text: str) -> None:
         """Exclude samples, if any, from fits, and report them."""
         if at.size:
             self.trusted[at] = False
-            self.say(what, text, at=at)
+            self.report(what, text, at=at)
 
-    def apart(self) -> tuple[list[Work], list[Finding]]:
+    def split_by_release(self) -> tuple[list[Work], list[Finding]]:
         """Return a record for each release, and the findings that belong to none of them.
 
         The first includes the samples before its release, the last those after it.

@@ -144,7 +144,7 @@ def test_a_different_steady_state_is_reported(tmp_path: Path) -> None:
     said = str(comparison)
     assert "settles on rotation 1:1; the model on" in said
     assert "not on the measured one" in said
-    assert "something is missing in the model" in said
+    assert "the model does not describe this run" in said
 
 
 def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -> None:
@@ -191,11 +191,11 @@ def test_runs_that_cannot_be_compared_are_left_out_with_a_reason(tmp_path: Path)
     found = compare(RIG, Experiment(tmp_path, (free, lost, still, short)))
     assert [one.run.name for one in found.every] == ["free"]
     why = dict(found.left_out)
-    assert why["lost"] == "what drives it is not known"
+    assert why["lost"] == "neither its drive nor its pivot is given"
     assert why["still"] == "nothing moves in it"
     assert "too short: 9 samples over 0.16 s" in why["short"]
-    assert "lost: not compared: what drives it is not known" in str(found)
-    with pytest.raises(InputError, match="no run can be compared: lost: what drives"):
+    assert "lost: not compared: neither its drive nor its pivot is given" in str(found)
+    with pytest.raises(InputError, match="no run can be compared: lost: neither its drive"):
         compare(RIG, Experiment(tmp_path, (lost,)))
     # The model's own drive has no part in a free decay.
     driven = compare(dataclasses.replace(RIG, p=0.8, Omega=12.0), Experiment(tmp_path, (free,)))

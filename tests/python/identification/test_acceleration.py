@@ -152,7 +152,7 @@ def test_a_model_is_compared_with_an_accelerometer(tmp_path: Path) -> None:
 def test_diagnose_requires_an_angle(tmp_path: Path) -> None:
     time, _, force = readings()
     there = pendmap.read_experiment(experiment(tmp_path, TANGENTIAL % 0.1, time, force))
-    with pytest.raises(InputError, match="its angle is made of an acceleration"):
+    with pytest.raises(InputError, match="its angle is computed from an acceleration"):
         split_records(there)
 
 

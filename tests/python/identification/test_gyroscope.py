@@ -275,6 +275,6 @@ def test_figure_model_and_comparison_of_a_gyroscope(tmp_path: Path) -> None:
 
 def test_diagnose_requires_an_angle(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates()))
-    with pytest.raises(InputError, match="its angle is a velocity integrated") as fault:
+    with pytest.raises(InputError, match="its angle is an integrated velocity") as fault:
         split_records(there)
     assert "\n" not in str(fault.value)

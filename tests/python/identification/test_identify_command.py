@@ -127,7 +127,7 @@ def test_drag_is_tried_where_the_residual_exceeds_the_noise(
             ("compare", "bare.toml", "decay.csv"),
             "bare.toml: has no dimensions, it must be a model in SI",
         ),
-        (("compare", "model.toml", "idle"), "run_00: what drives it is not known"),
+        (("compare", "model.toml", "idle"), "run_00: neither its drive nor its pivot is given"),
         (("compare", "bare.toml", "decay.csv"), "in SI: in [pendulum] w0 in rad/s, c_over_m ="),
         (("compare", "model.png", "decay.csv", "--plot", "model.png"), "'model.png': is an input"),
         (("identify", "forced", "--out", "forced/experiment.toml"), "is an input, which would"),

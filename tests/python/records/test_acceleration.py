@@ -133,7 +133,7 @@ def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
     there = experiment(tmp_path, column(PLACE % 0.1), time, force)
     with (there / "experiment.toml").open("a", encoding="utf-8") as file:
         file.write("drive = { p = 0.1, Omega = 12 }\n")
-    with pytest.raises(InputError, match="forced run holds the pivot's own: it must be a free"):
+    with pytest.raises(InputError, match="forced run includes the pivot's: it must be a free"):
         read(there)
 
 
@@ -162,7 +162,7 @@ def test_spikes_of_the_sensor_are_left_out(tmp_path: Path) -> None:
 
 BESIDE = {
     "agrees": (PLACE % 0.1, 1.0, "acceleration-agrees", "0.1 m: a check, not fitted"),
-    "turned": (PLACE % 0.1, -1.0, "sign-turned", "turned round"),
+    "turned": (PLACE % 0.1, -1.0, "sign-turned", "inverted to agree"),
     "elsewhere": (PLACE % 0.15, 1.0, "acceleration-scale", "distance_m would be 0.1"),
     "radial": ('direction = "radial", distance_m = 0.1', 1.0, "acceleration-unlike", "not used"),
     "unplaced": ('unit = "m/s2"', 1.0, "acceleration-unused", "distance_m 0.1"),

@@ -217,7 +217,7 @@ def test_slow_turns_between_lines_are_not_clipped(tmp_path: Path, form: str) -> 
 def test_one_end_of_a_sensor_is_reported_once(tmp_path: Path, limit: float) -> None:
     time, theta = clean(start=3.0, duration=12.0)
     run = read(tmp_path, text((time, np.minimum(theta, limit))))
-    assert found(run)["clipped"].text.startswith(f"the sensor ends at {limit:.4g} rad: ")
+    assert found(run)["clipped"].text.startswith(f"the sensor's range ends at {limit:.4g} rad: ")
 
 
 @pytest.mark.parametrize("gain", [0.75, 1.5])

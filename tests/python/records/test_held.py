@@ -119,7 +119,7 @@ def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     report = identify_experiment(read)
     told = summary.as_json(report)
     assert told["table1"] == []
-    assert "made of an acceleration" in told["table1_left_out"]
+    assert "computed from an acceleration" in told["table1_left_out"]
     assert not summary.table1_table(report)[1]
     assert sum("no errors of periods and peaks" in line for line in summary.as_text(report)) == 1
     beside = compare(report.model, read)
@@ -129,7 +129,7 @@ def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     run = compared.as_json(beside)["runs"][0]
     assert run["peaks"] == run["periods"] == []
     assert run["peak_rms_percent"] is None
-    assert any("made of an acceleration" in line for line in compared.as_text(beside))
+    assert any("computed from an acceleration" in line for line in compared.as_text(beside))
 
 
 def test_figures_of_a_reconstructed_angle_explain_the_missing_judgement(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_figures_of_a_reconstructed_angle_explain_the_missing_judgement(tmp_path
     for sheet in (identification.sheet(report), comparison.sheet(compare(report.model, read))):
         made = drawing.draw(sheet, dpi=50)
         words = written(made)
-        assert "made of an acceleration, too roughly to judge a model" in words
+        assert "computed from an acceleration, too inaccurate to judge a model" in words
         assert not any("error of each" in axes.get_title() for axes in made.axes)
 
 

@@ -121,8 +121,8 @@ def test_nothing_before_the_edge_is_used(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("trigger", "says"),
     [
-        (lambda t: 0 * t, "no two levels"),
-        (lambda t: np.sin(40 * t), "no two levels"),
+        (lambda t: 0 * t, "not have two levels"),
+        (lambda t: np.sin(40 * t), "not have two levels"),
         (lambda t: pulses(t, np.arange(0.3, 20, 0.5)), "three swings and less"),
         (lambda t: pulses(t, np.sort(np.random.default_rng(1).uniform(0, 20, 30)), 0.02), "three"),
     ],

@@ -36,7 +36,7 @@ def test_turning_points_are_recognised(tmp_path: Path, start: float, every: int)
     assert 'peaks = "theta_rad"' in found(run)["peaks-undeclared"].text
     assert run.peaks_only
     assert not run.trusted.any()
-    with pytest.raises(InputError, match="turning points alone"):
+    with pytest.raises(InputError, match="turning points only"):
         pendmap.read_experiment(tmp_path / run.file).refuse_still([run])
 
 

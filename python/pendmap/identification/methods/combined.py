@@ -135,7 +135,7 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
     if gaps.size:
         parts = np.split(np.arange(len(small)), gaps + 1)
         longest = max(parts, key=len)
-        warnings.append(f"peaks are missing: the longest row of {longest.size} is used")
+        warnings.append(f"peaks are missing: the longest sequence, of {longest.size}, is used")
         small = small.select(np.isin(np.arange(len(small)), longest))
     return small, warnings
 
@@ -184,7 +184,7 @@ def from_peaks(
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
     found = compute(values)
     if not np.isfinite(found).all():
-        text = "not applicable: a difference of peaks has the wrong sign, 2.7 has no logarithm"
+        text = "not applicable: a difference of peaks has the wrong sign: no logarithm in eq. 2.7"
         return Identification(warnings=(*warnings, text), applicable=False)
     covariance = propagated(compute, values, stderr)
     draws = bootstrap(compute, values, stderr)
@@ -194,8 +194,8 @@ def from_peaks(
     intervals = {n: (float(low[j]), float(high[j])) for j, n in enumerate(names)}
     if failed > 0.01:  # noqa: PLR2004 (an interval at 95 % hardly notices fewer)
         warnings.append(
-            f"noise turns a difference of peaks round in {failed:.0%} of simulated repetitions: "
-            "the errors are too small"
+            f"noise reverses the sign of a difference of peaks in {failed:.0%} of simulated "
+            "repetitions: the errors are too small"
         )
     warnings += unphysical(dict(zip(names, found, strict=True)))
     return Identification(

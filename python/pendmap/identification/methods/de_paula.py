@@ -65,8 +65,8 @@ def from_peaks(
     for name, misfit in (("exponential", rate_misfit), ("linear", fall_misfit)):
         if misfit > MISFIT and turned.known:
             warnings.append(
-                f"the decay is not {name} where it is taken for it: chi^2 per degree of freedom "
-                f"is {misfit:.3g}; the errors are widened by it, and yet too small"
+                f"the decay is not {name} in the assumed range: chi^2 per degree of freedom "
+                f"is {misfit:.3g}; the errors are widened accordingly, but still too small"
             )
 
     def compute(values: Floats) -> Floats:

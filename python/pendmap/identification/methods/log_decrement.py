@@ -75,8 +75,8 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     if misfit > MISFIT:
         warnings.append(
             f"the decay is not exponential: chi^2 per degree of freedom is {misfit:.3g} about a "
-            f"straight line of decrement {-decrements[1] / math.pi:.3g}; what is not viscous is "
-            "not in the errors"
+            f"straight line of decrement {-decrements[1] / math.pi:.3g}; the errors do not "
+            "include non-viscous damping"
         )
     names = ("w0", "c_over_m")
     warnings += unphysical(dict(zip(names, found, strict=True)))

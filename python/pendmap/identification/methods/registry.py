@@ -64,9 +64,7 @@ class Method:
     ) -> Identification:
         """Identify the damping from peaks, and from samples (s, rad) if given."""
         if self.needs_samples and record is None:
-            text = (
-                "not applicable: the record holds peaks alone, and this method needs every sample"
-            )
+            text = "not applicable: the record has peaks only, and this method needs every sample"
             return Identification(self.name, warnings=(text,), applicable=False)
         given = {"record": record} if self.reads_samples else {}
         found = self.compute(peaks, **given)

@@ -141,7 +141,7 @@ def _warnings(
             low, high = estimates[name].ci95 or (-math.inf, math.inf)
             reaches = low <= 0 <= high
             why = "its interval reaches 0" if reaches else "an effect is missing in the model"
-            found.append(f"{name} is {estimates[name].value:.3g}, which no pendulum has: {why}")
+            found.append(f"{name} is {estimates[name].value:.3g}, which is unphysical: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         found.append(
@@ -156,14 +156,16 @@ def _warnings(
     wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None]
     if lost:
-        found.append(f"no end was found for the interval of {', '.join(lost)}")
+        found.append(f"no finite interval was found for {', '.join(lost)}")
     laws = [reading.law for reading in readings if reading.law]
-    found += [f"{law}: each reading counts by the noise at its {law.grows_with}" for law in laws]
+    found += [
+        f"{law}: readings are weighted by the noise at their {law.grows_with}" for law in laws
+    ]
     coarse = [f"{r.gain * r.count:.3g} {r.unit}" for r in readings if r.coarse]
     if coarse:
         found.append(
             f"the sensor's count ({', '.join(dict.fromkeys(coarse))}) is coarser than its noise: "
-            "readings are taken for intervals"
+            "readings are fitted as intervals"
         )
     return found
 
@@ -279,7 +281,7 @@ def fit_together(
     the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted.
     """
     if not runs:
-        raise InputError("runs must hold one record or more, got none")
+        raise InputError("runs must have one record or more, got none")
     readings = [reading_of_run(run) for run in runs]
     fit, worth = fit_from_start(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
