@@ -11,6 +11,12 @@ class Thresholds:
 
     ``benchmarks/blind/thresholds.py`` halves and doubles each of them and counts how many verdicts
     change; the table is in ``docs/diagnose.md``.
+
+    Examples
+    --------
+    >>> from pendmap.diagnosis import Thresholds
+    >>> Thresholds(chance=1e-4).chance
+    0.0001
     """
 
     # Probability that noise alone gains as much, times the numbers of candidates and of the

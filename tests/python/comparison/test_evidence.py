@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
+from pendmap import InputError
 from pendmap.comparison.data import split_records
-from pendmap.errors import InputError
 from pendmap.records import Experiment, Run
 
 TIME = np.arange(1500) * 0.01

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from hidden import diagnosed
-from pendmap import virtual_rig
+from pendmap import InputError, virtual_rig
 from pendmap.diagnosis import diagnose
-from pendmap.errors import InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.records import read_experiment
 

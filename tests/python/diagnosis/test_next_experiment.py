@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hidden import once
-from pendmap import virtual_rig
+from pendmap import InputError, virtual_rig
 from pendmap.diagnosis import Discrepancy, diagnose
 from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.next_experiment.information import Columns, Information, Prospects
@@ -22,7 +22,6 @@ from pendmap.diagnosis.next_experiment.limits import required_gain
 from pendmap.diagnosis.next_experiment.power import chance_resolved, chance_wrong_name
 from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.summary import as_json
-from pendmap.errors import InputError
 from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan

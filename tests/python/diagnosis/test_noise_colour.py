@@ -9,7 +9,7 @@ import pytest
 
 from hidden import diagnosed
 from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, noise_of, swing
-from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.diagnosis import Thresholds
 
 if TYPE_CHECKING:
     from pathlib import Path

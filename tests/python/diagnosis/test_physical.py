@@ -11,14 +11,13 @@ from scipy.integrate import solve_ivp
 
 from driven_decays import motion
 from hidden import diagnosed
-from pendmap import report, virtual_rig
+from pendmap import InputError, report, virtual_rig
 from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis import diagnose, diagnosed_model
 from pendmap.diagnosis.candidates import Candidate
 from pendmap.diagnosis.fitted_model import FittedModel, fit_model, impose_physics
 from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.summary import as_json
-from pendmap.errors import InputError
 from pendmap.model import Effect, Rig, save_model
 from pendmap.records import Experiment, Run, read_experiment
 

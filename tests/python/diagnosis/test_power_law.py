@@ -13,15 +13,14 @@ from driven_decays import motion
 from hidden import diagnosed
 from pendmap import virtual_rig
 from pendmap.comparison.data import split_records
+from pendmap.diagnosis import diagnosed_model
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
-from pendmap.diagnosis.diagnose import diagnosed_model
 from pendmap.diagnosis.fitted_model import fit_with_candidates
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.runs import FitRun
 from pendmap.identification.sensitivity import window_slopes
-from pendmap.model import Formula, Rig, load_model, save_model
-from pendmap.model.effects import Effect
+from pendmap.model import Effect, Formula, Rig, load_model, save_model
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ import pendmap
 from driven_decays import motion
 from hidden import diagnosed, once
 from pendmap.comparison.data import split_records
+from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import ScoredModel, State
-from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import Alternative, Identifiability, decide_verdict, probabilities
 from pendmap.records import Experiment, Run
 from pendmap.residuals.by_run import RunByRun, parameters_by_run

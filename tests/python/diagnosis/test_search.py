@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap import read_experiment, virtual_rig
+from pendmap import FitDiverged, InputError, read_experiment, virtual_rig
 from pendmap.comparison.data import DataSplit, split_records
+from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import CORE, Candidate
 from pendmap.diagnosis.fitted_model import fit_with_candidates
 from pendmap.diagnosis.hold_out import hold_out_losses
 from pendmap.diagnosis.search import prune_effects, search
 from pendmap.diagnosis.state import State
-from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import compare_alternatives
-from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.records import Experiment, Run
 

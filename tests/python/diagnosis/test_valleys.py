@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from hidden import diagnosed
-from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.verdict import probabilities
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.methods.trajectory import fit_decay
 from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun
-from pendmap.model.effects import Effect
+from pendmap.model import Effect
 
 TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
 NAMES = ("w0", "c_over_m", "Tr", "encoder_offset.d")

@@ -11,15 +11,14 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap.errors import InputError
+from pendmap import InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.trajectory import fit_decay, identify
 from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun, Pivot
 from pendmap.identification.sensitivity import sensitivities
 from pendmap.identification.turning import rough_start
-from pendmap.model import Rig
-from pendmap.model.effects import Effect
+from pendmap.model import Effect, Rig
 
 TIME = np.arange(3000) * 0.01
 TRUTH = {"w0": 6.2, "c_over_m": 0.062, "friction": 0.1}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from pendmap.errors import InputError
+from pendmap import InputError
 from recorded import experiment, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
