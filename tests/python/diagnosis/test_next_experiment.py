@@ -141,7 +141,7 @@ def test_exact_equals_are_told_apart_by_no_proposal() -> None:
     assert {frozenset(pair) for pair in outlook.equals} == {
         frozenset(("bias_torque", "asymmetric_coulomb"))
     }
-    assert "No free decay tells" in found.advice.next_experiment
+    assert "No free decay distinguishes" in found.advice.next_experiment
     assert "bias_torque" not in outlook.about or "asymmetric_coulomb" not in outlook.about
 
 
