@@ -75,7 +75,7 @@ def parts(found: Discrepancy) -> dict[str, Chart]:
         made[name] = Chart.of(title, said, rows, size=(SIZE[0], high), letters=False)
 
     rows = [[panel] for panel in residuals(found)]
-    add("residuals", "Residuals", "the runs that the baseline misses most", rows, 4.2)
+    add("residuals", "Residuals", "the runs with the largest residuals of the baseline", rows, 4.2)
     starts = " and ".join(f"{one.starts} {one.kind}" for one in found.forecasts)
     said = f"forecasts from {starts} starts on what was held out" if starts else ""
     panels = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
@@ -280,7 +280,7 @@ def ranking(found: Discrepancy) -> Panel:
     best = [found.scores.scores[k] for k in found.scores.best()[:RANKED]]
     level = found.base.fitted.noise.level
     values = [max(score.gain / level, 0.1) for score in best]
-    said = {AFTER: "found", ALIKE: "not told apart from it", OTHER: "not taken"}
+    said = {AFTER: "found", ALIKE: "indistinguishable from it", OTHER: "not accepted"}
     boxes: dict[str, list[Floats]] = {}
     ticks = []
     for place, (score, value) in enumerate(zip(best, values, strict=True)):
@@ -365,7 +365,7 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
     for which, place, mark, said in (
         (known & (most > high), high - 0.03 * inner, "^", "beyond the axis"),
         (known & (least < low), low + 0.03 * inner, "v", "beyond the axis"),
-        (~known, low + 0.06 * inner, "x", "does not show"),
+        (~known, low + 0.06 * inner, "x", "undetectable"),
     ):
         x = at[which]
         if x.size:

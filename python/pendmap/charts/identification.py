@@ -240,7 +240,7 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
 
 def errors(report: IdentificationReport) -> Chart:
     """Return the errors of periods and peaks of every model."""
-    title, known = "What simulated periods and peaks miss of the measured ones", report.table.errors
+    title, known = "Errors of simulated periods and peaks", report.table.errors
     if report.table.left_out:
         return nothing(title, report.table.left_out)
     return errors_of({name: known[name] for name in drawn(known)}, report.peaks, title)
@@ -342,7 +342,7 @@ def table(report: IdentificationReport) -> Chart:
     ]
     high = down + len(notes) - 0.9
     panel = bare("table", Table(head, body), *words, high=high)
-    title = "Damping by each method, and what its simulation misses (%)"
+    title = "Damping by each method, and errors of its simulation (%)"
     return Chart(title, "", [panel], size=(WIDTH, 0.55 + LINE * high))
 
 

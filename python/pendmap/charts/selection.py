@@ -145,7 +145,7 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
         "mean_settle": total / settled if settled else -1.0,
         "longest_settle": longest,
     }
-    return _told(part, f"{counted(label.size, 'cell')} of {whole}")
+    return _note_selection(part, f"{counted(label.size, 'cell')} of {whole}")
 
 
 def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
@@ -163,7 +163,7 @@ def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
     )
     shares = {key: float(part[key].mean()) for key in ("undecided", "failed")}
     part.attrs = part.attrs | {"cells": regime.size} | shares
-    return _told(part, f"{counted(regime.size, 'cell')} of {whole}")
+    return _note_selection(part, f"{counted(regime.size, 'cell')} of {whole}")
 
 
 def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
@@ -188,7 +188,7 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     )
     if kept.all() and loose.all():
         return part
-    return _told(part, f"{counted(values.size, 'value')}")
+    return _note_selection(part, f"{counted(values.size, 'value')}")
 
 
 def _tongues(dataset: xr.Dataset) -> xr.Dataset:
@@ -221,14 +221,15 @@ def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.N
     return np.where(numbers < 0, -1, place)
 
 
-def _told(part: xr.Dataset, which: str) -> xr.Dataset:
+def _note_selection(part: xr.Dataset, which: str) -> xr.Dataset:
     """Add to the summary which part is shown, and that the remaining text is about the whole."""
     spans = [
         f"{name} = {low:.6g} to {high:.6g}"
         for name in reversed(_axes(part))
         for low, high in [plane.outer_edges(part, name)]
     ]
-    said = f"A part is shown: {', '.join(spans)}, {which}. What follows is of the whole."
+    said = f"A part is shown: {', '.join(spans)}, {which}."
+    said += " The text below describes the whole result."
     part.attrs = part.attrs | {"summary": f"{said}\n{part.attrs['summary']}"}
     return part
 

@@ -156,8 +156,8 @@ def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
         yield
     except FitDiverged as error:
         raise InputError(
-            f"{experiment.path}: no model follows these records: {error}. A run under a drive "
-            'must have the drive, in an experiment.toml: kind = "forced"'
+            f"{experiment.path}: no model can be fitted to these records: {error}. A forced run "
+            'must have kind = "forced" and its drive in an experiment.toml'
         ) from None
 
 

@@ -95,8 +95,8 @@ class TorqueFunction:
         except Exception as error:  # noqa: BLE001 (whatever a user's function may raise)
             said = " ".join(str(error).split())
             raise InputError(
-                f"function '{self.name}' must take arrays and return an array as long, it "
-                f"fails with {type(error).__name__}: {said}"
+                f"function '{self.name}' must accept arrays and return an array of equal length; "
+                f"it raised {type(error).__name__}: {said}"
             ) from None
         if not np.isfinite(values).all():
             k = int(np.flatnonzero(~np.isfinite(values))[0])

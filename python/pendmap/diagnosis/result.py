@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 SAID: Final = {
     "none": "none: the baseline describes the records to within their noise",
     "named": "named: the effects below explain what the baseline lacks",
-    "partial": "partial: the effects below close a part of the gap, and something is left",
-    "ambiguous": "ambiguous: these records do not tell the effects of a class apart",
+    "partial": "partial: the effects below close part of the gap; significant residuals remain",
+    "ambiguous": "ambiguous: these records do not distinguish the effects of a class",
     "unknown": "unknown: something is missing that no candidate explains",
 }
 
@@ -193,7 +193,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             for name, value in effect.parameters.items()
         )
         nearly = (
-            ", with reserve: what is missing may only resemble it" if effect.approximate else ""
+            ", with reserve: the missing effect may only resemble it" if effect.approximate else ""
         )
         share = next(
             100 * s.closed for s in assessment.identified if s.candidate.name == effect.name
@@ -205,22 +205,22 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         )
         for name, value in effect.elsewhere.items():
             said = f"{name} = {value:.4g} {units[name]}".rstrip()
-            yield f"    or {said}, which does as well: the records do not tell which"
+            yield f"    or {said}, which fits equally well"
     for names in found.equivalent:
-        yield f"  not told apart here: {', '.join(names)}"
+        yield f"  indistinguishable in these records: {', '.join(names)}"
     if found.without:
-        yield f"  left out of the candidates: {', '.join(found.without)}"
+        yield f"  excluded from the candidates: {', '.join(found.without)}"
     if found.most == 0 and found.verdict != "none":
         yield "  no candidate was fitted: at most 0 effects were allowed"
     if found.verdict == "unknown" and found.nearest.fitted.names:
-        yield f"  nearest, and not claimed: {', '.join(found.nearest.fitted.names)}"
+        yield f"  nearest effects, not claimed: {', '.join(found.nearest.fitted.names)}"
     yield (
         f"Residual, rms: {gap.before:.4g} rad before, {gap.after:.4g} after, noise "
         f"{gap.noise_floor:.4g}; held out {gap.held_out_before:.4g} before, "
         f"{gap.held_out_after:.4g} after, noise {gap.held_out_noise_floor:.4g}"
     )
     if assessment.identified:
-        by = "" if found.effects else " by what is nearest"
+        by = "" if found.effects else " by the nearest effects"
         yield f"Share of the squared gap closed{by}: {100 * max(assessment.closed, 0.0):.0f} %"
     yield from zeroed(found)
     yield from _between(found)
@@ -234,7 +234,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     for score in found.functions:
         yield (
             f"Function {score.name}, to first order: {score.size:.3g} +- {score.stderr:.2g} times "
-            f"it, G = {score.gain:.1f}; {score.left:.1f} beside the effects found"
+            f"it, G = {score.gain:.1f}; {score.left:.1f} in addition to the effects found"
         )
     yield from _further(found)
     yield from finding_lines(found.data.experiment, *runs)
@@ -248,7 +248,7 @@ def _between(found: Discrepancy) -> Iterator[str]:
             yield (
                 f"{name} differs from run to run by {between:.3g} "
                 f"{unit_of(name, found.definition)}".rstrip()
-                + ", more than its error: intervals are wider by it"
+                + ", more than its error: intervals include this"
             )
 
 
@@ -281,13 +281,13 @@ def confined(found: Discrepancy) -> Iterator[str]:
     """Yield a line for each effect of the model that no map over initial conditions can include."""
     for effect in found.best.fitted.fit.model.effects:
         if effect.definition["mappable"] == "no":
-            yield f"{effect.name}: simulate, compare and diagnose can have it; no map has it"
+            yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
 
 
 def zeroed(found: Discrepancy) -> Iterator[str]:
     """Yield a line for each coefficient fixed at 0."""
     for name in found.best.fitted.zeroed:
-        yield f"{name} is held at 0: the fit would make it negative, and no pendulum drives itself"
+        yield f"{name} is fixed at 0: the fit would make it negative, which is unphysical"
 
 
 def ranking(found: Discrepancy) -> list[dict[str, Any]]:

@@ -98,7 +98,7 @@ def _recoloured(chart: Chart, colormap: str) -> Chart:
         panels.append(dataclasses.replace(panel, marks=marks))
     if not found:
         raise InputError(
-            f"colormap {colormap!r}: this figure has none; its colours tell attractors apart"
+            f"colormap {colormap!r}: this figure has none; its colours identify attractors"
         )
     return dataclasses.replace(chart, panels=panels)
 

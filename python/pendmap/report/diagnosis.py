@@ -14,7 +14,7 @@ from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
 from pendmap.report.document import Document, Picture, bullets, code, plain, table
 from pendmap.report.gap import gap, verdict, where
-from pendmap.report.outlook import following, set_aside
+from pendmap.report.outlook import exclusions, following
 from pendmap.report.wording import (
     before_and_after,
     gained,
@@ -70,7 +70,7 @@ def diagnosis(found: Discrepancy) -> Document:
         ranked(found),
         parameters_by_run(found),
         following(found),
-        set_aside(found),
+        exclusions(found),
     )
     blocks = (lead(found), *(block for part in parts for block in part))
     return Document(f"What the model of {name} lacks", blocks)
@@ -85,9 +85,9 @@ def added(found: Discrepancy) -> Iterator[str]:
             f"{values(effect)}{_elsewhere(effect)}{_strength(found, effect)}"
             for effect in found.effects
         )
-        yield "How the other parameters moved:"
+        yield "Changes of the other parameters:"
     else:
-        yield "Nothing: no effect is claimed. The model given out is the baseline."
+        yield "Nothing: no effect is claimed. The resulting model is the baseline."
     yield _parameters(found)
     yield from map(plain, zeroed(found))
 
@@ -120,7 +120,7 @@ def _terms(found: Discrepancy) -> Iterator[str]:
 def _elsewhere(effect: NamedEffect) -> str:
     """Return the other shapes with which an effect fits equally well."""
     return "".join(
-        f". With {name} = {number(value, 4)} it does as well: the records do not tell which"
+        f". With {name} = {number(value, 4)} it fits equally well"
         for name, value in effect.elsewhere.items()
     )
 
@@ -134,7 +134,7 @@ def _strength(found: Discrepancy, effect: NamedEffect) -> str:
     )
     if strength is None:
         why = plain(reasons["strength"])
-        return f". How strong it is over these records is not computed: {why}"
+        return f". Its strength over these records is not computed: {why}"
     if strength.torque > 0:
         w0, friction = fit["w0"], fit.estimates.get("Tr")
         against = ""
@@ -147,7 +147,7 @@ def _strength(found: Discrepancy, effect: NamedEffect) -> str:
         )
     if strength.reading > 0:
         return (
-            f". It moves the readings by {mrad(strength.reading)} rms, at most "
+            f". It changes the readings by {mrad(strength.reading)} rms, at most "
             f"{mrad(strength.greatest_reading)}"
         )
     return ""
@@ -191,7 +191,7 @@ def parameters_by_run(found: Discrepancy) -> Iterator[str | Picture]:
         yield "There is no effect to compare between runs."
         return
     if len(names) == 1:
-        yield "There is one run, and nothing to compare it with."
+        yield "There is one run only: no comparison between runs."
     for size in sizes:
         nearest = found.nearest.fitted
         said = _said(nearest.fit.estimates[size], math.sqrt(nearest.widening))
@@ -211,7 +211,7 @@ def parameters_by_run(found: Discrepancy) -> Iterator[str | Picture]:
         head = ("run", f"value ({label})" if label else "value", "standard error, the others held")
         yield table(head, [(code(n), within(v, e), number(e, 2)) for n, v, e in shown])
         if blind:
-            yield f"It does not show in {joined(blind)}."
+            yield f"It is undetectable in {joined(blind)}."
     if len(names) > 1:
         yield Picture("runs", "Each run's own value, the other parameters held, with bars of 95 %.")
 
@@ -231,19 +231,21 @@ def ranked(found: Discrepancy) -> Iterator[str | Picture]:
     if found.functions:
         yield (
             "Python functions that were tried: to first order only, and never refitted or named. "
-            "G is what the function would take off the sum of squares at the baseline, then beside "
-            "the effects found, if there are any:"
+            "G is the fall of the sum of squares by the function at the baseline, and then in "
+            "addition to the effects found, if there are any:"
         )
         scores = [
             (
                 code(score.name),
-                stated(score.size, score.stderr) if math.isfinite(score.size) else "does not show",
+                stated(score.size, score.stderr) if math.isfinite(score.size) else "undetectable",
                 gained(score.gain),
                 gained(score.left),
             )
             for score in found.functions
         ]
-        yield table(("function", "times its torque", "score G", "G beside what was found"), scores)
+        yield table(
+            ("function", "times its torque", "score G", "G beyond the effects found"), scores
+        )
     for each in found.assessment.identified:
         yield from _alternatives(found, each)
 
@@ -252,9 +254,9 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[str]:
     """Yield the table of alternatives of an effect."""
     name = code(each.candidate.name)
     if not each.alternatives:
-        yield f"Nothing else of the library could stand in for {name}."
+        yield f"No other effect of the library could replace {name}."
         return
-    claimed = "" if found.effects else ", which comes nearest and is not claimed"
+    claimed = "" if found.effects else ", the nearest effect, not claimed"
     yield (
         f"In the place of {name}{claimed} (gain {gained(each.gain)}): the separation s is the part "
         "of that gain which another effect does not reach."
@@ -279,5 +281,5 @@ def _why(alternative: Alternative) -> str:
     if alternative.contains:
         return "does the same with more parameters and gains no more"
     if alternative.alike:
-        return f"not told apart: behind by less than {Thresholds().alike:g}, or by one run alone"
+        return f"indistinguishable: behind by less than {Thresholds().alike:g}, or by one run alone"
     return "refitted, explains less" if alternative.refitted else "scored, explains less"

@@ -28,17 +28,18 @@ if TYPE_CHECKING:
 
 SAID: Final = {
     "none": "the model describes the records to within their noise.",
-    "named": "what was found explains all that the model lacked.",
-    "ambiguous": "a class of effects explains it, which these records do not tell apart.",
-    "partial": "what was found closes most of the gap, and something is left: its form is only "
-    "nearly right.",
+    "named": "the effects found explain the whole gap.",
+    "ambiguous": "several effects explain the gap equally well; these records do not distinguish "
+    "them.",
+    "partial": "the effects found close part of the gap, and residuals remain: their form is only "
+    "approximate, or a further effect is missing.",
     "unknown": "something is missing that no candidate explains. No name is claimed.",
 }
 
 PROBABILITY: Final = (
-    "The probability of a name is that it is right, given that the effect is in the library. "
-    "Blind experiments gave it: it is lower the more is left, the more effects it took and the "
-    "weaker the effect is beside the strongest."
+    "The probability of a name is that it is right, given that the effect is in the library. It "
+    "was calibrated on blind experiments, and falls with the remaining residual, with the number "
+    "of effects, and with the weakness of the effect relative to the strongest."
 )
 
 RARE: Final = 1e-9  # Smallest reported probability
@@ -61,11 +62,11 @@ def verdict(found: Discrepancy) -> Iterator[str]:
             f"{values(effect)}; probability {chance(effect.probability)}"
             for effect in found.effects
         )
-        shared = " Names that are not told apart share it." if found.verdict == "ambiguous" else ""
+        shared = " Indistinguishable names share it." if found.verdict == "ambiguous" else ""
         yield PROBABILITY + shared
     for names in found.equivalent:
-        yield f"Not told apart here: {joined(names)}."
-    yield "It rests on this:"
+        yield f"Indistinguishable in these records: {joined(names)}."
+    yield "Statistics of the verdict:"
     yield bullets(_statistics(found))
 
 
@@ -75,8 +76,8 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
     form, limits = judged.form, Thresholds()
     yield (
         f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
-        f"1; the doubt about the noise allows up to {number(judged.ratio_allowed, 4)}. On what was "
-        f"held out it is {number(judged.ratio_held, 4)}."
+        f"1; the uncertainty of the noise allows up to {number(judged.ratio_allowed, 4)}. On "
+        f"held-out data it is {number(judged.ratio_held, 4)}."
     )
     left = {
         "slow": "as much in the slow part of the residuals",
@@ -85,7 +86,7 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
         "effects": "as much for an effect that is not in the model to explain",
     }
     if form.further is not None:
-        left["effects"] += f" ({code(form.further)} would take up most)"
+        left["effects"] += f" ({code(form.further)} would explain most)"
     if judged.identified:
         most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
         left["held_out"] = f"{number(most, 3)} of chi-squared over degrees of freedom held out"
@@ -96,9 +97,9 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
         yield f"Noise alone would leave {what} with a probability {said}."
     count = len(form.chances)
     yield (
-        f"The least of these {count} probabilities, times {count} because so many were looked at, "
-        f"is {number(form.chance, 2) if form.chance > RARE else rare}. Below "
-        f"{limits.rest:g} it counts as no chance: something is left."
+        f"The least of these {count} probabilities, times {count} (Bonferroni), is "
+        f"{number(form.chance, 2) if form.chance > RARE else rare}. Below {limits.rest:g} the "
+        "residuals are significant."
     )
 
 
@@ -127,7 +128,7 @@ def gap(found: Discrepancy) -> Iterator[str | Picture]:
     yield Picture("residuals", "Record less model where the baseline misses most.")
     if not found.forecasts:
         return
-    yield "## How far ahead the models see"
+    yield "## Forecast errors"
     yield (
         "From starts on held-out data each model runs forward without any further reading; its "
         "state at the start comes from the swing before. Root mean square errors:"
@@ -136,8 +137,7 @@ def gap(found: Discrepancy) -> Iterator[str | Picture]:
     yield before_and_after(found, ("runs", "ahead", "before", "after", "noise"), ahead)
     if any(forecast.kind == "forced" for forecast in found.forecasts):
         yield (
-            "A forced motion may be chaotic; then what the noise hides of the state grows in every "
-            "model."
+            "A forced motion may be chaotic; then errors of the initial state grow in every model."
         )
 
 
@@ -158,19 +158,18 @@ def where(found: Discrepancy) -> Iterator[str | Picture]:
     """Yield the bins with a missing torque, and the errors of periods and peaks."""
     yield "## Where the gap is"
     if found.where:
-        yield "The torque per moment of inertia that the baseline lacks stands out most clearly:"
+        yield "The torque per moment of inertia that the baseline lacks is most significant:"
         yield bullets(map(_place, found.clearest))
         yield (
-            "Each is fitted by itself, as if the torque went by that quantity alone, beyond what "
-            "damping, friction, frequency and initial states can take up. Where it really goes by "
-            "another, it may come out too large, and with either sign."
+            "Each is fitted by itself, as if the torque depended on that quantity alone, beyond "
+            "what damping, friction, frequency and initial states can explain. Where it depends on "
+            "another one, the value may be too large and of either sign."
         )
     else:
         yield (
-            f"The torque that the baseline lacks stands out nowhere by more than {STANDS_OUT:g} "
-            "standard errors."
+            f"The torque that the baseline lacks exceeds {STANDS_OUT:g} standard errors nowhere."
         )
-    yield Picture("torque", "Torque that is lacking, with bands of 95 %.")
+    yield Picture("torque", "Missing torque, with bands of 95 %.")
     rows = [
         (
             f"{'held out: ' if one.held_out else ''}{code(one.name)}",
@@ -226,11 +225,11 @@ def noise_of(found: Discrepancy) -> Iterator[str]:
         still = sigma <= np.percentile(sigma, QUIET)
         quiet, floor = (float(np.sqrt(np.mean(x[still] ** 2))) for x in (residual, sigma))
         yield (
-            "Root mean squares hang on the fast readings, which have the most noise; chi-squared "
-            "takes each residual over the noise at its own speed. Thus chi-squared over degrees of "
-            f"freedom is {number(judged.ratio)}, although the residual as a whole is as large as "
-            f"the noise: in the fifth of the readings that have the least noise, the residual is "
-            f"{mrad(quiet)} and the noise {mrad(floor)}."
+            "Root mean squares are dominated by the fast readings, which have the most noise; "
+            "chi-squared takes each residual over the noise at its own speed. Thus chi-squared "
+            f"over degrees of freedom is {number(judged.ratio)}, although the residual as a whole "
+            "is as large as the noise: in the fifth of the readings that have the least noise, the "
+            f"residual is {mrad(quiet)} and the noise {mrad(floor)}."
         )
 
 

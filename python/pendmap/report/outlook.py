@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.next_experiment.limits import MARGIN, SURELY
+from pendmap.diagnosis.next_experiment.limits import DETECTION_PROBABILITY, MARGIN
 from pendmap.formatting import counted
 from pendmap.identification.report import left_out
 from pendmap.model.labels import unit_of
@@ -38,7 +38,7 @@ MORE: Final = 1.5
 FIGURES: Final = {
     "separation": "separation",
     "interval": "half an interval of 95 %, over the value",
-    "limits": "smallest size seen, over that now",
+    "limits": "detection limit, over that now",
 }
 """Name of the figure of merit of a proposal, by aim."""
 
@@ -54,8 +54,8 @@ def following(found: Discrepancy) -> Iterator[str]:
     outlook = advice.outlook
     if outlook is not None and outlook.prospects:
         yield (
-            "Each line is the best of a kind of run that this rig could do: run through by the "
-            "model, read as often and as well as these records, and added to them. "
+            "Each line is the best of a kind of run that this rig could do: simulated with the "
+            "model at the sampling rate and noise of these records, and added to them. "
             + _meaning(outlook)
         )
         yield _proposals(outlook)
@@ -65,8 +65,9 @@ def _meaning(outlook: Outlook) -> str:
     """Return an explanation of the figure of merit in the table of proposals."""
     if outlook.aim == "separation":
         return (
-            "The separation is the part of the gain of one name that the other cannot follow; from "
-            f"{outlook.wanted:g} on a wrong name is improbable. Now it is {gained(outlook.now)}."
+            "The separation is the part of the gain of one name that the other cannot explain; "
+            f"from {outlook.wanted:g} on a wrong name is improbable. Now it is "
+            f"{gained(outlook.now)}."
         )
     if outlook.aim == "interval":
         return (
@@ -102,15 +103,15 @@ def _proposals(outlook: Outlook) -> str:
     return table(head, rows)
 
 
-def set_aside(found: Discrepancy) -> Iterator[str]:
+def exclusions(found: Discrepancy) -> Iterator[str]:
     """Yield the parts not used, not computed or not accepted, and the detection limits."""
-    yield "## What was left out, and what would have shown"
+    yield "## Exclusions and detection limits"
     said = left_out(found.data.experiment, found.data.runs)
     texts = [plain(said.capitalize()) + "."] if said else []
     for run in found.data.runs:
         lost = int((~run.trusted).sum())
         if lost:
-            texts.append(f"{code(run.name)}: {counted(lost, 'sample')} not for fitting.")
+            texts.append(f"{code(run.name)}: {counted(lost, 'sample')} not used for fits.")
         texts += [f"{code(run.name)}: {plain(finding.text)}" for finding in run.findings]
     texts += [plain(finding.text) for finding in found.data.experiment.findings]
     if texts:
@@ -131,26 +132,26 @@ def set_aside(found: Discrepancy) -> Iterator[str]:
     ]
     if dropped:
         yield (
-            "Refitted and not taken, with the fall of the BIC and of the sum of squares on what "
+            "Refitted and not accepted, with the fall of the BIC and of the sum of squares on what "
             "was held out:"
         )
-        yield table(("effects", "beside", "fall of BIC", "gain held out"), dropped, ("beside",))
+        yield table(("effects", "added to", "fall of BIC", "gain held out"), dropped, ("added to",))
     limits = found.advice.limits
     if not limits:
         return
     yield (
         f"Of each effect that was not found, the smallest size that would have been found with "
-        f"{100 * SURELY:g} % probability, in the shape that shows it least; of a torque also over "
-        "Tr and over w0\N{SUPERSCRIPT TWO}:"
+        f"{100 * DETECTION_PROBABILITY:g} % probability, in the least detectable shape; of a "
+        "torque also over Tr and over w0\N{SUPERSCRIPT TWO}:"
     )
     rows = [_limit(found, name, limit) for name, limit in limits.items()]
     yield table(LIMITS, rows, ("parameter", "shape"))
     times = math.sqrt(found.level)
     if times > MORE:
         yield (
-            "These sizes hold beside what is missing: what the baseline leaves counts as noise "
-            f"here, {number(times, 2)} times that of the readings. In records that the model "
-            "describes the sizes would be smaller by about as much."
+            "These limits include the unexplained residual as noise, "
+            f"{number(times, 2)} times that of the readings. In records that the model describes "
+            "the limits would be smaller by about this factor."
         )
 
 
@@ -163,10 +164,10 @@ def _limit(found: Discrepancy, effect: str, limit: Limit) -> tuple[str, ...]:
     definition, size = found.definition(effect), limit.size
     parameter = str(definition["parameters"][0]["name"])
     if not math.isfinite(size):
-        return code(effect), code(parameter), "not visible in these records", "", "", ""
+        return code(effect), code(parameter), "undetectable in these records", "", "", ""
     unit = unit_of(f"{effect}.{parameter}", found.definition)
     unseen = " or ".join(map(said, limit.unseen))
-    shape = said(limit.candidate) + (f"; not visible with {unseen}" if unseen else "")
+    shape = said(limit.candidate) + (f"; undetectable with {unseen}" if unseen else "")
     row = code(effect), code(parameter), plain(f"{number(size, 2)} {unit}".rstrip()), shape
     if definition["group"] in {"drive", "reading"} or unit != unit_of("Tr"):
         return (*row, "", "")

@@ -118,8 +118,8 @@ def lead(found: Discrepancy) -> str:
     noise = f"the noise is {mrad(gap.held_out_noise_floor)}."
     if found.verdict == "none":
         return (
-            "**Nothing is missing** that these records could show: what the model leaves is their "
-            f"noise, {mrad(gap.noise_floor)}."
+            "**Nothing detectable is missing**: the residual of the model is the noise of these "
+            f"records, {mrad(gap.noise_floor)}."
         )
     if found.verdict == "named":
         return (
@@ -130,19 +130,19 @@ def lead(found: Discrepancy) -> str:
         return (
             f"**The model lacks one of a class**: "
             f"{'; '.join(joined(each, 'or') for each in found.equivalent)}. These records do not "
-            f"tell which. With the first, the residual on held-out data falls {to}; {noise}"
+            f"distinguish them. With the first, the residual on held-out data falls {to}; {noise}"
         )
     if found.verdict == "partial":
         return (
-            f"**What the model lacks is nearly** {names}, and something more. "
+            f"**The model lacks approximately** {names}, and residuals remain. "
             f"{'They close' if several else 'It closes'} {share(closed)} of the squared gap: the "
             f"residual on held-out data falls {to}; {noise}"
         )
     near = ""
     if nearest:
         part = f"{share(closed)} of its squared gap" if closed > 0 else "nothing of its gap"
-        verb = "close" if len(nearest) > 1 else "closes"
-        near = f" What comes nearest, {joined(nearest)}, {verb} {part}; no name is claimed."
+        s, verb = ("s", "close") if len(nearest) > 1 else ("", "closes")
+        near = f" The nearest effect{s}, {joined(nearest)}, {verb} {part}; no name is claimed."
     return (
         "**Something is missing that no candidate explains**. The residual on held-out data is "
         f"{mrad(gap.held_out_before)}; {noise}{near}"

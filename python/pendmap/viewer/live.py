@@ -99,7 +99,7 @@ class Live:
             self._stream.connect_grpc(url, default_blueprint=layout)
             self._stream.send_recording_name(f"trajectory: {model.title}")
             trajectory.still(self._stream, self._attrs, self._around)
-            frame.text(self._stream, "summary", f"{model.title}\n\nUnder way.")
+            frame.text(self._stream, "summary", f"{model.title}\n\nRunning.")
 
     def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
         """Collect samples; send them once there are enough."""
@@ -125,7 +125,7 @@ class Live:
         try:
             self._stream.flush(timeout_sec=_FLUSH)
         except (RuntimeError, ValueError, TimeoutError) as error:
-            raise ViewerError(f"the viewer did not take all that was sent: {error}") from None
+            raise ViewerError(f"the viewer did not accept all data sent: {error}") from None
         finally:
             self._stream.disconnect()
 

@@ -58,7 +58,7 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
     ``quadratic_drag,q=0.01``, or ``none`` alone; ``scale`` multiplies every size that is drawn.
     """
     if NONE in asked and len(asked) > 1:
-        raise InputError("effect none must be alone, got others beside it")
+        raise InputError("effect none must be alone, got other effects too")
     made: list[Effect] = []
     for text in asked:
         if text == NONE:
@@ -81,7 +81,7 @@ def draw(asked: list[str], rng: Generator, scale: float, kinds: set[str]) -> lis
         if kind.name in used:
             raise InputError(f"effect {name!r}: {kind.name} is asked for twice")
         if kind.needs not in {"", *kinds}:
-            raise InputError(f"effect {name!r} shows in {kind.needs} runs only: here are none")
+            raise InputError(f"effect {name!r} is detectable in {kind.needs} runs only, got none")
         made.append(kind.draw(rng, scale, given))
     return made
 

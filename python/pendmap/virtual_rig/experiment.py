@@ -255,13 +255,13 @@ def make(request: Request) -> Experiment:
         sensor.instants(sensor.times(plan.duration), request.stream(_SENSOR, k, 1))
         for k, plan in enumerate(plans)
     ]
-    strayed = [np.zeros_like(times) for times in instants]
+    deviations = [np.zeros_like(times) for times in instants]
     if others:
-        strayed = _strayed(Equation(parameters, drive, lab, bearing), paths, instants)
+        deviations = _deviations(Equation(parameters, drive, lab, bearing), paths, instants)
     runs = []
     for k, (plan, path) in enumerate(zip(plans, paths, strict=True)):
         reading = read(path, _true(instants[k], readings), readings)
-        gap = reading - path.angle(instants[k]) + strayed[k]
+        gap = reading - path.angle(instants[k]) + deviations[k]
         if mess is not None:
             at = plan.lab_time + instants[k]
             reading = reading + mess.reading(at, sensor, request.stream(_MESS, k, 1))
@@ -330,7 +330,7 @@ def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
     return dataclasses.replace(plan, duration=min(plan.duration, float(end)))
 
 
-def _strayed(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
+def _deviations(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
     """Return the motion minus that of a rig without effects, restarted on it every second, rad."""
     begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
     ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]

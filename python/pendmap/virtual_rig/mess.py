@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.virtual_rig.effects.base import Effect, Floats, Motion
-from pendmap.virtual_rig.effects.readings import fading
+from pendmap.virtual_rig.effects.readings import first_order_filter
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -97,7 +97,7 @@ class Mess:
         rho = math.exp(-1 / (sensor.rate * self.time))
         white = rng.standard_normal(lab.size)
         white[1:] *= math.sqrt(1 - rho**2)
-        return np.asarray(drift + self.noise * fading(white, rho), np.float64)
+        return np.asarray(drift + self.noise * first_order_filter(white, rho), np.float64)
 
     def describe(self) -> dict[str, Any]:
         """Return the entries of the truth file."""

@@ -68,7 +68,7 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
         )
     if full and not (truth.is_file() and all(_FILES.fullmatch(f.name) for f in folder.iterdir())):
         raise InputError(
-            f"{folder}: is not an experiment of the virtual rig alone, with its truth beside it: "
+            f"{folder}: is not an experiment of the virtual rig only, with its truth next to it: "
             "--replace replaces nothing else"
         )
     if truth.exists() and not replace:

@@ -97,7 +97,7 @@ def test_a_model_that_loses_the_motion_is_refused_with_the_records(tmp_path: Pat
     rows = "".join(f"{k / 100},{np.exp(-k / 2000) * np.cos(k / 20):.4f}\n" for k in range(1500))
     record.write_text(rows)
     model = pendmap.Rig.of(w0=5.0, torque=1e9)
-    with pytest.raises(InputError, match=r"run\.csv: no model follows these records: "):
+    with pytest.raises(InputError, match=r"run\.csv: no model can be fitted to these records: "):
         pendmap.diagnosis.diagnose(pendmap.read_experiment(record), model=model)
 
 

@@ -249,7 +249,7 @@ def test_effects_left_out_are_reported(hidden: str, pendmap_command: Run) -> Non
     drags = ("quadratic_drag", "power_law_drag")
     words = [word for name in drags for word in ("--without", name)]
     less = pendmap_command("diagnose", hidden, *words, "--out", "b.toml")
-    assert "left out of the candidates: quadratic_drag, power_law_drag" in less.stdout
+    assert "excluded from the candidates: quadratic_drag, power_law_drag" in less.stdout
 
 
 @pytest.mark.thorough

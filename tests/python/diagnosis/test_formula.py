@@ -71,7 +71,7 @@ def test_functions_are_scored_beside_effects(tmp_path: Path) -> None:
     assert found.verdict not in {"none", "named"}
     shares = [line for line in as_text(found) if line.startswith("Share")]
     assert len(shares) == bool(found.nearest.fitted.names)
-    nearest = [line for line in shares if "closed by what is nearest: " in line]
+    nearest = [line for line in shares if "closed by the nearest effects: " in line]
     assert nearest == (shares if found.verdict == "unknown" else [])
     table, slope = found.functions
     assert (table.name, slope.name) == ("table", "slope")
@@ -91,11 +91,11 @@ def test_functions_are_scored_beside_effects(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        (lambda *_: np.zeros(3), "fails with ValueError"),
+        (lambda *_: np.zeros(3), "raised ValueError"),
         (lambda th, *_: th / 0.0, "must return finite numbers"),
-        (lambda th: th, "fails with TypeError"),
-        (lambda th, _v, _t, _phase, own: own["sise"] * th, "fails with KeyError"),
-        (lambda th, *_: 1.0 if th > 0 else 0.0, "fails with ValueError"),
+        (lambda th: th, "raised TypeError"),
+        (lambda th, _v, _t, _phase, own: own["sise"] * th, "raised KeyError"),
+        (lambda th, *_: 1.0 if th > 0 else 0.0, "raised ValueError"),
     ],
 )
 def test_an_error_of_a_function_is_reported_on_one_line(

@@ -140,7 +140,7 @@ def test_no_proposal_distinguishes_equivalent_effects() -> None:
     assert {frozenset(pair) for pair in outlook.equals} == {
         frozenset(("bias_torque", "asymmetric_coulomb"))
     }
-    assert "No free decay tells" in found.advice.next_experiment
+    assert "No free decay distinguishes" in found.advice.next_experiment
     assert "bias_torque" not in outlook.about or "asymmetric_coulomb" not in outlook.about
 
 

@@ -100,8 +100,8 @@ def test_the_printed_model_equals_the_written_one(tmp_path: Path) -> None:
     assert "unphysical" not in fields
     assert fields["model_file"]["rms"] == fitted.fit.rms
     assert "Tr" not in fields["parameters"]
-    (line,) = (line for line in as_text(found) if line.startswith("Tr is held at 0"))
-    assert "no pendulum drives itself" in line
+    (line,) = (line for line in as_text(found) if line.startswith("Tr is fixed at 0"))
+    assert "unphysical" in line
     assert line in report.as_markdown(report.diagnosis(found), {})
     path = save_model(diagnosed_model(found), tmp_path / "model.toml")
     content = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -176,7 +176,7 @@ def test_scores_of_python_functions_are_reported() -> None:
         report.diagnosis(dataclasses.replace(once("quadratic_drag"), functions=scores)), {}
     )
     assert "| `table` | 0.200 \N{PLUS-MINUS SIGN} 0.013 | 81.2 | 0.4 |" in text
-    assert "| `flat` | does not show | 0 | 0 |" in text
+    assert "| `flat` | undetectable | 0 | 0 |" in text
 
 
 @pytest.mark.parametrize("size", [1.0, -1.0])

@@ -96,7 +96,7 @@ def test_the_sent_data_are_the_trajectory(tmp_path: Path) -> None:
     later = np.arange(ago[0], len(bob))
     assert np.allclose(trail[later], bob[later[:, None] - ago])
     assert "/phase/data/curve" in back.static
-    # The page "Under way." and the one that replaces it.
+    # The page "Running." and the one that replaces it.
     pages = [row[0] for row in back.columns["/summary"]["TextDocument:text"]]
     assert sum(run.attrs["summary"].split("\n")[0] in page for page in pages) == 1
     assert {"/pendulum", "/phase", "/poincare", "/state/energy"} <= set(back.views)
@@ -159,6 +159,6 @@ def test_a_viewer_that_quits_does_not_end_the_computation(tmp_path: Path) -> Non
         process.kill()
         process.wait(timeout=20)
         run = pendmap.simulate(pendulum, 1.0, 0.0, 300.0, live=live)
-        with pytest.raises(viewer.ViewerError, match="did not take all"):
+        with pytest.raises(viewer.ViewerError, match="did not accept all"):
             live.finish(run)
     assert run.sizes["time"] > 1000

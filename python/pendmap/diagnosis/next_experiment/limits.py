@@ -28,11 +28,12 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-SURELY: Final = 0.95  # Probability of detection of an effect at its detection limit
+DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
 
-HUGE: Final = 10.0  # Limit over the largest typical size above which an effect is undetectable
+UNDETECTABLE: Final = 10.0
+"""Limit over the largest typical size above which an effect is undetectable."""
 
-NOTHING: Final = "No free decay or run under the drive adds to these records."
+NOTHING: Final = "No proposed free decay or forced run adds information to these records."
 
 MARGIN: Final = 1e-6  # Smallest reported probability of a wrong name; errors of the model exceed it
 
@@ -83,7 +84,7 @@ def detection_limits(
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
-        if size > HUGE * abs(candidate.effect(units, most).parameters[candidate.size]):
+        if size > UNDETECTABLE * abs(candidate.effect(units, most).parameters[candidate.size]):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
@@ -106,7 +107,11 @@ def required_gain(threshold: float, count: int) -> float:
 
     most = (math.sqrt(threshold) + 4.0) ** 2
     return float(
-        brentq(lambda g: float(ncx2.sf(threshold, count, g)) - SURELY, threshold / 2, most)
+        brentq(
+            lambda g: float(ncx2.sf(threshold, count, g)) - DETECTION_PROBABILITY,
+            threshold / 2,
+            most,
+        )
     )
 
 
@@ -145,16 +150,16 @@ def _sentences(assessment: Assessment, outlook: Outlook | None, *, driven: bool)
     said = []
     if assessment.verdict in {"unknown", "partial"}:
         said.append(
-            "Repeat one free decay several times over an hour: whether the rest repeats, and "
-            "over what it changes, says what it is."
+            "Repeat one free decay several times over an hour: whether the residual repeats, and "
+            "what it varies with, indicates its cause."
         )
     if outlook is None:
         return said
     if outlook.best is not None:
         said.append(_recommendation(outlook, outlook.best))
-    kinds = "free decay or run under the drive" if driven else "free decay"
+    kinds = "free decay or forced run" if driven else "free decay"
     said += [
-        f"No {kinds} tells {one} from {other}: {one} is shown by "
+        f"No {kinds} distinguishes {one} from {other}: {one} is revealed by "
         f"{_revealed(assessment, one)}; {other} by {_revealed(assessment, other)}."
         for one, other in outlook.equals
     ]
@@ -176,14 +181,14 @@ def _recommendation(outlook: Outlook, best: Prospect) -> str:
     names, what = ", ".join(outlook.about), best.proposal.what
     if outlook.aim == "interval":
         return (
-            f"The least sure is {outlook.about[0]}, known to +- {100 * outlook.now:.2g} % (95 %): "
+            f"{outlook.about[0]} has the widest interval, +- {100 * outlook.now:.2g} % (95 %): "
             f"record {what}, for a predicted +- {100 * best.value:.2g} %."
         )
     if outlook.aim == "limits":
         return (
-            f"To see smaller effects, record {what}: for half of the effects not found the "
-            f"smallest size that shows falls to {100 * best.value:.2g} % of what it is now, or "
-            f"further; most for {names}."
+            f"To lower the detection limits, record {what}: for half of the effects not found the "
+            f"limit falls to {100 * best.value:.2g} % of its present value or less; most for "
+            f"{names}."
         )
     names = ", ".join(outlook.about[:-1]) + f" and {outlook.about[-1]}"
     enough = ""
@@ -196,6 +201,6 @@ def _recommendation(outlook: Outlook, best: Prospect) -> str:
     wrong = best.wrong or 0.0
     chance = f"{wrong:.1g}" if wrong >= MARGIN else f"below {MARGIN:g}"
     return (
-        f"To tell {names} apart, record {what}: predicted separation {value} (now {now}, "
+        f"To distinguish {names}, record {what}: predicted separation {value} (now {now}, "
         f"{outlook.wanted:g} wanted{enough}), chance of a wrong name {chance}."
     )

@@ -36,7 +36,7 @@ def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
     return result[: time.size]
 
 
-def fading(values: Floats, factor: float) -> Floats:
+def first_order_filter(values: Floats, factor: float) -> Floats:
     """Return ``y[k] = factor y[k - 1] + values[k]``, a first-order filter, shape (N,)."""
     return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
@@ -124,7 +124,7 @@ class SensorLag(Effect):
         end = settled(every, np.full(step_count, step))
         # Difference from the steady-state response at the start of each interval.
         jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
-        departure = fading(jumps, fade)
+        departure = first_order_filter(jumps, fade)
         k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)
         t = time - grid[k]
         return np.asarray(settled(k, t) + departure[k] * np.exp(-t / self.tau))
