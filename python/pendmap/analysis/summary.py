@@ -182,9 +182,9 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     missed = 1 - math.pow(0.05, 1 / a["searched_starts"])
     return (
         f"One chaotic attractor captures all starts: {name}, exponent "
-        f"{with_error(exponent, error)} {Units.of(a).per_time}; no sampled trajectory settled within "
-        f"{a['chaos_bound']} periods. All {a['searched_starts']} sampled starts end there: another "
-        f"attractor has at most {100 * missed:.2g} % of them (95 %).\n"
+        f"{with_error(exponent, error)} {Units.of(a).per_time}; no sampled trajectory "
+        f"settled within {a['chaos_bound']} periods. All {a['searched_starts']} sampled starts "
+        f"end there: another attractor has at most {100 * missed:.2g} % of them (95 %).\n"
         "Labels carry no information here: net turns and the finite-time exponent after "
         f"{counted(a['layer_periods'], 'period')} are shown instead."
     )
