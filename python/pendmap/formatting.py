@@ -72,15 +72,15 @@ class Readable(abc.ABC):
     """
 
     @abc.abstractmethod
-    def said(self) -> tuple[Sequence[Table], Iterable[str]]:
+    def text_parts(self) -> tuple[Sequence[Table], Iterable[str]]:
         """Return tables, each a header and rows, and the lines below them."""
 
     def __str__(self) -> str:
-        tables, lines = self.said()
+        tables, lines = self.text_parts()
         return "\n".join([*(columns(*table) for table in tables if table[1]), *lines])
 
     def _repr_html_(self) -> str:
-        tables, lines = self.said()
+        tables, lines = self.text_parts()
         below = "<br>".join(html.escape(line) for line in lines)
         return "".join(_html(*table) for table in tables if table[1]) + f"<p>{below}</p>"
 

@@ -133,7 +133,7 @@ SCHEMA = Schema(
     Field("longest", result.OF_TIME, "period at the largest amplitude"),
     result.SIMD,
     *result.END,
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 
 

@@ -68,7 +68,7 @@ SCHEMA = Schema(
     "basins",
     result.UNITS,
     Field("attractors", "", "attractors with their shares of the starts", read=_attractors),
-    Field("undecided", "1", "share of the starts that nothing captured within the bound"),
+    Field("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Field("failed", "1", "share of the starts that failed or diverged"),
     Field("cells", "1", "starts"),
     Field("mean_periods", "periods", "periods computed for a start, on average"),
@@ -327,7 +327,7 @@ def _cells(
             dims,
             raw.settle.reshape(shape),
             "1",
-            "periods until an attractor's trap holds the trajectory",
+            "periods until the trap of an attractor captures the trajectory",
             "-1 where no attractor captured it",
         ),
         "net_turns": variable(
@@ -362,7 +362,7 @@ def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
             "distance",
             raw.uncertainty_tried.astype(np.int64),
             long_name="starts with known ends, drawn anew for each distance; where drawn by "
-            "strata, as many drawn evenly as tell the share as precisely",
+            "strata, the equivalent number of evenly drawn starts",
         ),
     }
 

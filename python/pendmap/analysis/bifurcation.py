@@ -210,7 +210,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{kind}{sense}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
-    lines += _hysteresis(dataset, name) if count else ["Nothing attracts, as far as was seen."]
+    lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
     lines += [*chaos(a), *undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():

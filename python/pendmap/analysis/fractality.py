@@ -88,7 +88,7 @@ class UncertaintyExponent(Readable):
     def __repr__(self) -> str:
         return f"UncertaintyExponent({self._value})"
 
-    def said(self) -> tuple[Sequence[Table], Iterable[str]]:
+    def text_parts(self) -> tuple[Sequence[Table], Iterable[str]]:
         """Return the shares as a table, and the exponent."""
         rows = [
             [f"{eps:.3g}", f"{share:.4g}", "yes" if k < self.scales else ""]
@@ -280,7 +280,7 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
     if "uncertainty_eps" not in dataset:
         raise InputError(
             "this dataset has no counts of uncertain starts: it must be a map of pendmap.basins "
-            "of 10,000 cells or more whose labels tell basins apart, made with check=True; or "
+            "of 10,000 cells or more whose labels distinguish basins, made with check=True; or "
             "dataset['label']"
         )
     if dataset["label"].size != dataset.attrs["cells"]:

@@ -73,7 +73,7 @@ SCHEMA = Schema(
     Field("tail_captured", "1", "captures in the tail"),
     Field("tail_weibull", "1", "chance of an exponential tail by a score test of the shape"),
     Field("tail_steady", "1", "chance of an exponential tail by chi squared of its rates"),
-    Field("tail_mean_periods", "periods", "mean time of the tail, whatever it is"),
+    Field("tail_mean_periods", "periods", "mean time of the tail, exponential or not"),
     Field("starts", "1", "starts"),
     Field("captured", "1", "starts that an attractor captured"),
     Field("censored", "1", "starts alive at the bound"),
@@ -259,7 +259,7 @@ def _curves(
     tails = survival.residual(times, censored, bound) if times.size else []
     rows = [(t.begin, t.mean, t.stderr, min(t.weibull, t.steady)) for t in tails]
     begin, mean, stderr, chance = np.array(rows, dtype=float).reshape(-1, 4).T
-    within = "starts captured within so many periods"
+    within = "starts captured up to this period"
     unlike = "chance of times as unlike an exponential's, the lesser of two tests"
     return {
         "captured": variable(("attractor", "elapsed"), captured, long_name=within),
@@ -325,11 +325,11 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         lines.append(
-            f"Persistent: {_shares(found)}; largest exponent {exponent}; nothing captured any of "
-            f"the trajectories watched within {a['chaos_bound']} periods."
+            f"Persistent: {_shares(found)}; largest exponent {exponent}; none of the "
+            f"trajectories followed was captured within {a['chaos_bound']} periods."
         )
     elif found.attrs["plane"] == "conservative":
-        lines.append("Without damping (gamma = 0) nothing is ever captured: no lifetime.")
+        lines.append("Without damping (gamma = 0) there are no attractors: no lifetime.")
     elif a["transient_chaos"]:
         lines += _of_tail(dataset, exponent)
     else:
@@ -338,7 +338,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
         names = found["attractor"].values[found["kind"].str.endswith("chaos").values]
         lines.append(
             f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
-            f"left out: nothing captured chaos there within {a['chaos_bound']} periods."
+            f"left out: chaos there was not captured within {a['chaos_bound']} periods."
         )
     if a["censored"] and found.attrs["plane"] == "basins":
         lines.append(
@@ -384,10 +384,10 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
 def _why_not(dataset: xr.Dataset, exponent: str) -> str:
     a = dataset.attrs
     if not a["captured"] and a["chaotic_share"]:
-        return "No start ends on anything that repeats: no lifetime."
+        return "Starts end only on chaotic attractors: no lifetime."
     if not a["captured"]:
         return (
-            "No start was captured, and nothing says that chaos persists: undecided within "
+            "No start was captured, and chaos is not shown to persist: undecided within "
             f"{counted(a['max_periods'], 'period')}; --max-periods raises this bound."
         )
     longest = int(dataset["capture_period"].max())

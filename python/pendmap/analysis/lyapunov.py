@@ -290,7 +290,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         if not known:
             lines.append(
                 f"Deviations that grow as tau, those of regular motion, give {a['regular']:.2g} "
-                f"{per} over so long: it cannot be told from 0."
+                f"{per} over this time: the exponent is not significantly different from 0."
             )
         if value > 0 and a["end"] == "chaotic":
             lines.append(
@@ -327,18 +327,18 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
         if a["exponent"] == -math.inf:
             said += " Its exponent is minus infinity: both multipliers are 0."
         elif math.isnan(a["exponent"]):
-            said += " Friction holds it for ever: deviations neither grow nor shrink, and it has"
-            said += " no exponent."
+            said += " Friction holds it permanently: deviations neither grow nor decay, and there"
+            said += " is no exponent."
     else:
         words = {
-            "chaotic": f": {name}; none of the trajectories watched was captured by anything"
-            f" within {a['chaos_bound']} periods, none of these here at their ends.",
+            "chaotic": f": {name}; none of the trajectories of the search was captured within"
+            f" {a['chaos_bound']} periods, and none of those followed here had settled at its end.",
             "undamped": ". Without damping there are no attractors: this is the exponent of the"
             " motion near this start.",
             "undecided": f": undecided within {counted(a['max_periods'], 'period')}; no exponent"
             " is given, since a chaotic transient has a positive one too. --max-periods raises"
             " this bound.",
-            "failed": ": leaves the range of numbers; there is no exponent.",
+            "failed": ": the motion leaves the range of numbers; there is no exponent.",
         }
         said = start + words[a["end"]]
     if not a["lost"]:
@@ -346,7 +346,7 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     lost = f"{a['lost']} of {a['trajectories']} trajectories"
     return [
         said,
-        f"What looks chaotic is a transient: {lost} settled. lifetime says how long it lasts.",
+        f"The chaos is a transient: {lost} settled. The analysis lifetime estimates its duration.",
     ]
 
 

@@ -59,7 +59,7 @@ SCHEMA = Schema(
     result.SIMD,
     *result.END,
     *result.OWN,
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 
 
@@ -247,9 +247,9 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
     apart = {name: p for name, p in known.items() if name != "loop"}
     lines = []
     if sense:
-        lines.append(f"The torque keeps up the rotation {sense}: it belongs to the potential.")
+        lines.append(f"The torque sustains the rotation {sense} and is included in the potential.")
     elif "loop" in own:
-        lines.append("The torque is not above the losses of a turn: a perturbation as they are.")
+        lines.append("The torque does not exceed the losses of a turn: both are perturbations.")
     if sense and "loop" in known:
         lines.append(
             f"Homoclinic tangles on the loop of upright rest from p = {first:.9g} on, {where} "
@@ -272,19 +272,21 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
         ]
     if not sense and "loop" in known:
         lines.append(
-            "On the loop that the torque makes of upright rest they begin at p = "
+            "On the homoclinic loop of upright rest under the torque they begin at p = "
             f"{known['loop']:.9g}."
         )
     if hidden := [name for name in own if name not in known]:
         names = " and ".join(hidden)
-        lines.append(f"No threshold {where} ({names}): rounding hides the drive's work.")
+        lines.append(f"No threshold {where} ({names}): the drive's work is below rounding errors.")
     if own.get("loop", first) == 0:
-        return [*lines, "Without damping nothing attracts, and there are no basins."]
+        return [*lines, "Without damping there are no attractors and no basins."]
     if first > 0 and pendulum.p:
         ratio = abs(pendulum.p) / first
         side = "above" if ratio > 1 else "below"
-        lines.append(f"The pendulum's own p = {pendulum.p:g} lies {side}: {ratio:.3g} of it.")
-    lines.append("Tangles make boundaries of basins fractal; chaos that lasts needs more.")
+        lines.append(
+            f"The pendulum's own p = {pendulum.p:g} is {side} p_melnikov: {ratio:.3g} times it."
+        )
+    lines.append("Tangles make basin boundaries fractal; they do not imply a chaotic attractor.")
     return lines
 
 

@@ -57,7 +57,7 @@ SCHEMA = Schema(
     drawn_field(drawn_fields),
     result.SECTION,
     *result.BOX,
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 
 
@@ -219,17 +219,17 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
     if count > _LISTED:
         lines.append(f"{count - _LISTED} more are in the result.")
     if pendulum.p == 0 and a["n"] > 1:
-        lines.append("Without drive nothing closes after more than one period: n must be 1.")
+        lines.append("Without drive every orbit closes after one period: n must be 1.")
     if pendulum.p == 0 and pendulum.gamma == 0 and a["w"]:
         lines.append(
-            "Without drive and damping rotations are there in curves, of any period: Newton's "
-            "method finds what stands alone."
+            "Without drive and damping rotations form continuous families, of any period: "
+            "Newton's method finds only isolated orbits."
         )
     if friction:
-        lines.append("States that friction holds for ever are a set, and not listed.")
+        lines.append("Rest states held by friction form a continuum and are not listed.")
     reach = units.spoken(f"{a['low_velocity']:.4g} to {a['high_velocity']:.4g}")
     lines.append(
-        f"Looked for with a point in theta = {a['low_theta']:.4g} to {a['high_theta']:.4g} rad, "
+        f"Search for a point in theta = {a['low_theta']:.4g} to {a['high_theta']:.4g} rad, "
         f"velocity = {reach}: {counted(a['cells'], 'cell')}, Newton's method from "
         f"{counted(a['begun'], 'place')}, {a['seconds']:.2f} s on "
         f"{counted(a['threads'], 'thread')}."

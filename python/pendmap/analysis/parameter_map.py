@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-CHAOS_PERIODS = "periods within which nothing captured the chaos; 0: none"
+CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
 """Comment of the variable ``chaos_periods``."""
 _LISTED = 10  # Largest number of regimes in a summary
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
@@ -320,8 +320,8 @@ def chaos(attributes: Mapping[str, Any]) -> list[str]:
     if not periods:
         return []
     line = (
-        f"Chaos: nothing captured it within {counted(periods, 'period')} (the least of all; "
-        "chaos_periods holds each); a longer transient looks the same."
+        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
+        "chaos_periods contains each); a longer transient looks the same."
     )
     return [line]
 
@@ -335,7 +335,7 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _said(place: dict[str, Any]) -> str:
+def _place_text(place: dict[str, Any]) -> str:
     """Return the ranges of a group of cells, and its size, as text."""
     spans = [
         f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
@@ -362,13 +362,13 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     lines += [*chaos(a), *undecided(a)]
     places = undecided_cells(dataset)
     if places:
-        listed = "; ".join(_said(place) for place in places[:_PLACES])
+        listed = "; ".join(_place_text(place) for place in places[:_PLACES])
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
         lines.append(f"Cells with undecided starts: {listed}{more}.")
     lines.append(
         f"{counted(a['starts'], 'start')} a cell, {box_said(a)}; "
-        f"{counted(a['searched_again'], 'cell')} searched again for what a neighbour has; error "
-        f"after 5 periods {a['reached_error']:.2g}; "
+        f"{counted(a['searched_again'], 'cell')} searched again for attractors of a neighbour; "
+        f"error after 5 periods {a['reached_error']:.2g}; "
         f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
     )
     return lines

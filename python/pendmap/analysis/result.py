@@ -151,7 +151,7 @@ OWN: Final = (
     Field("own_omega", "1", "frequency of the model itself", json=False),
 )
 RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
-UNSAID: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
+VERSIONS: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")
 )

@@ -73,7 +73,7 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
         if not unlimited and a["undecided"] > 0 and _dry(pendulum)[0] > 0 and pendulum.p:
             lines.append(
                 "With dry friction alone (gamma = 0) phase area shrinks only where the motion "
-                "turns back: a rotation that the drive keeps up settles on nothing."
+                "turns back: a rotation sustained by the drive approaches no attractor."
             )
     lines += of_model(pendulum, "this map is")
     lines.append(
@@ -105,11 +105,13 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     lines = [
         f"Without viscous damping (gamma = 0) nothing limits a rotation {way}: a turn gains "
         f"2 pi ({abs(torque):g} - {friction:g}) m l^2 w0^2 by torque less friction, so that it "
-        + ("speeds up for ever" if abs(torque) > friction else "keeps its energy")
-        + " and settles on nothing, whatever it looks like. A smaller --max-periods shows as much."
+        + ("accelerates without bound" if abs(torque) > friction else "keeps its energy")
+        + " and reaches no attractor. A smaller --max-periods gives the same result."
     ]
     if abs(torque) > friction + 1 + abs(pendulum.p):
-        lines.append("Friction can hold it nowhere (torque above theta_r + 1 + p): no start rests.")
+        lines.append(
+            "Friction holds it at no angle (torque above theta_r + 1 + p): no start rests."
+        )
     return lines
 
 
@@ -134,10 +136,10 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
     """Return the bound after which a start is undecided, as text, and what raises it."""
     undecided = dataset["label"] == 0
     if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
-        return ": they stand exactly on an unstable rest, where nothing moves them"
+        return ": they start exactly at an unstable equilibrium and stay there"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
     if chosen and dataset["kind"].str.endswith("chaos").any():
-        text += " (beside chaos ten times the longest settling seen, at least 200)"
+        text += " (where chaos coexists, ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
 
 
@@ -179,11 +181,11 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     # Upper end of the one-sided exact interval for no hit (Clopper & Pearson 1934, Biometrika 26).
     missed = 1 - math.pow(0.05, 1 / a["searched_starts"])
     return (
-        f"One chaotic attractor takes everything: {name}, exponent {with_error(exponent, error)} "
-        f"{Units.of(a).per_time}; nothing captured a sampled trajectory within "
-        f"{a['chaos_bound']} periods. All {a['searched_starts']} sampled starts end there: another "
-        f"attractor takes at most {100 * missed:.2g} % of them (95 %).\n"
-        "Labels tell nothing here: net turns and the finite-time exponent after "
+        f"One chaotic attractor captures all starts: {name}, exponent "
+        f"{with_error(exponent, error)} {Units.of(a).per_time}; no sampled trajectory "
+        f"settled within {a['chaos_bound']} periods. All {a['searched_starts']} sampled starts "
+        f"end there: another attractor has at most {100 * missed:.2g} % of them (95 %).\n"
+        "Labels carry no information here: net turns and the finite-time exponent after "
         f"{counted(a['layer_periods'], 'period')} are shown instead."
     )
 

@@ -82,7 +82,7 @@ def varied(
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
-        raise InputError(f"what varies must be a mapping like {few}, got {given or 'nothing'}")
+        raise InputError(f"ranges must be a mapping like {few}, got {given or 'nothing'}")
     found = tuple(_one(model, name, given) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
@@ -97,7 +97,7 @@ def varied(
         )
     if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
         raise InputError(
-            "stroke_mm beside a frequency that varies: p = Y Omega^2 / g must vary in their place"
+            "stroke_mm and a frequency must not both vary: vary p = Y Omega^2 / g instead"
         )
     return found
 
@@ -127,7 +127,7 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
         return []
     if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
         return []
-    return ["Without damping (gamma = 0) nothing attracts: such starts stay undecided."]
+    return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
 
 
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
@@ -280,9 +280,9 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 SEARCH = (
     Field("starts", "1", "initial conditions of each pendulum"),
-    Field("undecided", "1", "share of the starts that nothing captured"),
+    Field("undecided", "1", "share of the starts that no attractor captured"),
     Field("failed", "1", "share of the starts that failed or diverged"),
-    Field("chaos_periods", "periods", "least time within which nothing captured chaos; 0: none"),
+    Field("chaos_periods", "periods", "least time for which chaos was not captured; 0: no chaos"),
     result.SECONDS,
     result.SIMD,
     result.THREADS,
@@ -292,8 +292,8 @@ SEARCH = (
     result.SECTION,
     *result.BOX,
     result.TOL.hidden,
-    Field("searched_again", "1", "cells searched for what a neighbour has", json=False),
+    Field("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
     result.SEED.hidden,
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 """Fields of a search for attractors in many pendulums."""

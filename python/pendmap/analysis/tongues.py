@@ -91,7 +91,7 @@ SCHEMA = Schema(
     Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
     Field("moved", "", "1 where a torque makes an orbit of rest", json=False),
     *result.OWN,
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 
 

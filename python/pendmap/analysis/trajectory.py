@@ -101,7 +101,7 @@ SCHEMA = Schema(
     Field("velocity0", result.OF_VELOCITY, "velocity at the start", json=False),
     result.STEPS.hidden,
     Field("lyapunov", "", "1 where an exponent was asked for", json=False),
-    *result.UNSAID,
+    *result.VERSIONS,
 )
 
 
@@ -290,7 +290,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         turns = f" ({counted(abs(a['turns']), 'full turn')} {way})"
     if a.get("interrupted"):
         asked = units.at(format(a["until_asked"], "g"))
-        lines.append(f"INTERRUPTED before {asked}: this is what was computed until then.")
+        lines.append(f"INTERRUPTED before {asked}: the result ends where the computation stopped.")
     error = a["end_error"]
     at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
     lines += [
@@ -312,11 +312,11 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
     rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
     if rounding > a["tol"]:
         lines.append(
-            f"ANGLES ARE ROUNDED TO {rounding:.1e} rad, so large are they: begin nearer to 0."
+            f"ANGLES ARE ROUNDED TO {rounding:.1e} rad because they are large: start nearer to 0."
         )
     if a["stuck"]:
         kinds, times = dataset["event_kind"].values, dataset["event_time"].values
-        ever = " for ever" if kinds[-1] == "stuck for ever" else ""
+        ever = ", permanently" if kinds[-1] == "stuck for ever" else ""
         lines.append(f"Friction holds it since {units.at(format(times[-1], '.9g'))}{ever}.")
     if a["end_error"] > max(1e-3, a["tol"]):
         lines.append(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     tol_option,
     max_periods_option(
         "Bound after which a start is undecided.  [default: 4000; more where damping"
-        " is small, less beside chaos]"
+        " is small, less if chaos coexists]"
     ),
     option("--layer-periods", Whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 @click.argument("model", type=FILE, metavar="MODEL")
 @click.argument("path", type=FILE, metavar="EXPERIMENT")
 @plot_option
-@option("--members", Whole(20, 100_000), "Starts of the model beside each forced run.", 400)
-@option("--spread", NUMBER, "Of these about the measured start, rad, and over w0.", 0.01)
+@option("--members", Whole(20, 100_000), "Ensemble members for each forced run.", 400)
+@option("--spread", NUMBER, "Their spread about the measured start, rad, and over w0.", 0.01)
 @seed_option("Draws them.")
 @threads_option
 @json_option("; alone, no files")

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 @option(
     "--effects effects_path",
     FILE,
-    "Candidates of your own beside the library's: [[formula]] of a .toml.",
+    "User-defined candidates in addition to the library's: [[formula]] of a .toml.",
     metavar="FILE",
 )
 @option("--out", OutputFile([".toml"]), "New model: .toml.  [default: diagnose.toml]")
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 @option(
     "--report",
     REPORT,
-    "Report: .html with its figures in it, .md with them beside it, or a folder with both.",
+    "Report: .html with embedded figures, .md with separate figures, or a folder with both.",
     metavar="FILE|DIR",
 )
 @rerun_option

@@ -86,8 +86,10 @@ def _write(effect: EffectDefinition) -> None:
 def _maps(effect: EffectDefinition) -> str:
     """Return how maps treat an effect, as the predicate of a sentence."""
     if effect.group == "reading":
-        return "do not see it"
-    return {"frozen": "hold it at lab_time", "no": "refuse it"}.get(effect.mappable, "have it")
+        return "ignore it"
+    return {"frozen": "evaluate it at lab_time", "no": "refuse it"}.get(
+        effect.mappable, "include it"
+    )
 
 
 def _parameter(parameter: EffectParameter) -> str:

@@ -26,7 +26,7 @@ SUFFIX = ".toml"
 @click.command("identify")
 @click.argument("path", type=FILE, metavar="EXPERIMENT")
 @click.option(
-    "--method", "methods", multiple=True, metavar="NAME", help="One of them alone; may be repeated."
+    "--method", "methods", multiple=True, metavar="NAME", help="Only this method; may be repeated."
 )
 @click.option(
     "--effect",

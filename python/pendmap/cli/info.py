@@ -11,7 +11,7 @@ import click
 
 from pendmap.cli.options import json_option
 
-_LEANS_ON = (
+_DEPENDENCIES = (
     "numpy",
     "scipy",
     "xarray",
@@ -32,8 +32,8 @@ def command(*, as_json: bool) -> None:
     from pendmap.errors import instruction_set
 
     simd = instruction_set()
-    versions: dict[str, str | None] = dict.fromkeys(_LEANS_ON)
-    for name in _LEANS_ON:
+    versions: dict[str, str | None] = dict.fromkeys(_DEPENDENCIES)
+    for name in _DEPENDENCIES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[name] = importlib.metadata.version(name)
     facts = {
@@ -49,7 +49,7 @@ def command(*, as_json: bool) -> None:
         return
     click.echo(f"pendmap {facts['version']}")
     available = ", ".join(_core.simd_available())
-    click.echo(f"instruction set  {simd} (this processor has {available}; --simd asks for one)")
+    click.echo(f"instruction set  {simd} (this processor has {available}; --simd selects one)")
     click.echo(f"threads          {facts['threads']}")
     click.echo(f"Python           {facts['python']}")
     for name, version in versions.items():

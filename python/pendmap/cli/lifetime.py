@@ -28,11 +28,11 @@ _STARTS = (100, 10_000_000)
     option(
         "--from-period",
         Whole(0, MOST_PERIODS),
-        "Where the exponential tail begins.  [default: where the data say so]",
+        "Where the exponential tail begins.  [default: estimated from the data]",
     ),
     max_periods_option(
         "Bound after which a start is given up.  [default: 4000; more where damping"
-        " is small, less beside chaos]"
+        " is small, less if chaos coexists]"
     ),
     tol_option,
     seed_option("Draws the starts, and the models of --draws."),

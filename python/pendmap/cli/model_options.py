@@ -27,7 +27,7 @@ _BARE = {
     "p": "Amplitude Y Omega^2/g of the drive.",
     "omega": "Frequency Omega/w0 of the drive.",
     "phase": "Phase of the drive at tau = 0, rad.",
-    "torque": "Constant torque over m l^2 w0^2, also beside a model in SI.",
+    "torque": "Constant torque over m l^2 w0^2, also with a model in SI.",
     "theta_r": "Coulomb friction Tr/w0^2.",
 }
 _SI = {
@@ -54,7 +54,7 @@ def varied_model_options(function: Command) -> Command:
         frequency = next((n for n in ("omega", "Omega", "frequency_hz") if n in ranges), None)
         if frequency is not None and given["stroke_mm"] is not None:
             raise click.UsageError(
-                f"--stroke-mm must not stand beside {frequency} that varies, got both: --p is kept"
+                f"--stroke-mm must be left out if {frequency} varies, got both: --p stays constant"
             )
         typed = {name for name in ("p", "omega", "frequency_hz") if given[name] is not None}
         if frequency is not None and typed == {"p"}:
@@ -84,7 +84,7 @@ def model_options(
     model = option(
         "--model model",
         FILE,
-        "Model file, without dimensions or in SI; options typed beside it override it. In SI "
+        "Model file, without dimensions or in SI; options given in addition override it. In SI "
         "times are in s and velocities in rad/s; the options from --gamma to --theta-r have "
         "no dimensions there either.",
         metavar="FILE.toml",

@@ -74,7 +74,7 @@ quiet_option = click.option("--quiet", is_flag=True, help="No progress, no summa
 draws_option = option(
     "--draws",
     Whole(2, MOST_DRAWS),
-    "Draw so many models from the [covariance] of --model: the doubt of the result.",
+    "Number of models drawn from the [covariance] of --model: uncertainty of the result.",
 )
 rate_option = option(
     "--rate rate_hz",
@@ -124,7 +124,7 @@ start_options = added(
 search_options = added(
     option("--starts", Whole(1, MOST_CELLS), "Starts each.", 9),
     tol_option,
-    max_periods_option("Bound after which a start is watched.  [default: as damping asks]"),
+    max_periods_option("Bound after which a start is watched.  [default: depends on damping]"),
     seed_option("Shifts the starts, and draws the models of --draws."),
 )
 """Options of a search for attractors at each of many parameters."""

@@ -20,7 +20,9 @@ _LONGEST = 64
     option("--n", Whole(1, _LONGEST), "Smallest period, in drive's.", 1),
     option("--w", Whole(-MOST_CELLS, MOST_CELLS), "Net turns over it, forward positive.", 0),
     option("--theta", AXIS, "Angles of the box, rad.  [default: -pi:pi:200]"),
-    option("--velocity", AXIS, "Velocities of the box, in SI rad/s.  [default: as n, w and p ask]"),
+    option(
+        "--velocity", AXIS, "Velocities of the box, in SI rad/s.  [default: depends on n, w and p]"
+    ),
     option("--grid", Whole(1, MOST_CELLS), "Cells on each side of the box."),
     draws_option,
     seed_option("Draws the models."),

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 @option(
     "--plot",
     OutputFile(PICTURES),
-    "File of one figure: .png .svg .pdf; of table1 a picture, and a .csv beside it.",
+    "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
 )
 @seed_option("Of the rig's noise.")
 @json_option()
 @simd_option
-@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+@click.option("--quiet", is_flag=True, help="Do not list the files written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],

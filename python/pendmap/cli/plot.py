@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--layer",
-    help="One part alone: labels, settle, turns, exponent of basins, over draws probability and"
+    help="One part only: labels, settle, turns, exponent of basins, over draws probability and"
     " entropy; kinds, exponent, attractors, period, winding, undecided, 'share KIND', over draws"
     " certainty of a map; history, energy, phase, section of a trajectory; theta, velocity of a"
     " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @click.option("--size", help="Width x height in inches, like 8x4.")
 @option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.")
 @click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
-@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+@click.option("--quiet", is_flag=True, help="Do not list the files written.")
 def command(  # noqa: PLR0913 (the options above)
     *,
     file: Path,

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @option(
     "--mess",
     NUMBER,
-    "Weak disturbances beside the effects (texture of the bearing, drifting zero, slow "
+    "Weak disturbances in addition to the effects (texture of the bearing, drifting zero, slow "
     "noise), in multiples of the noise.",
     0.0,
 )
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @json_option()
-@click.option("--quiet", is_flag=True, help="Do not say what was written.")
+@click.option("--quiet", is_flag=True, help="Do not list the files written.")
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
         "--plane",
         type=click.Choice(["omega-p", "e-alpha2"]),
         default="omega-p",
-        help="What is drawn: that of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 ="
-        " 1/omega^2.",
+        help="Plane drawn: of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 = 1/omega^2.",
     ),
     draws_option,
     seed_option("Draws the models."),

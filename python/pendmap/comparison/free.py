@@ -127,7 +127,7 @@ class Comparison(Readable):
         """All runs that were compared, free decays first."""
         return (*self.runs, *self.forced)
 
-    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+    def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the tables and the lines that ``pendmap compare`` prints."""
         return tables(self), list(as_text(self))
 

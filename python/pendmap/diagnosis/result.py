@@ -94,7 +94,7 @@ class Discrepancy(Readable):
         path = self.data.experiment.path.name
         return f"<Discrepancy {path}: {said}; {gap}, noise {self.gap.noise_floor:.3g}>"
 
-    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+    def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the table and the lines that ``pendmap diagnose`` prints."""
         return [ranking_table(self)], list(as_text(self))
 

@@ -61,7 +61,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
-            f"{target}: what shall be saved is not a result of pendmap: it must be one of the "
+            f"{target}: dataset is not a result of pendmap: it must be one of the "
             f"datasets that {', '.join(sorted(made))} return"
         )
     if target.suffix.lower() != ".zarr":
@@ -91,10 +91,10 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
     except (FileNotFoundError, ValueError):
         said = {}
     if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
-        raise InputError(f"{target}: {wanted}; it is a folder of something else")
+        raise InputError(f"{target}: {wanted}; the folder does not contain a result")
     for entry in target.rglob("*"):
         if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
-            raise InputError(f"{target}: {wanted}; it holds {entry.name!r}, no part of a result")
+            raise InputError(f"{target}: {wanted}; it contains {entry.name!r}, no part of a result")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -77,7 +77,7 @@ class IdentificationReport(Readable):
         more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
         return f"<IdentificationReport {self.run.name}: {best}{more}>"
 
-    def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+    def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the tables and lines that ``pendmap identify`` prints."""
         tables = [methods_table(self), table1_table(self)]
         return tables, list(as_text(self))

@@ -106,7 +106,7 @@ def misses(notes: Mapping[str, Any]) -> float:
     return ratio if ratio > MISSES else math.nan
 
 
-def said_of(notes: Mapping[str, Any]) -> dict[str, float | str]:
+def misses_attribute(notes: Mapping[str, Any]) -> dict[str, float | str]:
     """Return the attribute ``misses_record`` of a dataset, if a model misses its record."""
     ratio = misses(notes)
     return {"misses_record": ratio} if math.isfinite(ratio) else {}

@@ -225,9 +225,7 @@ def formulas_of(tables: object) -> dict[str, Formula]:
     for where, table in each_table("formula", tables, FORMULA, _EXAMPLES):
         formula = Formula(**table)
         if formula.name in found:
-            raise InputError(
-                f"{where}: each name must be there once, {formula.name} is there twice"
-            )
+            raise InputError(f"{where}: each name must occur once, {formula.name} occurs twice")
         found[formula.name] = formula
     return found
 

@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
-from pendmap.model.covariance import said_of
+from pendmap.model.covariance import misses_attribute
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS, unit_of
@@ -167,7 +167,7 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
             called, value = own[names[0]]
             if value != 0:
                 raise InputError(
-                    f"{called} is {value:g} beside the effect {effect.name}: they are the same, "
+                    f"{called} is {value:g}, the same term as the effect {effect.name}: "
                     f"one of them must be left out (or {called} = 0)"
                 )
     return tuple(effects)
@@ -208,7 +208,7 @@ def attributes_of(
     ]
     angle = {"angle": "line"} if pendulum.counts_turns else {}
     found = {"units": model.units.name} | numbers | bare | {"effects": json.dumps(effects)} | angle
-    return found | said_of(model.notes)
+    return found | misses_attribute(model.notes)
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:

@@ -83,9 +83,7 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
         if name not in checked:
             continue
         if not ways["Omega"]:
-            raise InputError(
-                f"{name} has no frequency: it must have Omega or frequency_hz beside it"
-            )
+            raise InputError(f"{name} needs a frequency: Omega or frequency_hz must be given")
         omega = one("Omega", ways["Omega"])
         said = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
         ways["p"][f"Y Omega^2/g of {said}"] = checked[name] * metre * omega**2 / gravity

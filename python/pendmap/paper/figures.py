@@ -30,7 +30,7 @@ FIGURES: Final = {
     "7": "The errors of each model",
     "8": "Steady states after 2500 s",
     "9": "Transient tumbling",
-    TABLE: "Damping by each method, and what its simulation misses (%)",
+    TABLE: "Damping by each method, and the errors of its simulation (%)",
 }
 """Titles of the figures, by the names a user types."""
 _TRANSIENT: Final = 500  # Forcing periods before figure 2 begins

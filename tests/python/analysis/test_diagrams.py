@@ -124,11 +124,11 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     for words, wanted in (
         (
             ("bifurcation",),
-            "what varies must be a mapping like {'p': (0.5, 2.0, 100)}, got nothing",
+            "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, got nothing",
         ),
         (
             ("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"),
-            "what varies must be a mapping like {'p': (0.5, 2.0, 100)}, got p, omega",
+            "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, got p, omega",
         ),
         (
             ("bifurcation", "--p", "0:1:3", "--theta", "1"),
@@ -173,6 +173,6 @@ def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_fo
 def test_the_summary_reports_that_nothing_attracts_without_damping() -> None:
     found = pendmap.bifurcation(Pendulum(gamma=0.0), {"p": (0.2, 2.0, 5)})
     assert found.sizes["branch"] == 0
-    assert "Without damping (gamma = 0) nothing attracts" in found.attrs["summary"]
+    assert "Without damping (gamma = 0) there are no attractors" in found.attrs["summary"]
     assert "same kinds" not in found.attrs["summary"]
     assert "sweep, undecided" in named(made(found))

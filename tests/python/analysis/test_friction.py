@@ -132,7 +132,7 @@ def test_events_are_stored(tmp_path: Path) -> None:
         again = pendmap.load(pendmap.save(run, tmp_path / f"{name}.nc"))
         assert list(again.event_kind.values) == list(run.event_kind.values)
         assert again.event_time.values == pytest.approx(run.event_time.values)
-    assert "for ever" in stuck.attrs["summary"]
+    assert "permanently" in stuck.attrs["summary"]
     assert stuck.attrs["stuck"] == 1
     assert free.attrs["stuck"] == 0
 

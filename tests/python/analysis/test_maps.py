@@ -123,7 +123,7 @@ def test_one_chaotic_attractor_takes_everything() -> None:
     assert result.kind.values.tolist() == ["tumbling_chaos"]
     assert result.fraction.values == pytest.approx([1.0])
     assert np.isfinite(result.finite_time_exponent).all()
-    assert "One chaotic attractor takes everything" in result.attrs["summary"]
+    assert "One chaotic attractor captures all starts" in result.attrs["summary"]
 
 
 def test_without_damping_there_are_no_attractors() -> None:
@@ -350,7 +350,7 @@ def test_slow_settling_is_not_called_chaos(p: float) -> None:
 
 def test_starts_on_an_unstable_rest_are_named() -> None:
     alone = pendmap.basins(Pendulum(p=1.0), Grid.square(1))
-    assert "stand exactly on an unstable rest" in alone.attrs["summary"]
+    assert "start exactly at an unstable equilibrium" in alone.attrs["summary"]
     assert "--max-periods" not in alone.attrs["summary"]
     early = pendmap.basins(Pendulum(p=1.0), Grid.square(20), max_periods=5)
     assert "--max-periods raises this bound" in early.attrs["summary"]

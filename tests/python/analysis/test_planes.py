@@ -277,7 +277,7 @@ def test_undamped_motion_has_no_attractors() -> None:
     found = pendmap.parameter_map(Pendulum(omega=1.0), {"p": (0.0, 1.0, 3), "gamma": (0.0, 0.2, 3)})
     assert (found["undecided"].values[0] == 1.0).all()
     assert found["entry_cell"].values.min() >= 3
-    assert "Without damping (gamma = 0) nothing attracts" in found.attrs["summary"]
+    assert "Without damping (gamma = 0) there are no attractors" in found.attrs["summary"]
 
 
 def test_chaos_that_friction_ends_is_no_attractor() -> None:

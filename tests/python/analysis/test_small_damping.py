@@ -67,4 +67,4 @@ def test_rotations_that_dry_friction_does_not_stop_are_explained() -> None:
     pendulum = Pendulum(gamma=0.0, theta_r=0.01, p=0.3, omega=2.0)
     found = pendmap.basins_of(pendulum, [0.0, 0.5], [2.0, 0.1], check=False, max_periods=500)
     assert list(found["label"].values > 0) == [False, True]
-    assert "a rotation that the drive keeps up settles on nothing" in found.attrs["summary"]
+    assert "a rotation sustained by the drive approaches no attractor" in found.attrs["summary"]

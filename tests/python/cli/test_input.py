@@ -153,4 +153,4 @@ def test_a_bound_that_was_shortened_because_of_chaos_is_explained() -> None:
     result.attrs["summary"] = summary.summarise(
         result, pendmap.Pendulum(p=1.7), bound_was_chosen=True
     )
-    assert "beside chaos ten times the longest settling" in result.attrs["summary"]
+    assert "where chaos coexists, ten times the longest settling" in result.attrs["summary"]

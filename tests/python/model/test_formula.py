@@ -154,7 +154,7 @@ def test_formulas_are_read_from_a_file(tmp_path: Path, pendmap_command: Run) -> 
     for text, said in (
         ("", "has no table [[formula]]"),
         ("[[formula]]\nname = 'x'", "term must be given, like term = "),
-        (FILE + FILE, "each name must be there once, bump is there twice"),
+        (FILE + FILE, "each name must occur once, bump occurs twice"),
         ("[[formular]]\nname = 'x'", "formular is not known"),
         (FILE.replace("wrap(", "wrp("), "unknown function 'wrp' at 14"),
     ):

@@ -266,11 +266,11 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         ),
         (
             "[pendulum]\ngamma = 0.1\n" + VISCOUS,
-            "gamma is 0.1 beside the effect viscous_damping: they are the same, one of them must",
+            "gamma is 0.1, the same term as the effect viscous_damping: one of them must",
         ),
         (
             "[pendulum]\nw0 = 6\nTr = 0.1\n" + COULOMB,
-            "Tr is 0.1 beside the effect coulomb_friction: they are the same, one of them must",
+            "Tr is 0.1, the same term as the effect coulomb_friction: one of them must",
         ),
     ],
 )

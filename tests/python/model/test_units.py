@@ -126,7 +126,7 @@ def test_zeta_is_half_of_gamma() -> None:
         ({"w0": 6.2, "Omega": 12, "frequency_hz": 12}, "Omega is 12, but 75.3982 by 2 pi f"),
         ({"w0": 6.2, "length_m": 0.3}, "w0 is 6.2, but 5.71839 by sqrt(g/l) of length_m = 0.3"),
         ({"c_over_m": 0.1}, "w0 is missing: a model in SI needs w0 in rad/s, or length_m"),
-        ({"w0": 6.2, "stroke_mm": 20}, "stroke_mm has no frequency: it must have Omega"),
+        ({"w0": 6.2, "stroke_mm": 20}, "stroke_mm needs a frequency: Omega or frequency_hz must"),
         ({"w0": 6.2, "p": 0.3}, "Omega must be a number above 0 where something is driven, got 0"),
         ({"w0": 0}, "w0 must be a number from 1e-06 to 1e+06 rad/s, got 0"),
         ({"w0": 1e200}, "w0 must be a number from 1e-06 to 1e+06 rad/s, got 1e+200"),
@@ -201,11 +201,9 @@ def test_two_names_of_one_term_are_refused(
     name: str, values: dict[str, float], field: str, si: str
 ) -> None:
     effect = Effect(name, values)
-    with pytest.raises(
-        InputError, match=rf"{field} is 0\.2 beside the effect {name}: they are the"
-    ):
+    with pytest.raises(InputError, match=rf"{field} is 0\.2, the same term as the effect {name}"):
         Pendulum(**({"gamma": 0} | {field: 0.2}), effects=(effect,))
-    with pytest.raises(InputError, match=rf"{si} is 0\.2 beside the effect {name}: they are the"):
+    with pytest.raises(InputError, match=rf"{si} is 0\.2, the same term as the effect {name}"):
         Rig(w0=6, **{si: 0.2}, effects=(effect,))
     either = Pendulum(**({"gamma": 0} | values)), Pendulum(gamma=0, effects=(effect,))
     ends = [pendmap.simulate(x, 2.0, 0.0, 5.0).theta.values for x in either]

@@ -134,7 +134,7 @@ def test_a_copy_held_out_tests_nothing(tmp_path: Path) -> None:
     assert "is no independent test" in found.text
     report = identify_experiment(read)
     assert [run.name for run in report.runs] == ["one", "two"]
-    assert any("copies another" in line for line in report.said()[1])
+    assert any("copies another" in line for line in report.text_parts()[1])
     model = pendmap.Rig(w0=recorded.W0, c_over_m=recorded.C, Tr=recorded.TR)
     compared = compare(model, read)
     assert compared.left_out == (("copy", "it is a copy of another run"),)

@@ -55,7 +55,7 @@ def test_a_comparison_is_a_line_and_its_table() -> None:
 
 def test_columns_are_as_wide_as_they_need() -> None:
     class Result(Readable):
-        def said(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
+        def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
             return [(["a", "long"], [["123", "x"], ["4", "y"]]), (["none"], [])], ["end & <more>"]
 
     assert str(Result()) == "a    long\n123  x\n4    y\n\nend & <more>"

@@ -193,8 +193,8 @@ def _summary(found: xr.Dataset) -> list[str]:
     )
     both = a["doubt_start"] + a["doubt_parameters"]
     lines.append(
-        f"Doubt of an end in a box of {BOX} x {BOX} cells: {both:.3f} nat = "
-        f"{a['doubt_start']:.3f} by where in the box the start lies + "
-        f"{a['doubt_parameters']:.3f} by the parameters."
+        f"Entropy of the end in a box of {BOX} x {BOX} cells: {both:.3f} nat = "
+        f"{a['doubt_start']:.3f} from the position of the start in the box + "
+        f"{a['doubt_parameters']:.3f} from the parameters."
     )
     return lines
