@@ -248,14 +248,14 @@ def test_a_zarr_replaces_nothing_but_a_result(tmp_path: Path, result: xr.Dataset
         (target / name).unlink()
     (tmp_path / "foreign.zarr").mkdir()
     (tmp_path / "foreign.zarr" / "thesis.tex").write_text("mine")
-    with pytest.raises(InputError, match="something else"):
+    with pytest.raises(InputError, match="does not contain a result"):
         pendmap.save(result, tmp_path / "foreign.zarr")
     xr.Dataset({"x": ("t", [1.0])}).to_zarr(tmp_path / "other.zarr", zarr_format=2)
-    with pytest.raises(InputError, match="something else"):
+    with pytest.raises(InputError, match="does not contain a result"):
         pendmap.save(result, tmp_path / "other.zarr")
     others = xr.Dataset({"x": ("t", [1.0])}, attrs={"format_version": 3, "kind": "raw"})
     others.to_zarr(tmp_path / "marked.zarr", zarr_format=2)
-    with pytest.raises(InputError, match="something else"):
+    with pytest.raises(InputError, match="does not contain a result"):
         pendmap.save(result, tmp_path / "marked.zarr")
     assert (tmp_path / "foreign.zarr" / "thesis.tex").read_text() == "mine"
 
