@@ -89,8 +89,7 @@ class Equation:
         if not isinstance(m.lateral, float):
             total -= p.w0**2 * m.lateral * m.cos
         for effect, part in zip(self.effects, self._own, strict=True):
-            acts = effect.reaction(m, own[..., part]) if effect.states else effect.acceleration(m)
-            total = total + acts
+            total = total + effect.reaction(m, own[..., part])
         return total
 
     def friction(self, m: Motion) -> Floats | float:
@@ -112,13 +111,12 @@ class Equation:
         parts = [
             effect.rates(m, own[..., part], acceleration)
             for effect, part in zip(self.effects, self._own, strict=True)
-            if effect.states
         ]
         return acceleration, np.concatenate(parts, axis=-1)
 
     def begin(self, m: Motion) -> Floats:
         """Return the initial values of the effects' state variables, shape (L, K, states)."""
-        parts = [effect.begin(m) for effect in self.effects if effect.states]
+        parts = [effect.begin(m) for effect in self.effects]
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
 
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:

@@ -181,12 +181,12 @@ class Effect:
         return np.zeros((*motion.theta.shape, self.states))
 
     def reaction(self, motion: Motion, own: Floats) -> Floats:
-        """Return the acceleration, rad/s^2, of an effect with state variables."""
-        raise NotImplementedError
+        """Return the acceleration, rad/s^2, with the effect's state variables ``own``."""
+        return np.asarray(self.acceleration(motion))
 
     def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
         """Return the time derivatives of the state variables, shape (L, K, states)."""
-        raise NotImplementedError
+        return np.zeros_like(own)
 
     def alter(self, drive: Drive) -> Drive:
         """Return the actual drive, given the nominal one."""
