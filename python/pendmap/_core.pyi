@@ -36,7 +36,6 @@ __all__ = [
     "counts_turns",
     "default_threads",
     "effects",
-    "fit_equations",
     "fit_rows",
     "fit_runs",
     "formula",
@@ -371,12 +370,6 @@ def fit_runs(
     choices: dict[str, Any],
     windows: Sequence[_Window] | None = None,
 ) -> Fit: ...
-def fit_equations(
-    runs: Sequence[dict[str, Any]],
-    free: Sequence[_Free],
-    tolerance: float,
-    windows: Sequence[_Window],
-) -> FitPoint: ...
 def fit_rows(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

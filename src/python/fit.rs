@@ -285,22 +285,7 @@ pub fn fit_runs(
     Py::new(py, (own, FitPoint::new(py, &problem, &found.point)?))
 }
 
-/// The equations at the starts of the free parameters and of the windows, without a step.
-#[pyfunction]
-pub fn fit_equations(
-    py: Python<'_>,
-    runs: Vec<Run<'_>>,
-    free: Vec<FreeTuple>,
-    tolerance: f64,
-    windows: Vec<WindowTuple>,
-) -> PyResult<FitPoint> {
-    let problem = problem(runs, &free, tolerance)?;
-    let windows = self::windows(windows, &problem)?;
-    let at = pooled(py, 0, None, |_| Point::new(&problem, problem.start(), windows))?;
-    FitPoint::new(py, &problem, &at)
-}
-
-/// The derivatives behind the equations, window by window.
+/// The derivatives at the starts of the free parameters and of the windows, window by window.
 #[pyfunction]
 pub fn fit_rows(
     py: Python<'_>,

@@ -98,7 +98,7 @@ mod _core {
         convert::Attractor,
         counts_turns, default_threads,
         exponents::{Ensemble, Lyapunov, growth, lyapunov},
-        fit::{Fit, FitPoint, FittedRun, WindowRows, fit_equations, fit_rows, fit_runs, replay},
+        fit::{Fit, FitPoint, FittedRun, WindowRows, fit_rows, fit_runs, replay},
         library::{effects, formula, roles},
         maps::{BasinMap, Texture, basins_grid, basins_list, texture},
         motion::{Trajectory, acceleration, advance, choose_steps, simulate},

@@ -18,7 +18,7 @@ from pendmap.diagnosis import Discrepancy, diagnosed_model, result, summary
 if TYPE_CHECKING:
     from pathlib import Path
 
-ENTRIES = ("fit_runs", "fit_equations", "fit_rows", "simulate")
+ENTRIES = ("fit_runs", "fit_rows", "simulate")
 """Functions of the core that integrate a model."""
 LOST = "the motion leaves the range of numbers: it begins too fast"
 
