@@ -11,21 +11,12 @@ import xarray as xr
 
 from pendmap.analysis import result, survival
 from pendmap.analysis.basins import basins_of
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.lifetime import fields as drawn_fields
-from pendmap.analysis.draws.lifetime import lifetime_over
+from pendmap.analysis.draws import drawn
+from pendmap.analysis.draws.lifetime import drawn_lifetimes, lifetime_over
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import (
-    Field,
-    Schema,
-    drawn_field,
-    none_below_0,
-    records,
-    summarised,
-    variable,
-)
+from pendmap.analysis.result import Field, Schema, none_below_0, records, summarised, variable
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
@@ -87,7 +78,7 @@ SCHEMA = Schema(
     *result.RUN,
     Field("attractors", "", "attractors with the starts that each captured", read=_attractors),
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_lifetimes,
     result.SECTION,
     Field("from_period_given", "", "1 where the caller chose the beginning", json=False),
     Field("exponent_trajectories", "1", "trajectories the exponent was measured on", json=False),
@@ -178,12 +169,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(model, draws, seed, progress)
         same = partial(lifetime, from_period=from_period, **numerics.options)
-        first = part(progress, 0, len(several) + 1)
-        own = same(model, theta, velocity, starts=starts, progress=first)
+        own = same(model, theta, velocity, starts=starts, progress=several.first)
         again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
-        return lifetime_over(own, several, again, progress)
+        return lifetime_over(own, several, again)
     window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(numerics.seed)

@@ -21,6 +21,7 @@ from pendmap.files.dataset import FORMAT_VERSION
 
 Progress = Callable[[int, int], object]  # Called with units of work done and in total
 
+_STEPS = 10_000  # Number of progress steps of a part of a computation
 TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
@@ -94,6 +95,20 @@ class Numerics:
             "pendmap_version": _core.__version__,
             "format_version": FORMAT_VERSION,
         }
+
+
+def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
+    """Return the progress of one of ``parts`` equal parts of a computation; it never falls."""
+    if progress is None:
+        return None
+    furthest = 0.0
+
+    def report(done: int, total: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done / max(total, 1))
+        progress(round(_STEPS * (number + furthest)), _STEPS * parts)
+
+    return report
 
 
 def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:

@@ -11,12 +11,11 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.orbits import fields as drawn_fields
-from pendmap.analysis.draws.orbits import orbits_over
+from pendmap.analysis.draws import drawn
+from pendmap.analysis.draws.orbits import drawn_orbits, orbits_over
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
@@ -54,7 +53,7 @@ SCHEMA = Schema(
     result.SIMD,
     result.THREADS,
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_orbits,
     result.SECTION,
     *result.BOX,
     *result.VERSIONS,
@@ -143,10 +142,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     grid = window(model, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(model, draws, seed, progress)
         same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
-        own = same(model, progress=part(progress, 0, len(several) + 1))
-        return orbits_over(own, several, same, progress)
+        return orbits_over(same(model, progress=several.first), several, same)
     with core_errors():
         box = grid.bare(units)
         raw = _core.orbits(pendulum, (n, w), *box, numerics.workers, progress)

@@ -11,12 +11,11 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.parameter_map import fields as drawn_fields
-from pendmap.analysis.draws.parameter_map import regimes_over
-from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.draws import drawn
+from pendmap.analysis.draws.parameter_map import drawn_regimes, regimes_over
+from pendmap.analysis.numerics import Numerics, part
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised, variable
+from pendmap.analysis.result import Field, Schema, records, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import (
     SEARCH,
@@ -50,7 +49,6 @@ CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
 _LISTED = 10  # Largest number of regimes in a summary
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
 _FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
-_STEPS = 10_000  # Number of progress steps that two parts of a computation share
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -67,7 +65,7 @@ SCHEMA = Schema(
     Field("regimes", "", "sets of attractors with their shares of the cells", read=_regimes),
     Field("cells", "1", "cells of the plane"),
     *SEARCH,
-    drawn_field(drawn_fields),
+    drawn_regimes,
 )
 
 
@@ -170,15 +168,15 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     search = CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(model, draws, seed, progress)
         box = search.within(units)
         same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
-        own = same(model, curves=curves, progress=part(progress, 0, len(several) + 1))
-        return regimes_over(own, several, same, progress)
+        own = same(model, curves=curves, progress=several.first)
+        return regimes_over(own, several, same)
     over = None
     if curves:
-        first, progress = _halves(progress)
-        over = _curves(model, columns, rows, first)
+        over = _curves(model, columns, rows, part(progress, 0, 2))
+        progress = part(progress, 1, 2)
     with core_errors():
         raw = _core.parameter_map(
             pendulum,
@@ -248,23 +246,6 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "set": ("set", np.arange(len(sets))),
     }
     return xr.Dataset(data, coords=coordinates)
-
-
-def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
-    """Return the progress of two halves of a computation; the first may be restarted."""
-    if progress is None:
-        return None, None
-    furthest = 0.0
-
-    def half(number: int) -> Progress:
-        def report(done: int, total: int) -> None:
-            nonlocal furthest
-            furthest = max(furthest, (number + done / max(total, 1)) / 2)
-            progress(round(_STEPS * furthest), _STEPS)
-
-        return report
-
-    return half(0), half(1)
 
 
 def _curves(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.analysis.summary import of_model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Mapping
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 
     import xarray as xr
 
@@ -104,27 +104,17 @@ def variable(
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
     """Return a JSON object for each index of a dimension, from variables named by its keys."""
-    columns = [dataset[name].values.tolist() for name in variables.values()]
-    return [dict(zip(variables, row, strict=True)) for row in zip(*columns, strict=True)]
+    return [dict(zip(variables, row, strict=True)) for row in rows(dataset, *variables.values())]
+
+
+def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
+    """Return an iterator over the values of variables, index by index of a dimension."""
+    return zip(*(dataset[name].values.tolist() for name in names), strict=True)
 
 
 def none_below_0(value: float) -> float | None:
     """Return a number, or None if it is negative: an event that did not happen."""
     return None if value < 0 else value
-
-
-def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
-    """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
-
-    def read(dataset: xr.Dataset) -> dict[str, Any] | None:
-        a = dataset.attrs
-        if "draws" not in a:
-            return None
-        names = [str(name) for name in dataset["parameter"].values]
-        common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
-        return common | own(dataset)
-
-    return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
 
 UNITS: Final = Field("units", "", "SI or nondimensional", None)

@@ -13,11 +13,10 @@ from pendmap import _core
 from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.tongues import fields as drawn_fields
-from pendmap.analysis.draws.tongues import tongues_over
+from pendmap.analysis.draws import drawn
+from pendmap.analysis.draws.tongues import drawn_tongues, tongues_over
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, summarised, variable
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.analysis.sweep import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.formatting import counted
@@ -87,7 +86,7 @@ SCHEMA = Schema(
     result.SIMD,
     result.THREADS,
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_tongues,
     Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
     Field("moved", "", "1 where a torque makes an orbit of rest", json=False),
     *result.OWN,
@@ -200,11 +199,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
             "the drive, and it never loses its stability"
         )
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(model, draws, seed, progress)
         same = partial(tongues, p_max=p_max, inverted=inverted, threads=threads)
-        first = part(progress, 0, len(several) + 1)
-        own = same(model, asked, plane=plane, refine=refine, progress=first)
-        return tongues_over(own, several, partial(same, omega=own["omega"]), progress)
+        own = same(model, asked, plane=plane, refine=refine, progress=several.first)
+        return tongues_over(own, several, partial(same, omega=own["omega"]))
     frequencies, looked, (found, undamped, upright) = _solved(
         pendulum, asked, p_max, numerics, inverted=inverted, refine=refine
     )

@@ -6,21 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.draws.sample import interval
+from pendmap.analysis.draws import drawn_field, interval
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.analysis.draws.sample import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Draws, Run
 
 
 _KEYS = ("mean_periods", "stderr", "transient_chaos", "persistent")
 
 
-def lifetime_over(
-    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
-) -> xr.Dataset:
+def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a lifetime with the lifetimes of D draws from the same starts.
 
     Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
@@ -28,16 +25,13 @@ def lifetime_over(
     ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
     ``transient_share`` and ``persistent_share``.
     """
-    rows = [[float(one.attrs[key]) for key in _KEYS] for one in draws.each(run, progress)]
+    rows = [[float(one.attrs[key]) for key in _KEYS] for one in draws.each(run)]
     mean, error, transient, persistent = np.array(rows).T
     _, _, low, high = interval(mean)
     found = dataset.assign(
-        {
-            "drawn_mean_periods": ("draw", mean),
-            "drawn_stderr": ("draw", error),
-            "drawn_persistent": ("draw", persistent.astype(np.int8)),
-            **draws.variables,
-        }
+        drawn_mean_periods=("draw", mean),
+        drawn_stderr=("draw", error),
+        drawn_persistent=("draw", persistent.astype(np.int8)),
     )
     found.attrs |= {
         "mean_periods_low": float(low),
@@ -45,11 +39,11 @@ def lifetime_over(
         "transient_share": float(transient.mean()),
         "persistent_share": float(persistent.mean()),
     }
-    draws.complete(found, _summary(found.attrs))
-    return found
+    return draws.complete(found, _summary(found.attrs))
 
 
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
+@drawn_field
+def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a lifetime for the JSON object."""
     a = dataset.attrs
     return {

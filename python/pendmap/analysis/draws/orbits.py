@@ -7,24 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.analysis.draws import drawn_field, interval
 from pendmap.analysis.draws.match import matched, names_of, points_of
-from pendmap.analysis.draws.sample import interval
 from pendmap.analysis.result import records
 from pendmap.formatting import counted, with_error
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Run
-    from pendmap.analysis.numerics import Progress
-
-    Floats = NDArray[np.float64]
+    from pendmap.analysis.draws import Draws, Run
 
 
-def orbits_over(
-    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
-) -> xr.Dataset:
+def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return K closed orbits with statistics of the orbits of D draws.
 
     Orbits are matched by name, and among those of one name by their points. Of each the point and
@@ -41,7 +35,7 @@ def orbits_over(
     multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
     there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
     others = 0
-    for d, one in enumerate(draws.each(run, progress)):
+    for d, one in enumerate(draws.each(run)):
         theirs = points_of(one, "orbit")
         for j, k in enumerate(matched(names, points, names_of(one, "orbit"), theirs)):
             if k < 0:
@@ -58,24 +52,21 @@ def orbits_over(
     spread = interval(state)[1]
     dims = dataset["multipliers"].dims
     found = dataset.assign(
-        {
-            "drawn_theta": (("orbit", "draw"), state[:, 0], {"units": "rad"}),
-            "drawn_velocity": (("orbit", "draw"), state[:, 1], dataset["velocity_point"].attrs),
-            "drawn_multipliers": ((*dims, "draw"), multipliers),
-            "theta_spread": ("orbit", spread[:, 0], {"units": "rad"}),
-            "velocity_spread": ("orbit", spread[:, 1], dataset["velocity_point"].attrs),
-            "multipliers_spread": (dims, interval(multipliers)[1]),
-            "exists": ("orbit", there.mean(axis=1)),
-            "stable_share": ("orbit", stable.mean(axis=1)),
-            **draws.variables,
-        }
+        drawn_theta=(("orbit", "draw"), state[:, 0], {"units": "rad"}),
+        drawn_velocity=(("orbit", "draw"), state[:, 1], dataset["velocity_point"].attrs),
+        drawn_multipliers=((*dims, "draw"), multipliers),
+        theta_spread=("orbit", spread[:, 0], {"units": "rad"}),
+        velocity_spread=("orbit", spread[:, 1], dataset["velocity_point"].attrs),
+        multipliers_spread=(dims, interval(multipliers)[1]),
+        exists=("orbit", there.mean(axis=1)),
+        stable_share=("orbit", stable.mean(axis=1)),
     )
     found.attrs["drawn_others"] = others / total
-    draws.complete(found, _summary(found, others))
-    return found
+    return draws.complete(found, _summary(found, others))
 
 
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
+@drawn_field
+def drawn_orbits(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of closed orbits for the JSON object."""
     spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
     orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)

@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.draws.basins import SURE
-from pendmap.analysis.draws.sample import interval, rows
+from pendmap.analysis.draws import count_sure_cells, drawn_field, outcomes
+from pendmap.analysis.result import rows
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.analysis.draws.sample import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Draws, Run
 
 
 _LISTED = 10  # Largest number of regimes in a summary
+_SHARES = ("outcome_kinds", "share_mean", "share_low", "share_high")  # Variables over the outcomes
 
 
-def regimes_over(
-    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
-) -> xr.Dataset:
+def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a map of M x N cells with the regimes of D draws of the other parameters.
 
     Adds, over ``outcome``, all regimes: ``outcome_kinds`` (as ``regime_kinds``), ``probability``
@@ -34,57 +32,39 @@ def regimes_over(
     dims, shape = dataset["regime"].dims, dataset["regime"].shape
     counts: dict[str, np.ndarray] = {}
     shares: list[dict[str, float]] = []
-    for one in draws.each(run, progress):
+    for one in draws.each(run):
         own = [str(text) for text in one["regime_kinds"].values]
         shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
         for k, text in enumerate(own):
             counts.setdefault(text, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
     share = np.array([[one.get(text, 0.0) for one in shares] for text in counts])
-    mean, _, low, high = interval(share)
-    order = np.argsort(-mean, kind="stable")
+    order = np.argsort(-share.mean(axis=1), kind="stable")
     texts = np.array(list(counts), dtype=str)[order]
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
-    found = dataset.assign(
-        {
-            "outcome_kinds": ("outcome", texts),
-            "probability": (("outcome", *dims), probability, {"units": "1"}),
-            "certainty": (dims, probability.max(axis=0), {"units": "1"}),
-            "drawn_share": (("outcome", "draw"), share[order], {"units": "1"}),
-            "share_mean": ("outcome", mean[order]),
-            "share_low": ("outcome", low[order]),
-            "share_high": ("outcome", high[order]),
-            **draws.variables,
-        }
-    )
-    found.attrs["sure_cells"] = float((found["certainty"].values >= SURE).mean())
-    draws.complete(found, _summary(found))
-    return found
+    found = dataset.assign(outcome_kinds=("outcome", texts))
+    found = found.assign(outcomes(dims, probability, share[order]))
+    return draws.complete(found, _summary(found))
 
 
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
+@drawn_field
+def drawn_regimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a map over two parameters for the JSON object."""
     regimes = [
-        {"kinds": json.loads(str(text)), "share": mean, "ci95": [low, high]}
-        for text, mean, low, high in rows(
-            dataset, "outcome_kinds", "share_mean", "share_low", "share_high"
-        )
+        {"kinds": json.loads(text), "share": mean, "ci95": [low, high]}
+        for text, mean, low, high in rows(dataset, *_SHARES)
     ]
     return {"regimes": regimes, "sure_cells": dataset.attrs["sure_cells"]}
 
 
 def _summary(found: xr.Dataset) -> list[str]:
     lines = []
-    every = list(rows(found, "outcome_kinds", "share_mean", "share_low", "share_high"))
+    every = list(rows(found, *_SHARES))
     for kinds, mean, low, high in every[:_LISTED]:
-        text = str(kinds).strip("[]").replace('"', "")
+        text = kinds.strip("[]").replace('"', "")
         lines.append(
             f"{text}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
             f"[{100 * low:.3g}, {100 * high:.3g}] %."
         )
     if len(every) > _LISTED:
         lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
-    lines.append(
-        f"{100 * found.attrs['sure_cells']:.1f} % of the cells have a regime with a probability of "
-        f"{100 * SURE:g} % or more."
-    )
-    return lines
+    return [*lines, count_sure_cells(found, "a regime")]

@@ -6,25 +6,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.draws.sample import interval, rows
+from pendmap.analysis.draws import drawn_field, interval
+from pendmap.analysis.result import rows
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Run
-    from pendmap.analysis.numerics import Progress
-
-    Floats = NDArray[np.float64]
+    from pendmap.analysis.draws import Draws, Run
+    from pendmap.signal import Floats
 
 
 _TABLES: Final = (("critical", ""), ("inverted", "inverted_"))
 """Tables of critical amplitudes, and the prefixes of the names of their variables."""
 
 
-def tongues_over(
-    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
-) -> xr.Dataset:
+def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return K critical amplitudes with their 95 % bands over D draws.
 
     At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
@@ -34,12 +30,12 @@ def tongues_over(
     (D, parameter).
     """
     columns: dict[str, list[Floats]] = {table: [] for table, _ in _TABLES}
-    for one in draws.each(run, progress):
+    for one in draws.each(run):
         for table, prefix in _TABLES:
             theirs = _numbered(one, prefix)
             mine = _numbered(dataset, prefix)
             columns[table].append(np.array([theirs.get(key, np.nan) for key in mine], dtype=float))
-    found = dataset.assign(draws.variables)
+    found = dataset
     for table, prefix in _TABLES:
         p = np.array(columns[table]).T
         _, _, low, high = interval(p)
@@ -51,11 +47,11 @@ def tongues_over(
                 f"{prefix}exists": (table, np.isfinite(p).mean(axis=1)),
             }
         )
-    draws.complete(found, _lowest(found))
-    return found
+    return draws.complete(found, _lowest(found))
 
 
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
+@drawn_field
+def drawn_tongues(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of critical curves for the JSON object."""
     asked = dataset["asked"].values.astype(bool)
     found = {}
@@ -83,9 +79,9 @@ def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], fl
     numbered = {}
     names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
     for index, multiplier, p in rows(dataset, *names):
-        which = (int(index), int(multiplier))
+        which = index, multiplier
         seen[which] = seen.get(which, -1) + 1
-        numbered[*which, seen[which]] = float(p)
+        numbered[*which, seen[which]] = p
     return numbered
 
 
