@@ -11,8 +11,7 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
-from pendmap.analysis.regimes import kind_of
+from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, kinds_of, undecided
 from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats, Indices, Mask
     from pendmap.units import Units
 
 
@@ -124,17 +124,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
     with core_errors():
-        raw = _core.bifurcation(
-            pendulum,
-            axis.kernel,
-            *search.initial(units),
-            starts,
-            first,
-            search.numerics.tol,
-            search.numerics.max_periods,
-            search.numerics.workers,
-            progress,
-        )
+        initial, limits = search.initial(units), search.numerics.limits
+        raw = _core.bifurcation(pendulum, axis.kernel, *initial, first, *limits, progress)
     dataset = _dataset(raw, axis, units)
     values = {
         **search.attributes(raw, units),
@@ -149,11 +140,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    names = [
-        kind_of(kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
-    ]
-    kinds = sorted(set(names))
-    which = np.array([kinds.index(name) for name in names], dtype=np.intp)
+    kinds, which = kinds_of(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
     value = axis.values[raw.cell] if raw.cell.size else np.empty(0)
@@ -187,7 +174,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     }
     coordinates = {
         **axis.coordinates,
-        "kind": ("kind", np.array(kinds, dtype=str)),
+        "kind": ("kind", kinds),
         "entry": ("entry", np.arange(which.size)),
     }
     return xr.Dataset(data, coords=coordinates)
@@ -241,7 +228,7 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
     return lines
 
 
-def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
+def _spans(values: Floats, where: Mask) -> str:
     """Return the three widest ranges of the marked values, as text."""
     every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
     spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
@@ -300,9 +287,7 @@ def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], lis
     return of_entry, members
 
 
-def _apart(
-    plane: NDArray[np.float64], first: NDArray[np.intp], a: int, b: int, *, closed: bool
-) -> float:
+def _apart(plane: Floats, first: Indices, a: int, b: int, *, closed: bool) -> float:
     """Return the distance from the first point of ``a`` to the nearest of ``b``; 0 for chaos."""
     if not closed:
         return 0.0

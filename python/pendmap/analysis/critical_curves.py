@@ -15,16 +15,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from pendmap.signal import Floats, Indices, Mask
 
-Floats: TypeAlias = NDArray[np.float64]
 
 _BENT = 2e-3  # Largest distance of a drawn line from its curve, fraction of the figure's height
 
@@ -109,7 +108,7 @@ class _Column:
         return cls(heights[kept], multiplier[kept], float(heights[-1]))
 
 
-def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
+def _wanted(x: Floats, columns: Sequence[_Column]) -> Mask:
     """Return which intervals must be halved for the curves of one model."""
     widths = np.abs(np.diff(x))
     wanted = np.zeros(widths.size, dtype=bool)
@@ -147,7 +146,7 @@ def _seen_to_end(a: _Column, b: _Column) -> bool:
     return bool((~ended & (heights < _IN_VIEW)).any())
 
 
-def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _graded(widths: Floats, wanted: Mask) -> Indices:
     """Return indices of intervals to halve, including those much longer than a neighbour."""
     while True:
         after = np.where(wanted, widths / 2, widths)

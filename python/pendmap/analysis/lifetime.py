@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
-    Floats = NDArray[np.float64]
-
 
 _STARTS: Final = 40_000  # Default number of starts
 _MOST_STARTS: Final = 10_000_000  # Largest number of starts

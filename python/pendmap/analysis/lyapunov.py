@@ -19,12 +19,9 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _CLEAR = 3.0

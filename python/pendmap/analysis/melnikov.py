@@ -19,11 +19,10 @@ from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _PHASES, _FINE = (8, 16, 32, 64), 4096

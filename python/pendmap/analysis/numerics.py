@@ -26,20 +26,11 @@ TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
 class Choices(TypedDict):
-    """Numerical choices as passed to the core; 0 threads mean one per processor."""
+    """Numerical choices as keyword arguments of analyses, or as passed to the core."""
 
     tol: float
     max_periods: int | None
-    threads: int
-    seed: int
-
-
-class Options(TypedDict):
-    """Numerical choices as keyword arguments of analyses."""
-
-    tol: float
-    max_periods: int | None
-    threads: int | None
+    threads: Any  # None for one per processor, 0 in the core
     seed: int
 
 
@@ -70,7 +61,7 @@ class Numerics:
         return self.threads or 0
 
     @property
-    def options(self) -> Options:
+    def options(self) -> Choices:
         """The choices as keyword arguments of another analysis."""
         return {
             "tol": self.tol,
@@ -83,6 +74,11 @@ class Numerics:
     def core(self) -> Choices:
         """The choices as passed to the core."""
         return {**self.options, "threads": self.workers}
+
+    @property
+    def limits(self) -> tuple[float, int | None, int]:
+        """Tolerance, largest number of periods and threads, as passed to the core."""
+        return self.tol, self.max_periods, self.workers
 
     def provenance(self) -> dict[str, Any]:
         """Return attributes on how a result was computed, with the time since ``began``."""

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
-    from numpy.typing import NDArray
 
     from pendmap import _core
+    from pendmap.signal import Floats
 
 
 def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
@@ -23,8 +23,8 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     def column(key: str, none: float) -> list[float]:
         return [none if getattr(a, key) is None else getattr(a, key) for a in orbits]
 
-    def measured(key: str, power: int) -> NDArray[np.float64]:
-        values: NDArray[np.float64] = np.array(column(key, np.nan), dtype=float)
+    def measured(key: str, power: int) -> Floats:
+        values: Floats = np.array(column(key, np.nan), dtype=float)
         return np.asarray(units.given(values, power))
 
     multipliers = np.full((len(orbits), 2, 2), np.nan)

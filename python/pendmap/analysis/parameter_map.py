@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Indices
     from pendmap.units import Units
 
 
@@ -178,16 +179,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         over = _curves(model, columns, rows, part(progress, 0, 2))
         progress = part(progress, 1, 2)
     with core_errors():
-        raw = _core.parameter_map(
-            pendulum,
-            (columns.kernel, rows.kernel),
-            *search.initial(units),
-            starts,
-            numerics.tol,
-            numerics.max_periods,
-            numerics.workers,
-            progress,
-        )
+        axes, initial = (columns.kernel, rows.kernel), search.initial(units)
+        raw = _core.parameter_map(pendulum, axes, *initial, *numerics.limits, progress)
     dataset = _dataset(raw, (columns, rows), units).assign(over or {})
     values = {
         **search.attributes(raw, units),
@@ -207,17 +200,11 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     shape = (rows.values.size, columns.values.size)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
-    cell, n, w, own = raw.cell, raw.n, raw.w, raw.share
-    names = [
-        kind_of(kind, int(period), int(turns))
-        for kind, period, turns in zip(raw.kind, n, w, strict=True)
-    ]
-    sets, regime, frequency = regimes(names, cell, cells)
-    kinds = sorted({name for one in sets for name in one if name in set(names)})
-    share = np.zeros((len(kinds), cells))
-    place = {name: k for k, name in enumerate(kinds)}
-    which = np.array([place[name] for name in names], dtype=np.intp)
-    np.add.at(share, (which, cell), own)
+    cell, n, w = raw.cell, raw.n, raw.w
+    kinds, which = kinds_of(raw)
+    sets, regime, frequency = regimes(kinds[which].tolist(), cell, cells)
+    share = np.zeros((kinds.size, cells))
+    np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
     np.fmax.at(exponent, cell, raw.exponent)
     period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
@@ -236,13 +223,13 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "undecided": (dims, raw.undecided.reshape(shape)),
         "failed": (dims, raw.failed.reshape(shape)),
         "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": CHAOS_PERIODS}),
-        "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
+        "share": (("kind", *dims), share.reshape((kinds.size, *shape))),
         **entries(raw, which, units),
     }
     coordinates = {
         **columns.coordinates,
         **rows.coordinates,
-        "kind": ("kind", np.array(kinds, dtype=str)),
+        "kind": ("kind", kinds),
         "set": ("set", np.arange(len(sets))),
     }
     return xr.Dataset(data, coords=coordinates)
@@ -278,7 +265,15 @@ def _curves(
     }
 
 
-def entries(raw: _core.ParameterMap, kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
+def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
+    """Return the kinds of all attractors, sorted, and the index of the kind of each."""
+    each = zip(raw.kind, raw.n.tolist(), raw.w.tolist(), strict=True)
+    names = np.array([kind_of(*one) for one in each], dtype=str)
+    kinds, which = np.unique(names, return_inverse=True)
+    return kinds, which
+
+
+def entries(raw: _core.ParameterMap, kind: Indices, units: Units) -> dict[str, Any]:
     """Return all attractors, each with the index of its kind, over ``entry``."""
     rate = {"units": units.of_rate}
     speed = {"units": units.of_velocity}

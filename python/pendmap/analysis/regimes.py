@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.signal import Floats
+
 
 UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
 
@@ -48,7 +50,7 @@ def order(name: str) -> tuple[int, int, int]:
 
 def regimes(
     names: Sequence[str], cell: NDArray[np.int32], cells: int
-) -> tuple[list[tuple[str, ...]], NDArray[np.int16], NDArray[np.float64]]:
+) -> tuple[list[tuple[str, ...]], NDArray[np.int16], Floats]:
     """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
     bounds = np.searchsorted(cell, np.arange(cells + 1))
     own = [

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import xarray as xr
-    from numpy.typing import NDArray
 
     from pendmap.analysis.numerics import Numerics
     from pendmap.model import Pendulum
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 
@@ -44,11 +44,11 @@ class Varied:
 
     name: str
     """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
-    values: NDArray[np.float64]
+    values: Floats
     """Values in the units of the parameter."""
     parameter: str
     """Name of the parameter in the core."""
-    bare: NDArray[np.float64]
+    bare: Floats
     """The values without dimensions."""
     unit: str
     """Unit of the values; empty where they have none."""
@@ -179,7 +179,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     return Varied(name, values, bare, plain, unit)
 
 
-def _values(name: str, given: object) -> NDArray[np.float64]:
+def _values(name: str, given: object) -> Floats:
     wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
     if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
         raise InputError(f"{wanted}, got {short_repr(given)}")
@@ -217,7 +217,7 @@ _PLASTIC = 1.324717957244746
 _CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
 
 
-def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
     """Return angles and velocities that cover a box evenly; no two are mirror images."""
     shift = 0.5 + (seed * 0.6180339887498949) % 1.0
     # k = 0 may be the centre, where a pendulum at rest stays even if that is unstable.
@@ -245,10 +245,10 @@ class CellSearch:
         """Return the box, in these units; by default that of :func:`pendmap.basins`."""
         return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))
 
-    def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return initial conditions without dimensions; each cell takes the next ``starts``."""
+    def initial(self, units: Units) -> tuple[Floats, Floats, int]:
+        """Return initial conditions without dimensions, and how many of them each cell takes."""
         theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
-        return theta, units.bare(velocity, VELOCITY)
+        return theta, units.bare(velocity, VELOCITY), self.starts
 
     def attributes(self, raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
         """Return the attributes of the search whose result is ``raw``."""

@@ -26,12 +26,11 @@ from pendmap.units import RATE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 _Row: TypeAlias = _core.CriticalAmplitudes
@@ -246,7 +245,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     *,
     inverted: bool,
     refine: bool,
-) -> tuple[Floats, NDArray[np.bool_], tuple[list[_Row], list[_Row], list[_Row]]]:
+) -> tuple[Floats, Mask, tuple[list[_Row], list[_Row], list[_Row]]]:
     """Return frequencies, where folds were sought, and rows: hanging, undamped, inverted rest."""
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
@@ -281,9 +280,9 @@ def _solved(  # noqa: PLR0913 (as for tongues)
 def _folds_to_their_ends(
     omega: Floats,
     found: list[_Row],
-    looked: NDArray[np.bool_],
+    looked: Mask,
     solve: Callable[[Floats], list[_Row]],
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Bisect added frequencies for the ends of folds; return where folds were sought."""
     looked = looked.copy()
     while True:
@@ -403,7 +402,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     return lines
 
 
-def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
+def _inverted(dataset: xr.Dataset, asked: Mask) -> list[str]:
     """Return a summary line on the range in which inverted rest is stable."""
     rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
     if not dataset.attrs["inverted"]:

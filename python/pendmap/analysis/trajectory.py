@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
     Live = Callable[[Floats, Floats, Floats], object]
 
 
@@ -343,7 +343,7 @@ def advance(  # noqa: PLR0913
     steps_per_period: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Advance many starts by the same number of periods.
 
     Parameters

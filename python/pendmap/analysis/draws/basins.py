@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.analysis.draws import Draws, Run
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Mask
 
 
 _SHARES: Final = ("outcome", "share_mean", "share_low", "share_high", "exists")
@@ -154,7 +154,7 @@ def _variables(
     }
 
 
-def _in_boxes(own: xr.DataArray, cells: NDArray[np.bool_]) -> xr.DataArray:
+def _in_boxes(own: xr.DataArray, cells: Mask) -> xr.DataArray:
     """Return the number of true cells in each whole box, at the boxes' centres."""
     window = {name: min(BOX, size) for name, size in own.sizes.items()}
     return own.copy(data=cells).coarsen(window, boundary="trim").sum()

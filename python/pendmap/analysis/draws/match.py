@@ -10,7 +10,8 @@ from scipy.optimize import linear_sum_assignment
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
+
+    from pendmap.signal import Floats
 
 
 _APART = math.pi  # Distance assigned to an attractor without points, rad
@@ -26,7 +27,7 @@ def names_of(dataset: xr.Dataset, one: str) -> list[str]:
     return [str(name) for name in dataset[one].values]
 
 
-def points_of(dataset: xr.Dataset, one: str) -> list[NDArray[np.float64]]:
+def points_of(dataset: xr.Dataset, one: str) -> list[Floats]:
     """Return the stroboscopic points of each attractor or orbit, shape (M, 2)."""
     points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
     owner = dataset[f"point_{one}"].values
@@ -35,9 +36,9 @@ def points_of(dataset: xr.Dataset, one: str) -> list[NDArray[np.float64]]:
 
 def matched(
     names: list[str],
-    points: list[NDArray[np.float64]],
+    points: list[Floats],
     others: list[str],
-    theirs: list[NDArray[np.float64]],
+    theirs: list[Floats],
 ) -> list[int]:
     """Match attractors of equal :func:`plain` names by least distance; return indices, else -1."""
     found = [-1] * len(others)
@@ -52,7 +53,7 @@ def matched(
     return found
 
 
-def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def distance(one: Floats, other: Floats) -> float:
     """Return the mean distance from points of ``one`` to the nearest of ``other``, modulo turns."""
     if not (one.size and other.size):
         return _APART
