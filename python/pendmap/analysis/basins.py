@@ -16,7 +16,7 @@ from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, none_below_0, records, variable
+from pendmap.analysis.result import Field, Schema, none_below_0, variable
 from pendmap.analysis.summary import summarise
 from pendmap.errors import MOST_PERIODS, check_flag, core_errors
 from pendmap.formatting import counted
@@ -40,12 +40,6 @@ _LAYERS: Final = {
 }
 
 
-def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the attractors with their shares for the JSON object."""
-    shares = records(dataset, fraction="fraction", stderr="stderr")
-    return [orbit_table.row(dataset, "attractor", k) | own for k, own in enumerate(shares)]
-
-
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
     a = dataset.attrs
@@ -66,7 +60,12 @@ def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
 SCHEMA = Schema(
     "basins",
     result.UNITS,
-    Field("attractors", "", "attractors with their shares of the starts", read=_attractors),
+    Field(
+        "attractors",
+        "",
+        "attractors with their shares of the starts",
+        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr"),
+    ),
     Field("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Field("failed", "1", "share of the starts that failed or diverged"),
     Field("cells", "1", "starts"),

@@ -35,11 +35,6 @@ _BY_ROUNDING = math.log(1e10)
 """Logarithm of a deviation's growth from which rounding determines the result."""
 
 
-def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the attractor for the JSON object."""
-    return orbit_table.row(dataset, "attractor", 0) if dataset.sizes["attractor"] else None
-
-
 SCHEMA = Schema(
     "lyapunov",
     result.UNITS,
@@ -51,7 +46,12 @@ SCHEMA = Schema(
     Field("exponent_sum", result.OF_RATE, "sum of both exponents"),
     Field("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
     Field("end", "", "captured, chaotic, undamped, undecided or failed"),
-    Field("attractor", "", "the attractor that was reached", read=_attractor),
+    Field(
+        "attractor",
+        "",
+        "the attractor that was reached",
+        read=lambda d: next(iter(orbit_table.objects(d, "attractor")), None),
+    ),
     Field("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
     Field("trajectories", "1", "trajectories of the ensemble"),
     Field("periods", "periods", "length of each of them"),

@@ -15,7 +15,7 @@ from pendmap.analysis.draws import drawn
 from pendmap.analysis.draws.orbits import drawn_orbits, orbits_over
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, records, summarised
+from pendmap.analysis.result import Field, Schema, summarised
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
@@ -35,10 +35,8 @@ _LISTED = 12  # Largest number of orbits in a summary
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
-    return [
-        orbit_table.row(dataset, "orbit", k) | own | {"stable": bool(own["stable"])}
-        for k, own in enumerate(records(dataset, stable="stable", residual="residual"))
-    ]
+    found = orbit_table.objects(dataset, "orbit", "stable", "residual")
+    return [own | {"stable": bool(own["stable"])} for own in found]
 
 
 SCHEMA = Schema(

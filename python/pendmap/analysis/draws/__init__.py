@@ -1,7 +1,6 @@
-"""Models drawn from the covariance of fitted parameters, and results over all draws.
+"""Models drawn from the covariance of fitted parameters.
 
-``match`` identifies attractors and orbits between models; the other modules, one for each analysis,
-compute statistics of its results over the draws.
+The modules, one for each analysis, compute statistics of its results over the draws.
 """
 
 from __future__ import annotations

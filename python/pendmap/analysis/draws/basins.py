@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.draws import count_sure_cells, drawn_field, outcomes
-from pendmap.analysis.draws.match import matched, names_of, plain, points_of
 from pendmap.analysis.fractality import BOX
+from pendmap.analysis.orbit_table import matched, plain, points_of
 from pendmap.analysis.result import rows
 
 if TYPE_CHECKING:
@@ -95,12 +95,12 @@ def _counted(
     def new(points: Floats) -> _End:
         return _End(points, np.zeros(own.shape, np.uint16), none.copy())
 
-    names, points = names_of(dataset, "attractor"), points_of(dataset, "attractor")
+    names, points = dataset["attractor"].values.tolist(), points_of(dataset, "attractor")
     ends = {name: new(mine) for name, mine in zip(names, points, strict=True)}
     start, known = none.copy(), none.astype(np.int64)
     for d, one in enumerate(drawn):
         label = one["label"].values
-        names, points = names_of(one, "attractor"), points_of(one, "attractor")
+        names, points = one["attractor"].values.tolist(), points_of(one, "attractor")
         places = matched(list(ends), [end.points for end in ends.values()], names, points)
         mine = [list(ends)[place] if place >= 0 else "" for place in places]
         for k, name in enumerate(names):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.draws import drawn_field, interval
-from pendmap.analysis.draws.match import matched, names_of, points_of
+from pendmap.analysis.orbit_table import matched, points_of
 from pendmap.analysis.result import records
 from pendmap.formatting import counted, with_error
 
@@ -29,7 +29,7 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
     mean number of orbits of a draw that the model itself lacks.
     """
-    names, points = names_of(dataset, "orbit"), points_of(dataset, "orbit")
+    names, points = dataset["orbit"].values.tolist(), points_of(dataset, "orbit")
     count, total = len(names), len(draws)
     state = np.full((count, 2, total), np.nan)
     multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
@@ -37,7 +37,7 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     others = 0
     for d, one in enumerate(draws.each(run)):
         theirs = points_of(one, "orbit")
-        for j, k in enumerate(matched(names, points, names_of(one, "orbit"), theirs)):
+        for j, k in enumerate(matched(names, points, one["orbit"].values.tolist(), theirs)):
             if k < 0:
                 others += 1
                 continue
