@@ -172,8 +172,8 @@ def uncertainty_exponent(
     found = fitted(eps, hit / fewer, all_ / fewer, "cell")
     if found is None:
         raise InputError("labels have no boundary at enough distances: there is no exponent")
-    counts = (values.astype(np.int64) for values in (hit, all_))
-    return dataclasses.replace(found, **dict(zip(("uncertain", "tried"), counts, strict=True)))
+    hit, all_ = (values.astype(np.int64) for values in (hit, all_))
+    return dataclasses.replace(found, uncertain=hit, tried=all_)
 
 
 def fitted(

@@ -165,16 +165,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start = theta, units.bare(velocity, VELOCITY)
         raw = _core.lyapunov(pendulum, start, choices, progress)
     found, members = raw.attractor, raw.ensemble
+    growth = np.empty((0, 0)) if members is None else members.growth
     exponent, stderr, regular = _value(raw, pendulum.period)
     attractors = [] if found is None else [found]
     dataset = xr.Dataset(
         {
             **orbit_table.table(attractors, units, "attractor"),
-            **_growth(raw, pendulum.period, units),
+            **_growth(raw, growth, pendulum.period, units),
         },
         coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
     )
-    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     values = {
         **numerics.provenance(),
         **_second(raw, exponent, pendulum, units),
@@ -238,10 +238,9 @@ def _second(
     }
 
 
-def _growth(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
+def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) -> dict[str, Any]:
     """Return the growth along the start's trajectory, running means, finite-time exponents."""
     course = np.concatenate([[0.0], np.cumsum(raw.course)])
-    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     count, windows = growth.shape
     time = raw.window * period
     averaged = np.arange(1, windows + 1)

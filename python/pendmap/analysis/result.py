@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import operator
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.analysis.summary import of_model
+from pendmap.model.covariance import misses
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
@@ -85,6 +86,21 @@ class Schema:
         }
 
 
+def of_model(model: Pendulum | Rig, what: str) -> list[str]:
+    """Return summary lines on a model that misses its record or has effects on its reading."""
+    ratio = misses(model.notes)
+    lines = []
+    if math.isfinite(ratio):
+        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
+    names = [effect.name for effect in model.effects if effect.reads]
+    if names:
+        verb = "acts" if len(names) == 1 else "act"
+        lines.append(
+            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+        )
+    return lines
+
+
 def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
     """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
     dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
@@ -140,7 +156,8 @@ OWN: Final = (
     Field("own_p", "1", "amplitude of the model itself", json=False),
     Field("own_omega", "1", "frequency of the model itself", json=False),
 )
-RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
+TIMED: Final = (SECONDS, SIMD, THREADS)
+RUN: Final = (*TIMED, SEED, VERSION, FORMAT)
 VERSIONS: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")

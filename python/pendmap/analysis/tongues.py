@@ -81,9 +81,7 @@ SCHEMA = Schema(
     Field("undamped", "", "the same without damping", read=lambda d: _curves(d, "undamped_")),
     Field("asymptotic", "1", "critical amplitudes by perturbation", read=_asymptotic_curves),
     Field("p_max", "1", "largest amplitude that was looked at"),
-    result.SECONDS,
-    result.SIMD,
-    result.THREADS,
+    *result.TIMED,
     *result.END,
     drawn_tongues,
     Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
@@ -263,28 +261,21 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         # The end of the search bounds the last strip.
         return [(np.array([*r.p, p_max]), np.array([*r.multiplier, 0.0])) for r in rows]
 
-    looked = np.ones(asked.size, dtype=bool)
     with core_errors():
         frequencies, rows = asked, all_at(asked, folds=True)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
             frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
         found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
-        if refine and asked.size > 1:
-            again = partial(solve, one=pendulum, upright=False, folds=True)
-            known = np.isin(frequencies, asked)
-            looked = _folds_to_their_ends(frequencies, found, known, again)
+        again = partial(solve, one=pendulum, upright=False, folds=True)
+        looked = _folds_to_their_ends(frequencies, found, np.isin(frequencies, asked), again)
     return frequencies, looked, (found, undamped, upright)
 
 
 def _folds_to_their_ends(
-    omega: Floats,
-    found: list[_Row],
-    looked: Mask,
-    solve: Callable[[Floats], list[_Row]],
+    omega: Floats, found: list[_Row], looked: Mask, solve: Callable[[Floats], list[_Row]]
 ) -> Mask:
     """Bisect added frequencies for the ends of folds; return where folds were sought."""
-    looked = looked.copy()
     while True:
         places = np.flatnonzero(looked)
         folded = np.array([found[k].fold is not None for k in places])
@@ -329,12 +320,7 @@ def _variables(
     return variables
 
 
-def _asymptotic(
-    found: list[_Row],
-    omega: Floats,
-    gamma: float,
-    p_max: float,
-) -> dict[str, Any]:
+def _asymptotic(found: list[_Row], omega: Floats, gamma: float, p_max: float) -> dict[str, Any]:
     """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
     curves, errors = [], []
     for multiplier, formula in critical_curves.CURVES.values():

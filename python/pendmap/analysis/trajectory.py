@@ -188,11 +188,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     if until <= 0:
         raise InputError(f"until must be a time above 0, got {until:g}")
     periods = until / model.period
+    start, end = (theta, units.bare(velocity, VELOCITY)), units.bare(until, TIME)
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
         if not lyapunov:  # the batches of an exponent depend on the number of samples
-            speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
-            samples = max(samples, _smooth(pendulum, speed, end))
+            samples = max(samples, _smooth(pendulum, start[1], end))
     samples = check_whole("samples", samples, 1, MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
         most = 100 * _MOST_SAMPLES // samples * model.period
@@ -206,8 +206,6 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
 
     with core_errors():
-        start = (theta, units.bare(velocity, VELOCITY))
-        end = units.bare(until, TIME)
         raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, live and shown)
     time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
     event_time = units.given(raw.event_time, TIME)
@@ -237,21 +235,20 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "period": ("period", np.arange(wrapped.size)),
         },
     )
-    turns = math.trunc((float(raw.theta[-1]) - theta) / math.tau)
     values = {
         **numerics.provenance(),
         **_exponent(raw, time, units),
         "theta0": theta,
         "velocity0": velocity,
         "until": float(time[-1]) if raw.interrupted else until,
-        "turns": turns,
+        "turns": math.trunc((float(raw.theta[-1]) - theta) / math.tau),
         "stuck": int(raw.stuck),
         "lyapunov": int(lyapunov),
     }
     if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
     SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, [_summary(dataset, units)], model, "angle and velocity here are")
+    summarised(dataset, _summary(dataset, units), model, "angle and velocity here are")
     return dataset
 
 
@@ -281,7 +278,7 @@ def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, fl
     }
 
 
-def _summary(dataset: xr.Dataset, units: Units) -> str:
+def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     turns, lines = "", []
@@ -293,17 +290,14 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         lines.append(f"INTERRUPTED before {asked}: the result ends where the computation stopped.")
     error = a["end_error"]
     at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
-    lines += [
-        (
-            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
-            f"{turns}, velocity = {units.spoken(format(velocity, '.9g'))}."
-        ),
-        (
-            f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
-            f"after 5 periods{at_end} "
-            f"({a['steps_per_period']} steps a period)."
-        ),
-    ]
+    lines.append(
+        f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad{turns}, velocity = "
+        f"{units.spoken(format(velocity, '.9g'))}."
+    )
+    lines.append(
+        f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
+        f"after 5 periods{at_end} ({a['steps_per_period']} steps a period)."
+    )
     if not a["reached_error"] <= a["tol"]:
         lines.append(
             f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
@@ -330,7 +324,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
             f"{with_error(value, error)} {units.per_time}. Transients are included; basins gives "
             "the exponents of the attractors."
         )
-    return "\n".join(lines)
+    return lines
 
 
 def advance(  # noqa: PLR0913
