@@ -22,6 +22,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from pendmap._core import CriticalAmplitudes
     from pendmap.signal import Floats, Indices, Mask
 
 
@@ -159,6 +160,25 @@ def _graded(widths: Floats, wanted: Mask) -> Indices:
         wanted = wanted | longer
 
 
+def fold_ends(
+    omega: Floats,
+    found: list[CriticalAmplitudes],
+    looked: Mask,
+    solve: Callable[[Floats], list[CriticalAmplitudes]],
+) -> Mask:
+    """Bisect added frequencies for the ends of folds; return where folds were sought."""
+    while True:
+        places = np.flatnonzero(looked)
+        folded = np.array([found[k].fold is not None for k in places])
+        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
+        middles = ((places[:-1] + places[1:]) // 2)[change]
+        if not middles.size:
+            return looked
+        for k, row in zip(middles, solve(omega[middles]), strict=True):
+            found[k] = row
+        looked[middles] = True
+
+
 def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
     """Convert frequencies and amplitudes to coordinates in one of :data:`PLANES`."""
     if plane == PLANES[0]:
@@ -227,3 +247,22 @@ CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
     "tongue 2, second order": (1, second_tongue),
 }
 """Name of each curve, the multiplier on it, and its formula."""
+
+
+def asymptotic(
+    found: list[CriticalAmplitudes], omega: Floats, gamma: float, p_max: float
+) -> tuple[Floats, Floats]:
+    """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
+    curves, errors = [], []
+    for multiplier, formula in CURVES.values():
+        p = formula(omega, gamma)
+        p[p > p_max] = np.nan
+        error = np.full_like(p, np.nan)
+        for k, row in enumerate(found):
+            exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
+            if exact and np.isfinite(p[k]):
+                nearest = min(exact, key=lambda q: abs(q - p[k]))
+                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
+        curves.append(p)
+        errors.append(error)
+    return np.array(curves), np.array(errors)

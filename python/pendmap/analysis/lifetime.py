@@ -11,8 +11,7 @@ import xarray as xr
 
 from pendmap.analysis import result, survival
 from pendmap.analysis.basins import basins_of
-from pendmap.analysis.draws import drawn
-from pendmap.analysis.draws.lifetime import drawn_lifetimes, lifetime_over
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
@@ -26,6 +25,7 @@ from pendmap.units import RATE, TIME, VELOCITY, Units
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
@@ -34,13 +34,26 @@ _STARTS: Final = 40_000  # Default number of starts
 _MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
 """Excess of the exponent over the escape rate that shows transient chaos, standard errors."""
-_DRAWN: Final = 4000  # Largest number of periods of a stored survival curve
+_STORED: Final = 4000  # Largest number of periods of a stored survival curve
+_DRAWN: Final = ("mean_periods", "stderr", "transient_chaos", "persistent")
+"""Attributes that are kept of each draw."""
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
     last = dataset.isel(elapsed=-1)
     return records(last, name="attractor", fraction="fraction", captured="captured")
+
+
+@drawn_field
+def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of a lifetime for the JSON object."""
+    a = dataset.attrs
+    return {
+        "mean_periods_ci95": [a["mean_periods_low"], a["mean_periods_high"]],
+        "transient_share": a["transient_share"],
+        "persistent_share": a["persistent_share"],
+    }
 
 
 SCHEMA = Schema(
@@ -127,7 +140,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Draws the starts, and the models of ``draws``.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the interval of the mean lifetime
-        (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
+        (:func:`pendmap.analysis.lifetime.lifetime_over`).
     max_periods, tol, threads, progress
         As for :func:`pendmap.basins`.
 
@@ -238,7 +251,7 @@ def _curves(
     """Return captures up to each period by each attractor, and tails from all beginnings."""
     label, settle = found["label"].values, found["settle_periods"].values
     last = bound if censored else int(times.max(initial=0)) + 1
-    elapsed = np.unique(np.linspace(0, last, min(last, _DRAWN) + 1).round().astype(np.int64))
+    elapsed = np.unique(np.linspace(0, last, min(last, _STORED) + 1).round().astype(np.int64))
     by = [
         np.searchsorted(np.sort(settle[(label == k) & (settle >= 0)]), elapsed, side="right")
         for k in found["id"].values
@@ -390,3 +403,42 @@ def _why_not(dataset: xr.Dataset, exponent: str) -> str:
         f"{a['exponent_per_period']:.3g} per period; rate {a['escape_rate']:.3g}): those at the "
         "edge of a basin."
     )
+
+
+def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return a lifetime with the lifetimes of D draws from the same starts.
+
+    Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
+    ``drawn_persistent`` (D) and ``drawn`` (D, parameter); attributes ``mean_periods_low`` and
+    ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
+    ``transient_share`` and ``persistent_share``.
+    """
+    rows = [[float(one.attrs[key]) for key in _DRAWN] for one in draws.each(run)]
+    mean, error, transient, persistent = np.array(rows).T
+    _, _, low, high = interval(mean)
+    found = dataset.assign(
+        drawn_mean_periods=("draw", mean),
+        drawn_stderr=("draw", error),
+        drawn_persistent=("draw", persistent.astype(np.int8)),
+    )
+    found.attrs |= {
+        "mean_periods_low": float(low),
+        "mean_periods_high": float(high),
+        "transient_share": float(transient.mean()),
+        "persistent_share": float(persistent.mean()),
+    }
+    return draws.complete(found, _drawn_summary(found.attrs))
+
+
+def _drawn_summary(a: dict[str, Any]) -> list[str]:
+    lines = []
+    if a["transient_share"]:
+        lines.append(
+            f"Mean lifetime: 95 % of the draws in [{a['mean_periods_low']:.4g}, "
+            f"{a['mean_periods_high']:.4g}] periods."
+        )
+    lines.append(
+        f"{100 * a['transient_share']:.3g} % of the draws have transient chaos; in "
+        f"{100 * a['persistent_share']:.3g} % chaos persists."
+    )
+    return lines

@@ -10,18 +10,19 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import orbit_table, result
-from pendmap.analysis.draws import drawn
-from pendmap.analysis.draws.orbits import drawn_orbits, orbits_over
+from pendmap.analysis import result
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.analysis.orbit_table import matched, objects, points_of, table
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
-from pendmap.formatting import counted
+from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
@@ -35,8 +36,16 @@ _LISTED = 12  # Largest number of orbits in a summary
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
-    found = orbit_table.objects(dataset, "orbit", "stable", "residual")
+    found = objects(dataset, "orbit", "stable", "residual")
     return [own | {"stable": bool(own["stable"])} for own in found]
+
+
+@drawn_field
+def drawn_orbits(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of closed orbits for the JSON object."""
+    spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
+    orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
+    return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
 
 
 SCHEMA = Schema(
@@ -106,7 +115,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     draws : int, optional
         As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
-        and are stable (:func:`pendmap.analysis.draws.orbits.orbits_over`).
+        and are stable (:func:`pendmap.analysis.orbits.orbits_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -148,7 +157,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     found = raw.orbits
     dataset = xr.Dataset(
         {
-            **orbit_table.table(found, units, "orbit"),
+            **table(found, units, "orbit"),
             "stable": ("orbit", np.array([o.stable for o in found], dtype=np.int8)),
             "residual": ("orbit", np.array([o.residual for o in found], dtype=float)),
             **paths,
@@ -235,3 +244,71 @@ def _written(value: complex) -> str:
     if value.imag == 0:
         return f"{value.real:.6g}"
     return f"{value.real:.6g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.6g} i"
+
+
+def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return K closed orbits with statistics of the orbits of D draws.
+
+    Orbits are matched by name, and among those of one name by their points. Of each the point and
+    the multipliers nearest to those of the model's orbit are taken. Adds ``drawn_theta``,
+    ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
+    has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
+    standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
+    which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
+    mean number of orbits of a draw that the model itself lacks.
+    """
+    names, points = dataset["orbit"].values.tolist(), points_of(dataset, "orbit")
+    count, total = len(names), len(draws)
+    state = np.full((count, 2, total), np.nan)
+    multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
+    there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
+    others = 0
+    for d, one in enumerate(draws.each(run)):
+        theirs = points_of(one, "orbit")
+        for j, k in enumerate(matched(names, points, one["orbit"].values.tolist(), theirs)):
+            if k < 0:
+                others += 1
+                continue
+            there[k, d], stable[k, d] = True, bool(one["stable"][j])
+            point = np.array([dataset["theta_point"][k], dataset["velocity_point"][k]])
+            away = theirs[j] - point
+            away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
+            state[k, :, d] = point + away[np.argmin(np.hypot(*away.T))]
+            own, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
+            swapped = np.abs(pair[::-1] - own).sum() < np.abs(pair - own).sum()
+            multipliers[k, ..., d] = pair[::-1] if swapped else pair
+    spread = interval(state)[1]
+    dims = dataset["multipliers"].dims
+    found = dataset.assign(
+        drawn_theta=(("orbit", "draw"), state[:, 0], {"units": "rad"}),
+        drawn_velocity=(("orbit", "draw"), state[:, 1], dataset["velocity_point"].attrs),
+        drawn_multipliers=((*dims, "draw"), multipliers),
+        theta_spread=("orbit", spread[:, 0], {"units": "rad"}),
+        velocity_spread=("orbit", spread[:, 1], dataset["velocity_point"].attrs),
+        multipliers_spread=(dims, interval(multipliers)[1]),
+        exists=("orbit", there.mean(axis=1)),
+        stable_share=("orbit", stable.mean(axis=1)),
+    )
+    found.attrs["drawn_others"] = others / total
+    return draws.complete(found, _drawn_summary(found, others))
+
+
+def _drawn_summary(found: xr.Dataset, others: int) -> list[str]:
+    lines = []
+    for k, name in enumerate(found["orbit"].values):
+        theta, velocity = (
+            with_error(float(found[f"{what}_point"][k]), float(found[f"{what}_spread"][k]))
+            for what in ("theta", "velocity")
+        )
+        sizes = np.hypot(*np.moveaxis(found["drawn_multipliers"].values[k], 1, 0))
+        mean, error, _, _ = interval(sizes.max(axis=0))
+        largest = f", largest multiplier {with_error(float(mean), float(error))} in size"
+        lines.append(
+            f"{name}: there in {100 * float(found['exists'][k]):.3g} % of the draws, stable in "
+            f"{100 * float(found['stable_share'][k]):.3g} %; theta = {theta}, velocity = {velocity}"
+            f"{largest if math.isfinite(mean) else ''}."
+        )
+    if others:
+        more = counted(others, "orbit")
+        lines.append(f"All draws together have {more} more, which the own model has not.")
+    return lines

@@ -11,11 +11,10 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result
-from pendmap.analysis.draws import drawn
-from pendmap.analysis.draws.parameter_map import drawn_regimes, regimes_over
+from pendmap.analysis.draws import count_sure_cells, drawn, drawn_field, outcomes
 from pendmap.analysis.numerics import Numerics, part
 from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.result import Field, Schema, records, summarised, variable
+from pendmap.analysis.result import Field, Schema, records, rows, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.sweep import (
     SEARCH,
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
 """Comment of the variable ``chaos_periods``."""
 _LISTED = 10  # Largest number of regimes in a summary
+_SHARES = ("outcome_kinds", "share_mean", "share_low", "share_high")  # Variables over the outcomes
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
 _FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
 
@@ -56,6 +57,16 @@ def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regimes with their shares of the cells for the JSON object."""
     found = records(dataset, kinds="regime_kinds", share="regime_share")
     return [one | {"kinds": json.loads(one["kinds"])} for one in found]
+
+
+@drawn_field
+def drawn_regimes(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of a map over two parameters for the JSON object."""
+    regimes = [
+        {"kinds": json.loads(text), "share": mean, "ci95": [low, high]}
+        for text, mean, low, high in rows(dataset, *_SHARES)
+    ]
+    return {"regimes": regimes, "sure_cells": dataset.attrs["sure_cells"]}
 
 
 SCHEMA = Schema(
@@ -128,7 +139,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell
-        (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
+        (:func:`pendmap.analysis.parameter_map.regimes_over`).
     threads, progress
         As for :func:`pendmap.basins`.
 
@@ -348,3 +359,43 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
     )
     return lines
+
+
+def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return a map of M x N cells with the regimes of D draws of the other parameters.
+
+    Adds, over ``outcome``, all regimes: ``outcome_kinds`` (as ``regime_kinds``), ``probability``
+    (outcome, M, N), ``drawn_share`` (outcome, D), ``share_mean``, ``share_low`` and ``share_high``
+    (the 95 % interval over the draws); over the cells ``certainty``, the probability of the most
+    likely regime; ``drawn`` (D, parameter). Attribute ``sure_cells``: the share of the cells with a
+    certainty of 95 % or more.
+    """
+    dims, shape = dataset["regime"].dims, dataset["regime"].shape
+    counts: dict[str, np.ndarray] = {}
+    shares: list[dict[str, float]] = []
+    for one in draws.each(run):
+        own = [str(text) for text in one["regime_kinds"].values]
+        shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
+        for k, text in enumerate(own):
+            counts.setdefault(text, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
+    share = np.array([[one.get(text, 0.0) for one in shares] for text in counts])
+    order = np.argsort(-share.mean(axis=1), kind="stable")
+    texts = np.array(list(counts), dtype=str)[order]
+    probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
+    found = dataset.assign(outcome_kinds=("outcome", texts))
+    found = found.assign(outcomes(dims, probability, share[order]))
+    return draws.complete(found, _drawn_summary(found))
+
+
+def _drawn_summary(found: xr.Dataset) -> list[str]:
+    lines = []
+    every = list(rows(found, *_SHARES))
+    for kinds, mean, low, high in every[:_LISTED]:
+        text = kinds.strip("[]").replace('"', "")
+        lines.append(
+            f"{text}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
+            f"[{100 * low:.3g}, {100 * high:.3g}] %."
+        )
+    if len(every) > _LISTED:
+        lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
+    return [*lines, count_sure_cells(found, "a regime")]

@@ -13,8 +13,7 @@ from pendmap import _core
 from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
-from pendmap.analysis.draws import drawn
-from pendmap.analysis.draws.tongues import drawn_tongues, tongues_over
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.analysis.sweep import title_without
@@ -24,10 +23,9 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike
 
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Mask
@@ -41,6 +39,8 @@ _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
 _TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
 _STRIP = 1e-6  # Width in p of a strip of stability below which a summary leaves it out
+_TABLES = {"curves": ("critical", ""), "inverted": ("inverted", "inverted_")}
+"""Tables of critical amplitudes over draws: JSON key, dimension, prefix of the variables."""
 NEAR = 0.05  # Relative error below which an asymptotic curve is near the exact one
 
 
@@ -69,6 +69,21 @@ def _asymptotic_curves(dataset: xr.Dataset) -> dict[str, list[float]]:
     asked = dataset["asked"].values.astype(bool)
     rows = zip(dataset["curve"].values, dataset["asymptotic"].values, strict=True)
     return {str(name): p[asked].tolist() for name, p in rows}
+
+
+@drawn_field
+def drawn_tongues(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of critical curves for the JSON object."""
+    asked = dataset["asked"].values.astype(bool)
+    found = {}
+    for key, (table, prefix) in _TABLES.items():
+        mine = dataset.isel({table: asked[dataset[f"{prefix}index"].values]})
+        names = (f"{prefix}{name}" for name in ("multiplier", "p", "p_low", "p_high", "exists"))
+        found[key] = [
+            {"omega": omega, "multiplier": sign, "p": p, "ci95": [low, high], "exists": exists}
+            for omega, sign, p, low, high, exists in result.rows(mine, f"{table}_omega", *names)
+        ]
+    return found
 
 
 SCHEMA = Schema(
@@ -143,7 +158,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         figures.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the band of each critical amplitude
-        (:func:`pendmap.analysis.draws.tongues.tongues_over`).
+        (:func:`pendmap.analysis.tongues.tongues_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -206,11 +221,14 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     moved = bool(found[0].moved)
     if moved:
         undamped = [_NO_REST] * len(found)
+    reach = 0.0 if moved else p_max
+    asymptotic, errors = critical_curves.asymptotic(found, frequencies, pendulum.gamma, reach)
     of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
         **_variables(frequencies, found, undamped, upright),
         **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
-        **_asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max),
+        "asymptotic": (("curve", "omega"), asymptotic, _OF_P),
+        "asymptotic_error": (("curve", "omega"), errors, {"units": "1"}),
     }
     coords: dict[str, Any] = {
         "omega": variable("omega", frequencies, "1", "Omega/w0"),
@@ -268,24 +286,8 @@ def _solved(  # noqa: PLR0913 (as for tongues)
             frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
         found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
         again = partial(solve, one=pendulum, upright=False, folds=True)
-        looked = _folds_to_their_ends(frequencies, found, np.isin(frequencies, asked), again)
+        looked = critical_curves.fold_ends(frequencies, found, np.isin(frequencies, asked), again)
     return frequencies, looked, (found, undamped, upright)
-
-
-def _folds_to_their_ends(
-    omega: Floats, found: list[_Row], looked: Mask, solve: Callable[[Floats], list[_Row]]
-) -> Mask:
-    """Bisect added frequencies for the ends of folds; return where folds were sought."""
-    while True:
-        places = np.flatnonzero(looked)
-        folded = np.array([found[k].fold is not None for k in places])
-        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
-        middles = ((places[:-1] + places[1:]) // 2)[change]
-        if not middles.size:
-            return looked
-        for k, row in zip(middles, solve(omega[middles]), strict=True):
-            found[k] = row
-        looked[middles] = True
 
 
 def _variables(
@@ -318,27 +320,6 @@ def _variables(
             above = [stable for row in rows for stable in row.stable[1:]]
             variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
     return variables
-
-
-def _asymptotic(found: list[_Row], omega: Floats, gamma: float, p_max: float) -> dict[str, Any]:
-    """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
-    curves, errors = [], []
-    for multiplier, formula in critical_curves.CURVES.values():
-        p = formula(omega, gamma)
-        p[p > p_max] = np.nan
-        error = np.full_like(p, np.nan)
-        for k, row in enumerate(found):
-            exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
-            if exact and np.isfinite(p[k]):
-                nearest = min(exact, key=lambda q: abs(q - p[k]))
-                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
-        curves.append(p)
-        errors.append(error)
-    across = ("curve", "omega")
-    return {
-        "asymptotic": (across, np.array(curves), _OF_P),
-        "asymptotic_error": (across, np.array(errors), {"units": "1"}),
-    }
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
@@ -408,3 +389,56 @@ def _inverted(dataset: xr.Dataset, asked: Mask) -> list[str]:
     on = " and on" if high == p_max else ""
     widest = f"in the widest strip from p = {low:.9g} to {high:.9g}{on}, at omega = {where:.6g}"
     return [f"{rest} is stable at {count} of omega, {widest}."]
+
+
+def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return K critical amplitudes with their 95 % bands over D draws.
+
+    At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
+    lowest, and matched by this number. Adds ``drawn_p`` (K, D), nan where a draw has no such
+    amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the share
+    of the draws that have it; the same for inverted rest with the prefix ``inverted_``; ``drawn``
+    (D, parameter).
+    """
+    tables = _TABLES.values()
+    every = [{table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(run)]
+    found = dataset
+    for table, prefix in tables:
+        mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]
+        p = np.array(mine, dtype=float).reshape(-1, len(draws))
+        _, _, low, high = interval(p)
+        found = found.assign(
+            {
+                f"{prefix}drawn_p": ((table, "draw"), p),
+                f"{prefix}p_low": (table, low),
+                f"{prefix}p_high": (table, high),
+                f"{prefix}exists": (table, np.isfinite(p).mean(axis=1)),
+            }
+        )
+    return draws.complete(found, _lowest(found))
+
+
+def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], float]:
+    """Return critical amplitudes by frequency index, multiplier and number."""
+    seen: dict[tuple[int, int], int] = {}
+    numbered = {}
+    names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
+    for index, multiplier, p in result.rows(dataset, *names):
+        which = index, multiplier
+        seen[which] = seen.get(which, -1) + 1
+        numbered[*which, seen[which]] = p
+    return numbered
+
+
+def _lowest(found: xr.Dataset) -> list[str]:
+    p, low, high = (found[name].values for name in ("p", "p_low", "p_high"))
+    asked = found["asked"].values.astype(bool)[found["index"].values]
+    if not asked.any():
+        return []
+    k = int(np.argmin(np.where(asked, p, np.inf)))
+    omega = float(found["omega"].values[found["index"].values[k]])
+    line = (
+        f"The lowest critical amplitude, p = {p[k]:.6g} at omega = {omega:.6g}: 95 % of the "
+        f"draws in [{low[k]:.6g}, {high[k]:.6g}]."
+    )
+    return [line]
