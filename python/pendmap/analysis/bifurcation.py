@@ -9,12 +9,10 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import result
+from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, kinds_of, undecided
 from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
-from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
 from pendmap.errors import check_number, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
@@ -51,7 +49,7 @@ SCHEMA = Schema(
     Field("varied", "", "parameter that varies"),
     Field("branches", "", "attractors followed along the parameter", read=_branches),
     Field("points", "1", "stroboscopic points"),
-    *SEARCH,
+    *sweep.SEARCH,
 )
 
 
@@ -60,7 +58,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges: Mapping[str, tuple[float, float, int]],
     *,
     start: tuple[float, float] | None = None,
-    starts: int = STARTS,
+    starts: int = sweep.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -115,32 +113,31 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(result.sizes)
     ['bound', 'branch', 'entry', 'kind', 'loose', 'p', 'point']
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
-    (axis,) = varied(model, ranges, 1)
-    search = CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
+    bare, units = without_dimensions(pendulum)
+    (axis,) = sweep.varied(pendulum, ranges, 1)
+    search = sweep.CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
     first = None
     if start is not None:
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
     with core_errors():
         initial, limits = search.initial(units), search.numerics.limits
-        raw = _core.bifurcation(pendulum, axis.kernel, *initial, first, *limits, progress)
+        raw = _core.bifurcation(bare, axis.kernel, *initial, first, *limits, progress)
     dataset = _dataset(raw, axis, units)
     values = {
         **search.attributes(raw, units),
         "varied": axis.name,
         "points": dataset.sizes["point"],
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    dataset.attrs["title"] = title(model, axis)
-    lines = [*_summary(dataset), *without_damping(model, axis)]
-    summarised(dataset, lines, model, "attractors are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    dataset.attrs["title"] = sweep.title(pendulum, axis)
+    lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
+    summarised(dataset, lines, pendulum, "attractors are")
     return dataset
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    kinds, which = kinds_of(raw)
+    kinds, which = sweep.kinds_of(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
     value = axis.values[raw.cell] if raw.cell.size else np.empty(0)
@@ -151,7 +148,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         for key in ("value", "theta", "velocity")
     }
     data: dict[str, Any] = {
-        **entries(raw, which, units),
+        **sweep.entries(raw, which, units),
         "entry_value": ("entry", value, axis.attributes),
         "entry_branch": ("entry", of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
@@ -166,7 +163,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "down": (axis.name, raw.down.on, {"comment": "entry, -1: none"}),
         "undecided": (axis.name, raw.undecided),
         "failed": (axis.name, raw.failed),
-        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": CHAOS_PERIODS}),
+        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": sweep.CHAOS_PERIODS}),
         "loose_sweep": ("loose", np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
@@ -198,7 +195,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
-    lines += [*chaos(a), *undecided(a)]
+    lines += [*sweep.chaos(a), *sweep.undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():
         lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")

@@ -172,17 +172,16 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(result.attrs["mean_periods"])
     132
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
-        several = drawn(model, draws, seed, progress)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(lifetime, from_period=from_period, **numerics.options)
-        own = same(model, theta, velocity, starts=starts, progress=several.first)
+        own = same(pendulum, theta, velocity, starts=starts, progress=several.first)
         again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
         return lifetime_over(own, several, again)
     window = ""
@@ -193,7 +192,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         velocity = draw.uniform(-reach, reach, starts)
         window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
-    found = basins_of(model, angles, speeds, check=False, progress=progress, **numerics.options)
+    found = basins_of(pendulum, angles, speeds, check=False, progress=progress, **numerics.options)
     label = found["label"].values.astype(np.int64)
     settle = found["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]
@@ -205,7 +204,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = survival.growth_on_saddle(found, fitted, pendulum, threads)
+    saddle = survival.growth_on_saddle(found, fitted, bare, threads)
     dataset = xr.Dataset(
         {
             **{
@@ -224,7 +223,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     values = {
         **found.attrs,
         **numerics.provenance(),
-        **_measures(found, fitted, saddle, pendulum, units),
+        **_measures(found, fitted, saddle, bare, units),
         "starts": angles.size,
         "captured": int(times.size),
         "censored": censored,
@@ -232,11 +231,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "chaotic_share": _chaotic(found),
         "from_period_given": int(from_period is not None),
     }
-    SCHEMA.complete(dataset, model, values)
+    SCHEMA.complete(dataset, pendulum, values)
     lines = _summary(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
-    summarised(dataset, lines, model, "these lifetimes are")
+    summarised(dataset, lines, pendulum, "these lifetimes are")
     return dataset
 
 

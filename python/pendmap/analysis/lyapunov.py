@@ -151,8 +151,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(result.attrs["exponent"], 1)
     0.3
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
     precision = check_number("precision", precision)
     if not 0 < precision <= _MOST_PRECISION:
@@ -163,37 +162,37 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
-        raw = _core.lyapunov(pendulum, start, choices, progress)
+        raw = _core.lyapunov(bare, start, choices, progress)
     found, members = raw.attractor, raw.ensemble
     growth = np.empty((0, 0)) if members is None else members.growth
-    exponent, stderr, regular = _value(raw, pendulum.period)
+    exponent, stderr, regular = _value(raw, bare.period)
     attractors = [] if found is None else [found]
     dataset = xr.Dataset(
         {
             **orbit_table.table(attractors, units, "attractor"),
-            **_growth(raw, growth, pendulum.period, units),
+            **_growth(raw, growth, bare.period, units),
         },
         coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
     )
     values = {
         **numerics.provenance(),
-        **_second(raw, exponent, pendulum, units),
-        "forcing_period": units.given(pendulum.period, TIME),
+        **_second(raw, exponent, bare, units),
+        "forcing_period": units.given(bare.period, TIME),
         "theta0": theta,
         "velocity0": velocity,
         "exponent": units.given(exponent, RATE),
         "stderr": units.given(stderr, RATE),
         "regular": units.given(regular, RATE),
-        "per_period": exponent * pendulum.period,
-        "per_period_stderr": stderr * pendulum.period,
+        "per_period": exponent * bare.period,
+        "per_period_stderr": stderr * bare.period,
         "transient_periods": -1 if raw.transient is None else raw.transient,
         "trajectories": growth.shape[0],
         "periods": growth.shape[1] * raw.window,
         "dropped_periods": 0 if members is None else members.dropped,
         "precision": precision,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, _summary(dataset), model, "this exponent is")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset), pendulum, "this exponent is")
     return dataset
 
 

@@ -139,21 +139,20 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> result.theta_point.values.round(3), result.stable.values
     (array([-1.318]), array([1], dtype=int8))
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
     numerics = Numerics(threads=threads, seed=seed, progress=progress)
-    grid = window(model, n, w) if grid is None else grid
+    grid = window(pendulum, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
     if draws is not None:
-        several = drawn(model, draws, seed, progress)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
-        return orbits_over(same(model, progress=several.first), several, same)
+        return orbits_over(same(pendulum, progress=several.first), several, same)
     with core_errors():
         box = grid.bare(units)
-        raw = _core.orbits(pendulum, (n, w), *box, numerics.workers, progress)
-        paths = _paths(pendulum, raw.orbits, units)
+        raw = _core.orbits(bare, (n, w), *box, numerics.workers, progress)
+        paths = _paths(bare, raw.orbits, units)
     found = raw.orbits
     dataset = xr.Dataset(
         {
@@ -171,8 +170,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "w": w,
         "cells": grid.cells,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, _summary(dataset, pendulum, friction=raw.friction), model, "orbits are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset, bare, friction=raw.friction), pendulum, "orbits are")
     return dataset
 
 

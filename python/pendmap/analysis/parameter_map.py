@@ -10,43 +10,28 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result
+from pendmap.analysis import result, sweep
 from pendmap.analysis.draws import count_sure_cells, drawn, drawn_field, outcomes
 from pendmap.analysis.numerics import Numerics, part
-from pendmap.analysis.regimes import kind_of, regimes
 from pendmap.analysis.result import Field, Schema, records, rows, summarised, variable
 from pendmap.analysis.summary import box_said
-from pendmap.analysis.sweep import (
-    SEARCH,
-    STARTS,
-    CellSearch,
-    title,
-    undecided_cells,
-    varied,
-    without_damping,
-)
 from pendmap.analysis.tongues import MOST_P, tongues
 from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
-from pendmap.units import RATE, VELOCITY
+from pendmap.units import RATE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Indices
     from pendmap.units import Units
 
 
-CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
-"""Comment of the variable ``chaos_periods``."""
 _LISTED = 10  # Largest number of regimes in a summary
 _SHARES = ("outcome_kinds", "share_mean", "share_low", "share_high")  # Variables over the outcomes
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
@@ -76,7 +61,7 @@ SCHEMA = Schema(
     Field("rows", "", "parameter that varies along rows"),
     Field("regimes", "", "sets of attractors with their shares of the cells", read=_regimes),
     Field("cells", "1", "cells of the plane"),
-    *SEARCH,
+    *sweep.SEARCH,
     drawn_regimes,
 )
 
@@ -85,7 +70,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, tuple[float, float, int]],
     *,
-    starts: int = STARTS,
+    starts: int = sweep.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -173,25 +158,24 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(pendmap.parameter_map(pendulum, ranges, starts=4).sizes)
     ['bound', 'entry', 'kind', 'omega', 'p', 'set']
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
-    columns, rows = varied(model, ranges, 2)
+    bare, units = without_dimensions(pendulum)
+    columns, rows = sweep.varied(pendulum, ranges, 2)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    search = CellSearch(starts, box, numerics)
+    search = sweep.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
-        several = drawn(model, draws, seed, progress)
+        several = drawn(pendulum, draws, seed, progress)
         box = search.within(units)
         same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
-        own = same(model, curves=curves, progress=several.first)
+        own = same(pendulum, curves=curves, progress=several.first)
         return regimes_over(own, several, same)
     over = None
     if curves:
-        over = _curves(model, columns, rows, part(progress, 0, 2))
+        over = _curves(pendulum, columns, rows, part(progress, 0, 2))
         progress = part(progress, 1, 2)
     with core_errors():
         axes, initial = (columns.kernel, rows.kernel), search.initial(units)
-        raw = _core.parameter_map(pendulum, axes, *initial, *numerics.limits, progress)
+        raw = _core.parameter_map(bare, axes, *initial, *numerics.limits, progress)
     dataset = _dataset(raw, (columns, rows), units).assign(over or {})
     values = {
         **search.attributes(raw, units),
@@ -199,10 +183,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         "rows": rows.name,
         "cells": columns.values.size * rows.values.size,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    dataset.attrs["title"] = title(model, columns, rows)
-    lines = [*_summary(dataset), *without_damping(model, columns, rows)]
-    summarised(dataset, lines, model, "attractors are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
+    lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
+    summarised(dataset, lines, pendulum, "attractors are")
     return dataset
 
 
@@ -212,8 +196,8 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
     cell, n, w = raw.cell, raw.n, raw.w
-    kinds, which = kinds_of(raw)
-    sets, regime, frequency = regimes(kinds[which].tolist(), cell, cells)
+    kinds, which = sweep.kinds_of(raw)
+    sets, regime, frequency = sweep.regimes(kinds[which].tolist(), cell, cells)
     share = np.zeros((kinds.size, cells))
     np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
@@ -233,9 +217,9 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "exponent": variable(dims, units.given(exponent, RATE).reshape(shape), units.of_rate),
         "undecided": (dims, raw.undecided.reshape(shape)),
         "failed": (dims, raw.failed.reshape(shape)),
-        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": CHAOS_PERIODS}),
+        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": sweep.CHAOS_PERIODS}),
         "share": (("kind", *dims), share.reshape((kinds.size, *shape))),
-        **entries(raw, which, units),
+        **sweep.entries(raw, which, units),
     }
     coordinates = {
         **columns.coordinates,
@@ -276,52 +260,6 @@ def _curves(
     }
 
 
-def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
-    """Return the kinds of all attractors, sorted, and the index of the kind of each."""
-    each = zip(raw.kind, raw.n.tolist(), raw.w.tolist(), strict=True)
-    names = np.array([kind_of(*one) for one in each], dtype=str)
-    kinds, which = np.unique(names, return_inverse=True)
-    return kinds, which
-
-
-def entries(raw: _core.ParameterMap, kind: Indices, units: Units) -> dict[str, Any]:
-    """Return all attractors, each with the index of its kind, over ``entry``."""
-    rate = {"units": units.of_rate}
-    speed = {"units": units.of_velocity}
-    return {
-        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
-        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
-        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
-        "entry_w": ("entry", raw.w),
-        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
-        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
-        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
-        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
-        "entry_share": ("entry", raw.share),
-    }
-
-
-def chaos(attributes: Mapping[str, Any]) -> list[str]:
-    """Return a summary line on how long chaos was followed, if there is any."""
-    periods = attributes["chaos_periods"]
-    if not periods:
-        return []
-    line = (
-        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
-        "chaos_periods contains each); a longer transient looks the same."
-    )
-    return [line]
-
-
-def undecided(attributes: Mapping[str, Any]) -> list[str]:
-    """Return summary lines on the shares of undecided and failed starts."""
-    return [
-        f"{100 * attributes[key]:.3g} % of the starts {word}."
-        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
-        if attributes[key] > 0
-    ]
-
-
 def _place_text(place: dict[str, Any]) -> str:
     """Return the ranges of a group of cells, and its size, as text."""
     spans = [
@@ -346,8 +284,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    lines += [*chaos(a), *undecided(a)]
-    places = undecided_cells(dataset)
+    lines += [*sweep.chaos(a), *sweep.undecided(a)]
+    places = sweep.undecided_cells(dataset)
     if places:
         listed = "; ".join(_place_text(place) for place in places[:_PLACES])
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""

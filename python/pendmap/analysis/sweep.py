@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,20 +23,22 @@ from pendmap.errors import (
     check_whole,
     short_repr,
 )
+from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
-from pendmap.units import VELOCITY
+from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import xarray as xr
+    from numpy.typing import NDArray
 
     from pendmap.analysis.numerics import Numerics
     from pendmap.model import Pendulum
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
     from pendmap.units import Units
 
 
@@ -210,11 +214,26 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
+CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
+"""Comment of the variable ``chaos_periods``."""
 STARTS = 9  # Default number of initial conditions of a cell
 _SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746
 """Plastic number, whose powers give an even additive recurrence in two dimensions."""
 _CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
+UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
+
+_ORDER = (
+    "rest",
+    "inverted rest",
+    "oscillation",
+    "rotation",
+    "quasiperiodic rotation",
+    "libration chaos",
+    "rotating chaos",
+    "tumbling chaos",
+    UNDECIDED,
+)
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
@@ -276,6 +295,85 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
         mean = float(share.values[mine].mean())
         found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
     return sorted(found, key=lambda one: -one["cells"])
+
+
+def kind_of(kind: str, n: int, w: int) -> str:
+    """Return the name of a kind of attractor, like ``rotation 1:2``; mirror images have one."""
+    if kind == "oscillation":
+        return f"oscillation period {n}"
+    if kind == "rotation":
+        return f"rotation {n}:{abs(w)}"
+    return kind.replace("_", " ")
+
+
+def order(name: str) -> tuple[int, int, int]:
+    """Return the rank of a kind: rest first, chaos last, short periods before long."""
+    place = next(k for k, word in enumerate(_ORDER) if name.startswith(word))
+    digits = name.rsplit(" ", 1)[-1]
+    n, _, w = digits.partition(":")
+    return (place, int(n) if n.isdigit() else 0, int(w) if w.isdigit() else 0)
+
+
+def regimes(
+    names: Sequence[str], cell: NDArray[np.int32], cells: int
+) -> tuple[list[tuple[str, ...]], NDArray[np.int16], Floats]:
+    """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
+    bounds = np.searchsorted(cell, np.arange(cells + 1))
+    own = [
+        tuple(sorted(set(names[low:high]), key=order)) or (UNDECIDED,)
+        for low, high in itertools.pairwise(bounds)
+    ]
+    count = Counter(own)
+    sets = sorted(count, key=lambda one: (-count[one], [order(name) for name in one]))
+    place = {one: k for k, one in enumerate(sets)}
+    share = np.array([count[one] / cells for one in sets])
+    return sets, np.array([place[one] for one in own], dtype=np.int16), share
+
+
+def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
+    """Return the kinds of all attractors, sorted, and the index of the kind of each."""
+    each = zip(raw.kind, raw.n.tolist(), raw.w.tolist(), strict=True)
+    names = np.array([kind_of(*one) for one in each], dtype=str)
+    kinds, which = np.unique(names, return_inverse=True)
+    return kinds, which
+
+
+def entries(raw: _core.ParameterMap, kind: Indices, units: Units) -> dict[str, Any]:
+    """Return all attractors, each with the index of its kind, over ``entry``."""
+    rate = {"units": units.of_rate}
+    speed = {"units": units.of_velocity}
+    return {
+        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
+        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
+        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
+        "entry_w": ("entry", raw.w),
+        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
+        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
+        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
+        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
+        "entry_share": ("entry", raw.share),
+    }
+
+
+def chaos(attributes: Mapping[str, Any]) -> list[str]:
+    """Return a summary line on how long chaos was followed, if there is any."""
+    periods = attributes["chaos_periods"]
+    if not periods:
+        return []
+    line = (
+        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
+        "chaos_periods contains each); a longer transient looks the same."
+    )
+    return [line]
+
+
+def undecided(attributes: Mapping[str, Any]) -> list[str]:
+    """Return summary lines on the shares of undecided and failed starts."""
+    return [
+        f"{100 * attributes[key]:.3g} % of the starts {word}."
+        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
+        if attributes[key] > 0
+    ]
 
 
 SEARCH = (

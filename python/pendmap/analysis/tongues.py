@@ -192,8 +192,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(float(result.p.min()), 3)
     0.2
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     if omega is None:  # evenly spread in the plane
         low, high, count = OMEGA
         omega = np.linspace(*OMEGA)
@@ -205,24 +204,24 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     if plane not in PLANES:
         raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
     refine, inverted = check_flag("refine", refine), check_flag("inverted", inverted)
-    if pendulum.theta_r > 0:
+    if bare.theta_r > 0:
         raise InputError(
-            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
+            f"theta_r must be 0, got {bare.theta_r:g}: friction holds hanging rest whatever "
             "the drive, and it never loses its stability"
         )
     if draws is not None:
-        several = drawn(model, draws, seed, progress)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(tongues, p_max=p_max, inverted=inverted, threads=threads)
-        own = same(model, asked, plane=plane, refine=refine, progress=several.first)
+        own = same(pendulum, asked, plane=plane, refine=refine, progress=several.first)
         return tongues_over(own, several, partial(same, omega=own["omega"]))
     frequencies, looked, (found, undamped, upright) = _solved(
-        pendulum, asked, p_max, numerics, inverted=inverted, refine=refine
+        bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
     moved = bool(found[0].moved)
     if moved:
         undamped = [_NO_REST] * len(found)
     reach = 0.0 if moved else p_max
-    asymptotic, errors = critical_curves.asymptotic(found, frequencies, pendulum.gamma, reach)
+    asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
     of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
         **_variables(frequencies, found, undamped, upright),
@@ -244,12 +243,12 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "p_max": p_max,
         "moved": int(moved),
         "inverted": int(upright[0].rest),
-        "own_p": pendulum.p,
-        "own_omega": pendulum.omega,
+        "own_p": bare.p,
+        "own_omega": bare.omega,
     }
-    SCHEMA.complete(dataset, model, values)
-    dataset.attrs["title"] = title_without(model, "p", "omega", "phase")
-    summarised(dataset, _summary(dataset), model, "curves are")
+    SCHEMA.complete(dataset, pendulum, values)
+    dataset.attrs["title"] = title_without(pendulum, "p", "omega", "phase")
+    summarised(dataset, _summary(dataset), pendulum, "curves are")
     return dataset
 
 

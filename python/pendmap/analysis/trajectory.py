@@ -173,29 +173,28 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(float(result.theta[-1]), 3)
     0.446
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     check_callable("live", live, "three arrays, times, angles and velocities")
     numerics = Numerics(tol)
     theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
     until = check_number("until", until)
     lyapunov = check_flag("lyapunov", lyapunov)
-    if abs(pendulum.p) > _STRONGEST:
+    if abs(bare.p) > _STRONGEST:
         raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            f"p must be at most {_STRONGEST:g} times gravity, got {bare.p:g}: the number "
             "of steps grows with its root"
         )
     if until <= 0:
         raise InputError(f"until must be a time above 0, got {until:g}")
-    periods = until / model.period
+    periods = until / pendulum.period
     start, end = (theta, units.bare(velocity, VELOCITY)), units.bare(until, TIME)
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
         if not lyapunov:  # the batches of an exponent depend on the number of samples
-            samples = max(samples, _smooth(pendulum, start[1], end))
+            samples = max(samples, _smooth(bare, start[1], end))
     samples = check_whole("samples", samples, 1, MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
-        most = 100 * _MOST_SAMPLES // samples * model.period
+        most = 100 * _MOST_SAMPLES // samples * pendulum.period
         raise InputError(
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
@@ -206,11 +205,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
 
     with core_errors():
-        raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, live and shown)
+        raw = _core.simulate(bare, start, end, numerics.tol, samples, lyapunov, live and shown)
     time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
     event_time = units.given(raw.event_time, TIME)
     once = np.arange(0, time.size, samples)
-    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
+    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
         once = once[:-1]  # the end, between two samples
     angle = raw.theta[once]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
@@ -220,7 +219,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "velocity": variable("time", speed, units.of_velocity, units.derivative),
             "energy": (
                 "time",
-                energy(raw.theta, speed, model.attributes),
+                energy(raw.theta, speed, pendulum.attributes),
                 {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
             ),
             "section_theta": ("period", wrapped, {"units": "rad"}),
@@ -247,8 +246,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     }
     if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, _summary(dataset, units), model, "angle and velocity here are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset, units), pendulum, "angle and velocity here are")
     return dataset
 
 

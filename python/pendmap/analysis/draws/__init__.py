@@ -118,13 +118,8 @@ def drawn(
             )
     middle = np.array([there[name] for name in known.names], dtype=float)
     root = known.root
-    sizes = {
-        f"{effect.name}.{entry['name']}"
-        for effect in model.effects
-        if effect.brakes
-        for entry in effect.definition["parameters"]
-        if entry["role"] == "size"
-    }
+    brakes = (effect for effect in model.effects if effect.brakes)
+    sizes = {f"{effect.name}.{size}" for effect in brakes for size in effect.sizes}
     signs = np.where([name in sizes for name in known.names], np.sign(middle), 0.0)
     source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))
     values, models = [], []
