@@ -378,7 +378,7 @@ def _complete(
             "fraction": ("attractor", fraction),
             "stderr": ("attractor", stderr),
         }
-    ).assign_coords(attractor=("attractor", np.array([a.name for a in attractors], dtype=str)))
+    )
     settle = dataset["settle_periods"].values
     settled = settle[settle >= 0]
     values = {

@@ -140,7 +140,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     kinds, which = sweep.kinds_of(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
-    value = axis.values[raw.cell] if raw.cell.size else np.empty(0)
+    value = axis.values[raw.cell]
     speed = {"units": units.of_velocity}
     ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
     loose = {

@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import xarray as xr
 
 from pendmap.analysis import result, survival
 from pendmap.analysis.basins import basins_of
@@ -23,6 +22,7 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.draws import Draws, Run
@@ -205,20 +205,12 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
     saddle = survival.growth_on_saddle(found, fitted, bare, threads)
-    dataset = xr.Dataset(
+    dataset = found.drop_dims("start").assign(
         {
-            **{
-                name: found[name]
-                for name in found.data_vars
-                if "attractor" in found[name].dims or "point" in found[name].dims
-            },
             **_curves(found, times, censored, bound),
-            "start_theta": found["start_theta"],
-            "start_velocity": found["start_velocity"],
+            **{name: found[name] for name in ("start_theta", "start_velocity", "label")},
             "capture_period": ("start", settle.astype(np.int32), {"comment": "-1: never"}),
-            "label": found["label"],
-        },
-        coords={"attractor": found["attractor"]},
+        }
     )
     values = {
         **found.attrs,

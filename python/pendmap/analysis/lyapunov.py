@@ -166,13 +166,11 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     found, members = raw.attractor, raw.ensemble
     growth = np.empty((0, 0)) if members is None else members.growth
     exponent, stderr, regular = _value(raw, bare.period)
-    attractors = [] if found is None else [found]
     dataset = xr.Dataset(
         {
-            **orbit_table.table(attractors, units, "attractor"),
+            **orbit_table.table([] if found is None else [found], units, "attractor"),
             **_growth(raw, growth, bare.period, units),
-        },
-        coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
+        }
     )
     values = {
         **numerics.provenance(),

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
+    from numpy.typing import NDArray
 
     from pendmap import _core
     from pendmap.signal import Floats
@@ -26,12 +27,11 @@ _APART = math.pi  # Distance assigned to an attractor without points, rad
 def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
     """Return orbits as variables over the dimension ``one``, their points over ``point``."""
 
-    def column(key: str, none: float) -> list[float]:
-        return [none if getattr(a, key) is None else getattr(a, key) for a in orbits]
+    def whole(key: str) -> NDArray[np.int32]:
+        return np.array([getattr(a, key) or 0 for a in orbits], dtype=np.int32)
 
     def measured(key: str, power: int) -> Floats:
-        values: Floats = np.array(column(key, np.nan), dtype=float)
-        return np.asarray(units.given(values, power))
+        return np.asarray(units.given(np.array([getattr(a, key) for a in orbits], float), power))
 
     multipliers = np.full((len(orbits), 2, 2), np.nan)
     for pairs, orbit in zip(multipliers, orbits, strict=True):
@@ -44,10 +44,11 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
     of_velocity = {"units": units.of_velocity}
     return {
+        one: (one, np.array([a.name for a in orbits], dtype=str)),
         "id": (one, np.arange(1, len(orbits) + 1, dtype=np.int32)),
         "kind": (one, np.array([a.kind for a in orbits], dtype=str)),
-        "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
-        "w": (one, np.array(column("w", 0), dtype=np.int32)),
+        "n": (one, whole("n"), {"comment": "0: no meaning"}),
+        "w": (one, whole("w")),
         "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
         "velocity_point": (one, speed, of_velocity),
         "period": (one, measured("period", TIME), {"units": units.of_time}),
@@ -55,7 +56,7 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
         "exponent_stderr": (one, measured("exponent_stderr", RATE), {"units": units.of_rate}),
         "twin": (
             one,
-            np.array(column("twin", 0), dtype=np.int32),
+            whole("twin"),
             {"comment": "number of the mirror image; its own where symmetric, 0 if not known"},
         ),
         "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),

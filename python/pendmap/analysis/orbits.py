@@ -160,8 +160,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
             "stable": ("orbit", np.array([o.stable for o in found], dtype=np.int8)),
             "residual": ("orbit", np.array([o.residual for o in found], dtype=float)),
             **paths,
-        },
-        coords={"orbit": ("orbit", np.array([o.name for o in found], dtype=str))},
+        }
     )
     values = {
         **numerics.provenance(),

@@ -137,30 +137,27 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
-    powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
-    # Parameter of the rig that each laboratory quantity changes, and the factor.
-    laboratory: dict[str, tuple[str, float]] = {}
+    # Name in the core, factor and power of w0 of each quantity.
+    own = {bare: (bare, 1.0, 0) for bare in known if "." not in bare}
     if isinstance(model, Rig):
-        laboratory["frequency_hz"] = ("Omega", math.tau)
+        for bare in ("gamma", "omega", "phase", "theta_r"):
+            si, power = COUNTERPARTS[bare]
+            own[si] = (bare, 1.0, power)
+        own["frequency_hz"] = ("omega", math.tau, 1)
         if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
-            laboratory["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity)
-        own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
-        powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
-        powers |= {name: own[si] for name, (si, _) in laboratory.items()}
+            own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
-    if name not in powers and name not in shared:
-        there = ", ".join([*powers, *shared])
+    if name not in own and name not in shared:
+        there = ", ".join([*own, *shared])
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
         )
     values = _values(name, given)
-    if name in powers:
-        bare, power = powers[name]
-        factor = 1.0
-        if name in laboratory:
+    if name in own:
+        bare, factor, power = own[name]
+        if name in {"frequency_hz", "stroke_mm"}:
             check(name, values[0])
-            factor = laboratory[name][1]
         plain = units.bare(factor * values, power)
         # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
@@ -174,7 +171,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
             )
         one = dataclasses.replace(effects[which], ci95={})
         changed = ({**one.parameters, parameter: float(x)} for x in values)
-        bared = [dataclasses.replace(one, parameters=own).bare(units) for own in changed]
+        bared = [dataclasses.replace(one, parameters=mine).bare(units) for mine in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
             unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
