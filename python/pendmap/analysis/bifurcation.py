@@ -13,7 +13,7 @@ from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
-from pendmap.errors import check_number, core_errors
+from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
@@ -118,6 +118,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     search = sweep.CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
     first = None
     if start is not None:
+        if np.shape(start) != (2,):
+            raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
     with core_errors():
