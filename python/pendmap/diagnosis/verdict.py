@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel, State
+    from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.residuals.by_run import RunByRun
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
@@ -196,6 +197,7 @@ class Assessment:
     form: GoodnessOfFit
     probabilities: tuple[float, ...]  # That each name, or one of its class, is right
     approximate: bool  # Whether names are given with reserve: the fit is poor, or one is uncertain
+    thresholds: Thresholds  # Thresholds of all decisions
 
 
 def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: float) -> Assessment:
@@ -252,6 +254,7 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         form,
         sure,
         verdict == "partial" or min(sure, default=1.0) < limits.sure,
+        limits,
     )
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.diagnosis.result import PLACES
-from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.report.document import Picture, bullets, code
 from pendmap.report.wording import (
     before_and_after,
@@ -73,7 +72,7 @@ def verdict(found: Discrepancy) -> Iterator[str]:
 def _statistics(found: Discrepancy) -> Iterator[str]:
     """Yield the statistics on which the verdict is based."""
     judged = found.assessment
-    form, limits = judged.form, Thresholds()
+    form, limits = judged.form, judged.thresholds
     yield (
         f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
         f"1; the uncertainty of the noise allows up to {number(judged.ratio_allowed, 4)}. On "

@@ -14,7 +14,6 @@ from pendmap.diagnosis.next_experiment.power import (
     predict_limits,
     predict_separation,
 )
-from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -62,13 +61,14 @@ class Advice:
 
 
 def detection_limits(
-    scores: Scores, level: float, found: Collection[str], units: Units
+    scores: Scores, level: float, found: Collection[str], units: Units, chance: float
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
     A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect,
     orthogonal to the fitted parameters and initial states. The gain has a noncentral chi-squared
-    distribution and must exceed the threshold of the search.
+    distribution and must exceed the threshold of the search, which noise alone exceeds with the
+    probability ``chance``.
     """
     from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
 
@@ -79,7 +79,7 @@ def detection_limits(
         if candidate.name in found:
             continue
         among = len(choices) * choices[candidate.name]
-        threshold = float(chdtri(candidate.count, Thresholds().chance / among))
+        threshold = float(chdtri(candidate.count, chance / among))
         wanted = required_gain(threshold, len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
@@ -129,11 +129,16 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     The aim is to distinguish equivalent names (``s G`` of 25), whatever the verdict; else to halve
     the widest interval of named effects; else to lower the detection limits.
     """
-    limits = detection_limits(scores, level, best.fitted.names, best.fitted.fit.model.units)
+    names, units, chance = (
+        best.fitted.names,
+        best.fitted.fit.model.units,
+        assessment.thresholds.chance,
+    )
+    limits = detection_limits(scores, level, names, units, chance)
 
     def proposed() -> Outlook | None:
         if any(len(each.equivalent) > 1 for each in assessment.identified):
-            return predict_separation(data, nearest, assessment.identified, level, reasons)
+            return predict_separation(data, nearest, assessment, level, reasons)
         if assessment.verdict == "named":
             return predict_interval(data, best, level, reasons)
         return predict_limits(data, best, scores, reasons)

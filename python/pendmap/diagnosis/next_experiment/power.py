@@ -19,10 +19,9 @@ import numpy as np
 from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.diagnosis.next_experiment.information import Prospects
 from pendmap.diagnosis.refit import Z95
-from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.further import Reasons
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel
-    from pendmap.diagnosis.verdict import Alternative, Identifiability
+    from pendmap.diagnosis.verdict import Alternative, Assessment
 
 CLEAR: Final = 25.0  # ``s G`` from which a wrong name has a probability of at most 0.6 %
 
@@ -56,14 +55,14 @@ class _Pair:
 def predict_separation(
     data: DataSplit,
     found: ScoredModel,
-    identified: Sequence[Identifiability],
+    assessment: Assessment,
     level: float,
     reasons: Reasons,
 ) -> Outlook:
     """Return the predicted separation of indistinguishable names after each proposal."""
     pairs = [
         _Pair(each.candidate, alternative, _shapes(alternative.candidate))
-        for each in identified
+        for each in assessment.identified
         for alternative in each.alternatives
         if alternative.alike and not alternative.contains
     ]
@@ -93,7 +92,7 @@ def predict_separation(
                 proposal,
                 min(powers),
                 min(sum(map(chance_wrong_name, powers)), 1.0),
-                math.prod(map(chance_resolved, powers)),
+                math.prod(chance_resolved(power, assessment.thresholds.alike) for power in powers),
             )
         )
     about = dict.fromkeys(
@@ -264,9 +263,9 @@ def chance_wrong_name(power: float) -> float:
     return _tail(math.sqrt(max(power, 0.0)) / 2)
 
 
-def chance_resolved(power: float) -> float:
-    """Return the probability that the wrong one of two names falls behind by the threshold."""
-    return 1.0 - _tail((power - Thresholds().alike) / (2 * math.sqrt(power))) if power > 0 else 0.0
+def chance_resolved(power: float, alike: float) -> float:
+    """Return the probability that the wrong one of two names falls behind by ``alike``."""
+    return 1.0 - _tail((power - alike) / (2 * math.sqrt(power))) if power > 0 else 0.0
 
 
 def _tail(z: float) -> float:
