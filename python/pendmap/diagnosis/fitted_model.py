@@ -29,10 +29,6 @@ Windows = tuple[tuple[int, int, int, float, float], ...]
 Given = ParamSpec("Given")
 Found = TypeVar("Found")
 
-MOST_STEPS: Final = 40  # Most steps of a fit
-
-QUICK: Final = 4.0  # Growth factor of windows between stages of a fit
-
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one independent reading's, below which a fit ends."""
 
@@ -133,32 +129,17 @@ class FittedModel:
         return len(self.fit.names) + len(self.zeroed) + scanned
 
 
-def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
+def fit_model(
     data: DataSplit,
     model: Rig,
     free: Sequence[str],
     chosen: Sequence[Candidate] = (),
     *,
-    start: Mapping[str, float] | None = None,
-    windows: Windows | None = None,
-    steps: int = MOST_STEPS,
-    least_gain: float = 1e-3,
     zeroed: Sequence[str] = (),
-    target: float = math.inf,
+    **search: Any,  # noqa: ANN401 (arguments of fit_runs)
 ) -> FittedModel:
-    """Fit a model to records; ``zeroed`` are coefficients fixed at 0, the others as in fit_runs."""
-    fit = fit_runs(
-        data.fitted,
-        model,
-        free,
-        start=start,
-        windows=windows,
-        profiled=(),
-        steps=steps,
-        least_gain=least_gain,
-        growth=QUICK,
-        target=target,
-    )
+    """Fit a model to records, without profiles; ``zeroed`` are coefficients fixed at 0."""
+    fit = fit_runs(data.fitted, model, free, profiled=(), **search)
     return FittedModel(fit, tuple(free), tuple(chosen), data.fitted, data.floors, tuple(zeroed))
 
 
@@ -176,32 +157,20 @@ def none_if_diverged(fit: Callable[Given, Found]) -> Callable[Given, Found | Non
 
 
 @none_if_diverged
-def fit_again(  # noqa: PLR0913 (what changes, and when the fit ends)
+def fit_again(
     data: DataSplit,
     fitted: FittedModel,
-    *,
-    model: Rig | None = None,
-    free: Sequence[str] | None = None,
-    chosen: Sequence[Candidate] | None = None,
-    start: Mapping[str, float] | None = None,
-    zeroed: Sequence[str] = (),
-    steps: int = MOST_STEPS,
-    least_gain: float = 1e-3,
-    target: float = math.inf,
+    **changed: Any,  # noqa: ANN401 (arguments of fit_model)
 ) -> FittedModel:
     """Fit a model again, with the given arguments changed, from its parameters and windows."""
-    return fit_model(
-        data,
-        fitted.fit.model if model is None else model,
-        fitted.free if free is None else free,
-        fitted.chosen if chosen is None else chosen,
-        start=fitted.start if start is None else start,
-        windows=fitted.fit.windows,
-        steps=steps,
-        least_gain=least_gain,
-        zeroed=zeroed,
-        target=target,
-    )
+    usual: dict[str, Any] = {
+        "model": fitted.fit.model,
+        "free": fitted.free,
+        "chosen": fitted.chosen,
+        "start": fitted.start,
+        "windows": fitted.fit.windows,
+    }
+    return fit_model(data, **(usual | changed))
 
 
 def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel | None:

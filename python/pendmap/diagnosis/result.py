@@ -7,15 +7,12 @@ import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
-from pendmap.comparison.further import Reasons
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.next_experiment.limits import Advice, advise
-from pendmap.diagnosis.scores import Scores
 from pendmap.formatting import Readable
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.records.summary import doubt_lines, finding_lines
-from pendmap.residuals.torque import Torque
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,12 +29,15 @@ if TYPE_CHECKING:
 
 
 SAID: Final = {
-    "none": "none: the baseline describes the records to within their noise",
-    "named": "named: the effects below explain what the baseline lacks",
-    "partial": "partial: the effects below close part of the gap; significant residuals remain",
-    "ambiguous": "ambiguous: these records do not distinguish the effects of a class",
-    "unknown": "unknown: something is missing that no candidate explains",
+    "none": "the baseline describes the records to within their noise",
+    "named": "the effects found explain the whole gap",
+    "partial": "the effects found close part of the gap, and significant residuals remain: their "
+    "form is only approximate, or a further effect is missing",
+    "ambiguous": "several effects explain the gap equally well; these records do not distinguish "
+    "them",
+    "unknown": "something is missing that no candidate explains; no name is claimed",
 }
+"""Meaning of each verdict, in the summary and in the report."""
 
 PLACES: Final[dict[str, str]] = {
     "angle": "at an angle of",
@@ -184,7 +184,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     runs = found.data.runs
     yield from doubt_lines(found.data.experiment, *runs)
     gap, assessment = found.gap, found.assessment
-    yield f"Verdict: {SAID[found.verdict]}"
+    yield f"Verdict: {found.verdict}: {SAID[found.verdict]}"
     for effect in found.effects:
         units = {name: _unit(found, effect.name, name) for name in effect.parameters}
         values = ", ".join(
@@ -195,13 +195,10 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         nearly = (
             ", with reserve: the missing effect may only resemble it" if effect.approximate else ""
         )
-        share = next(
-            100 * s.closed for s in assessment.identified if s.candidate.name == effect.name
-        )
         yield (
-            f"  {effect.name}: {values}; closes {share:.0f} % of the squared gap that the others "
-            f"leave; probability {effect.probability:.3f}, given that the effect is in the "
-            f"library{nearly}"
+            f"  {effect.name}: {values}; closes {100 * effect.closes:.0f} % of the squared gap "
+            f"that the others leave; probability {effect.probability:.3f}, given that the effect "
+            f"is in the library{nearly}"
         )
         for name, value in effect.elsewhere.items():
             said = f"{name} = {value:.4g} {units[name]}".rstrip()

@@ -16,15 +16,13 @@ from pendmap.diagnosis.next_experiment.power import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.next_experiment.power import Outlook, Prospect
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.diagnosis.verdict import Assessment
-    from pendmap.units import Units
 
 
 DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
@@ -61,7 +59,7 @@ class Advice:
 
 
 def detection_limits(
-    scores: Scores, level: float, found: Collection[str], units: Units, chance: float
+    scores: Scores, level: float, found: FittedModel, chance: float
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
@@ -76,7 +74,7 @@ def detection_limits(
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
         candidate = score.candidate
-        if candidate.name in found:
+        if candidate.name in found.names:
             continue
         among = len(choices) * choices[candidate.name]
         threshold = float(chdtri(candidate.count, chance / among))
@@ -84,7 +82,9 @@ def detection_limits(
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
-        if size > UNDETECTABLE * abs(candidate.effect(units, most).parameters[candidate.size]):
+        if size > UNDETECTABLE * abs(
+            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+        ):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
@@ -129,12 +129,7 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     The aim is to distinguish equivalent names (``s G`` of 25), whatever the verdict; else to halve
     the widest interval of named effects; else to lower the detection limits.
     """
-    names, units, chance = (
-        best.fitted.names,
-        best.fitted.fit.model.units,
-        assessment.thresholds.chance,
-    )
-    limits = detection_limits(scores, level, names, units, chance)
+    limits = detection_limits(scores, level, best.fitted, assessment.thresholds.chance)
 
     def proposed() -> Outlook | None:
         if any(len(each.equivalent) > 1 for each in assessment.identified):
