@@ -354,15 +354,11 @@ def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:
     pairs = list(zip(data.fitted, errors, strict=True))
     excess = float(np.mean([max(error**2 - _variance(run), 0.0) for run, error in pairs]))
     held = (
-        _with_error(run, of[k] if k in of else _whole_run_error(run, excess))
+        _with_error(run, of.get(k, math.sqrt(_variance(run) + excess) if excess > 0 else 0.0))
         for run, k in zip(data.held, data.held_of, strict=True)
     )
     fitted = (_with_error(run, error) for run, error in pairs)
     return dataclasses.replace(data, fitted=tuple(fitted), held=tuple(held))
-
-
-def _whole_run_error(run: FitRun, excess: float) -> float:
-    return math.sqrt(_variance(run) + excess) if excess > 0 else 0.0
 
 
 def _variance(run: FitRun) -> float:

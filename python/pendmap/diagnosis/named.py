@@ -7,8 +7,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.comparison.further import Reasons, compute_part
-from pendmap.diagnosis.refit import Z95, find_equivalents, profile_intervals
+from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
+from pendmap.identification.uncertainty import Z95
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted

@@ -82,7 +82,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "left": {
             "z": assessment.left,
             "uneven": assessment.uneven,
-            "torque_by_chance": assessment.chance,
+            "torque_by_chance": assessment.form.chances["torque"],
             "chance": assessment.form.chance,
             "chances": dict(assessment.form.chances),
             "further": assessment.form.further,

@@ -210,12 +210,13 @@ def effect(
     method: str,
     group: str,
     formula: str,
+    of: type[Effect] = Effect,
     **said: Any,  # noqa: ANN401 (parameters and class variables)
 ) -> Callable[[Callable[..., Any]], type[Effect]]:
     """Return an Effect class, named after the function that implements its one ``method``.
 
     The function takes the method's arguments, then the effect's parameters. ``said`` holds these,
-    made by :func:`size` and :func:`shape`, and class variables.
+    made by :func:`size` and :func:`shape`, and class variables; a variant has those ``of`` another.
     """
     parameters = [name for name, value in said.items() if isinstance(value, dataclasses.Field)]
 
@@ -227,12 +228,12 @@ def effect(
             "__doc__": function.__doc__,
             "__module__": function.__module__,
             "__annotations__": dict.fromkeys(parameters, float),
-            "name": function.__name__,
+            "name": getattr(of, "name", function.__name__),
             "group": group,
             "formula": formula,
             method: term,
         }
-        return type(function.__name__, (Effect,), body | said)
+        return type(function.__name__, (of,), body | said)
 
     return make
 
