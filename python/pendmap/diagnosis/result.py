@@ -145,7 +145,6 @@ class Discrepancy(Readable):
             self.nearest,
             self.assessment,
             self.beside,
-            self.level,
             self.reasons,
         )
 
@@ -160,22 +159,14 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     refitted = {a.effects[0]: a for a in reversed(found.attempts) if a.stage == 0}
     rows = []
     for row in ranking(found)[:RANKED]:
-        tried = refitted.get(row["name"])
+        name, tried = row["name"], refitted.get(row["name"])
         shape = ", ".join(
-            f"{name} = {value:.3g} {_unit(found, row['name'], name)}".rstrip()
-            for name, value in row["shape"].items()
+            f"{own} = {value:.3g} {unit_of(f'{name}.{own}', found.definition)}".rstrip()
+            for own, value in row["shape"].items()
         )
-        rows.append(
-            [
-                row["name"],
-                shape,
-                f"{row['score']:.1f}",
-                "" if tried is None else f"{tried.bic_gain:.1f}",
-                ""
-                if tried is None or tried.held_out_gain is None
-                else f"{tried.held_out_gain:.1f}",
-            ]
-        )
+        gains = () if tried is None else (tried.bic_gain, tried.held_out_gain)
+        said = ["" if gain is None else f"{gain:.1f}" for gain in gains] or ["", ""]
+        rows.append([name, shape, f"{row['score']:.1f}", *said])
     return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
 
 
@@ -186,7 +177,7 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     gap, assessment = found.gap, found.assessment
     yield f"Verdict: {found.verdict}: {SAID[found.verdict]}"
     for effect in found.effects:
-        units = {name: _unit(found, effect.name, name) for name in effect.parameters}
+        units = {n: unit_of(f"{effect.name}.{n}", found.definition) for n in effect.parameters}
         values = ", ".join(
             f"{name} = {value:.4g} {units[name]}".rstrip()
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
@@ -255,11 +246,6 @@ def _further(found: Discrepancy) -> Iterator[str]:
         yield f"Next: {found.advice.next_experiment}"
     for field, reason in found.not_computed.items():
         yield f"Not computed: {field}: {reason}"
-
-
-def _unit(found: Discrepancy, effect: str, parameter: str) -> str:
-    """Return the unit of an effect's parameter, or an empty string."""
-    return unit_of(f"{effect}.{parameter}", found.definition)
 
 
 def given_out(found: ScoredModel) -> dict[str, float]:

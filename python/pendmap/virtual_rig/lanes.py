@@ -60,7 +60,7 @@ class Lanes:
         fastest = max(equation.parameters.w0, float(np.abs(equation.drive.frequency).max()))
         self.longest = 1.0 / fastest
         self.wish = np.full(count, _FIRST * self.longest)
-        self.paths = [Path() for _ in range(count)]
+        self.paths = [Path(lab) for lab in equation.lab[starts.run].tolist()]
         # The end is a last kick of size 0.
         self._kicks = [
             [*equation.kicks(int(run), float(begin), float(end)), (float(end), 0.0)]

@@ -121,7 +121,6 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     nearest: ScoredModel,
     assessment: Assessment,
     scores: Scores,
-    level: float,
     reasons: Reasons,
 ) -> Advice:
     """Return the recommended next record, detection limits and predicted outcomes.
@@ -129,13 +128,14 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     The aim is to distinguish equivalent names (``s G`` of 25), whatever the verdict; else to halve
     the widest interval of named effects; else to lower the detection limits.
     """
-    limits = detection_limits(scores, level, best.fitted, assessment.thresholds.chance)
+    chance = assessment.thresholds.chance
+    limits = detection_limits(scores, nearest.fitted.level, best.fitted, chance)
 
     def proposed() -> Outlook | None:
         if any(len(each.equivalent) > 1 for each in assessment.identified):
-            return predict_separation(data, nearest, assessment, level, reasons)
+            return predict_separation(data, nearest, assessment, reasons)
         if assessment.verdict == "named":
-            return predict_interval(data, best, level, reasons)
+            return predict_interval(data, best, reasons)
         return predict_limits(data, best, scores, reasons)
 
     outlook = compute_part(reasons, "proposals", proposed, None)

@@ -56,7 +56,6 @@ def predict_separation(
     data: DataSplit,
     found: ScoredModel,
     assessment: Assessment,
-    level: float,
     reasons: Reasons,
 ) -> Outlook:
     """Return the predicted separation of indistinguishable names after each proposal."""
@@ -71,7 +70,7 @@ def predict_separation(
     before = [_separation(ahead, ahead.old, found, pair) for pair in pairs]
     added = [
         [
-            max(_separation(ahead, total, found, pair) - first, 0.0) / level
+            max(_separation(ahead, total, found, pair) - first, 0.0) / found.fitted.level
             for pair, first in zip(pairs, before, strict=True)
         ]
         for total in map(ahead.after, ahead.menu)
@@ -125,9 +124,7 @@ def _separation(ahead: Prospects, total: Information, found: ScoredModel, pair: 
     return value * min(right, other)
 
 
-def predict_interval(
-    data: DataSplit, found: ScoredModel, level: float, reasons: Reasons
-) -> Outlook | None:
+def predict_interval(data: DataSplit, found: ScoredModel, reasons: Reasons) -> Outlook | None:
     """Return the predicted widest interval of an effect's size after each proposal."""
     ahead = Prospects(data, found, (), reasons)
     shared = ahead.now.shared
@@ -139,7 +136,7 @@ def predict_interval(
 
     def width(information: Information, name: str) -> float:
         k = shared.index(name)
-        variance = level * float(information.covariance(every)[k, k])
+        variance = found.fitted.level * float(information.covariance(every)[k, k])
         return Z95 * math.sqrt(max(variance, 0.0)) / max(abs(found.fitted.fit[name]), 1e-300)
 
     weakest = max(sizes, key=lambda name: width(ahead.old, name))
