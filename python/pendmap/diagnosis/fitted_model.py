@@ -201,42 +201,26 @@ def fit_with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     begin = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start | dict(start)
     windows = None if short else fitted.fit.windows
     least = LITTLE * level
+    fit = functools.partial(fit_model, data, least_gain=least)
     if shapes and not short:
         # A shape is determined only once its effect has a size.
         steps = FEW_STEPS if any(c.exponents for c in added) else SIZED_STEPS
-        sized = fit_model(
-            data, model, free, start=begin, windows=windows, steps=steps, least_gain=least
-        )
+        sized = fit(model, free, start=begin, windows=windows, steps=steps)
         sized = _adjust_exponents(data, sized, added, least)
         # The exponent of the model sets the unit of its size.
         model, begin, windows = sized.fit.model, sized.start, sized.fit.windows
-    return fit_model(
-        data,
-        model,
-        [*free, *shapes],
-        (*fitted.chosen, *added),
-        start=begin,
-        windows=windows,
-        steps=FEW_STEPS,
-        least_gain=least,
-    )
+    chosen = (*fitted.chosen, *added)
+    return fit(model, [*free, *shapes], chosen, start=begin, windows=windows, steps=FEW_STEPS)
 
 
 def _adjust_exponents(
     data: DataSplit, sized: FittedModel, added: Sequence[Candidate], least: float
 ) -> FittedModel:
     """Return a fit of candidates' sizes with exponents near their best values."""
+    near = functools.partial(fit_model, data, steps=NEAR_STEPS, least_gain=least)
 
     def again(model: Rig, start: Mapping[str, float], before: TrajectoryFit) -> TrajectoryFit:
-        return fit_model(
-            data,
-            model,
-            sized.free,
-            start=start,
-            windows=before.windows,
-            steps=NEAR_STEPS,
-            least_gain=least,
-        ).fit
+        return near(model, sized.free, start=start, windows=before.windows).fit
 
     fit = sized.fit
     for candidate in added:

@@ -82,9 +82,8 @@ def detection_limits(
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
-        if size > UNDETECTABLE * abs(
-            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
-        ):
+        largest = candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+        if size > UNDETECTABLE * abs(largest):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
