@@ -81,8 +81,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     return Chart(
         _title(dataset, shown),
         f"{names.parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
-        panels,
-        rows=[[panel.name] for panel in panels] if ratio < FLAT else (),
+        [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )
 

@@ -76,8 +76,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",
-        panels,
-        rows=[[shown], ["sweeps"], ["exponent"]],
+        [[panels[_LAYERS.index(shown)]], [panels[2]], [panels[3]]],
+        recorded=panels,
         heights=_HEIGHTS,
         size=_SIZE,
         letters=False,

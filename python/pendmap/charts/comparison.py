@@ -97,7 +97,7 @@ def _overview(runs: Sequence[Compared]) -> Chart:
     ticks = [(float(k), runs[k].run.name) for k in range(0, len(runs), every)]
     across = Axis("", (-0.5, len(runs) - 0.5), ticks=ticks)
     title = "all runs: the residual over the noise" + ("; orange: held out" if held.any() else "")
-    return Chart("", "", [Panel("all", title, across, up, marks)], size=(WIDTH, OVERVIEW))
+    return Chart("", "", [[Panel("all", title, across, up, marks)]], size=(WIDTH, OVERVIEW))
 
 
 def _row(one: Compared, high: float) -> Chart:
@@ -109,7 +109,7 @@ def _row(one: Compared, high: float) -> Chart:
     if isinstance(one, ForcedComparison):
         heading += f", in {counted(one.windows, 'window')}"
     panels = _forced(one) if isinstance(one, ForcedComparison) else _free(one)
-    return Chart(heading, "", panels, size=(WIDTH, high))
+    return Chart(heading, "", [panels], size=(WIDTH, high))
 
 
 def _small(angle: float) -> str:
@@ -275,7 +275,7 @@ def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart
     panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
     rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
     size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
-    return Chart.of(title, subtitle, rows, columns=2, size=size)
+    return Chart(title, subtitle, rows, columns=2, size=size)
 
 
 def _reached(one: ForcedComparison) -> str:
@@ -305,5 +305,5 @@ def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> She
         below = [phase(one), phase(one, **member), statistics(one)]
         heading = f"{_drive(one)}: {counted(one.ensemble.members, 'member')} of the ensemble"
         style = {"heights": (0.7, 1.0), "size": (WIDTH, 4.4)}
-        charts.append(Chart.of(heading, "", [above, below], **style))
+        charts.append(Chart(heading, "", [above, below], **style))
     return Sheet(title, subtitle, [charts], legend=True)

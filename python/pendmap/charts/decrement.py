@@ -104,7 +104,7 @@ def part(report: IdentificationReport) -> Chart:
             if not absolute:
                 marks.append(Level(0.0, colour=QUIET, width=0.6, order=0.0))
             panels.append(Panel(f"{title} {text}", title, across, up, marks))
-    return Chart.of(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
+    return Chart(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
 
 
 def _zero(report: IdentificationReport) -> Estimate | None:

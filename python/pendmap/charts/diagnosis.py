@@ -64,7 +64,7 @@ def sheet(found: Discrepancy) -> Chart:
     rows.append([ranking(found), last])
     heights += [1.2, 1.2, 1.5]
     look = {"heights": heights, "size": SIZE, "letters": False}
-    return Chart.of(_title(found), subtitle, rows, **look)
+    return Chart(_title(found), subtitle, rows, **look)
 
 
 def parts(found: Discrepancy) -> dict[str, Chart]:
@@ -72,7 +72,7 @@ def parts(found: Discrepancy) -> dict[str, Chart]:
     made: dict[str, Chart] = {}
 
     def add(name: str, title: str, said: str, rows: list[list[Panel]], high: float) -> None:
-        made[name] = Chart.of(title, said, rows, size=(SIZE[0], high), letters=False)
+        made[name] = Chart(title, said, rows, size=(SIZE[0], high), letters=False)
 
     rows = [[panel] for panel in residuals(found)]
     add("residuals", "Residuals", "the runs with the largest residuals of the baseline", rows, 4.2)

@@ -78,7 +78,7 @@ def part(report: IdentificationReport) -> Chart:
     shares = [1.0, 0.35] if run.peaks_only else [1.0, 0.8, 0.28]
     size = (8.6, 2.4 if few else 4.6 if run.peaks_only else 5.6)
     heights = [1.1, *([] if few else shares)]
-    return Chart.of("The record and its half cycles", "", rows, heights=heights, size=size)
+    return Chart("The record and its half cycles", "", rows, heights=heights, size=size)
 
 
 def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:

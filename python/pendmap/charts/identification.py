@@ -138,9 +138,7 @@ def decays(report: IdentificationReport) -> Chart:
         chart = nothing(title, report.table.left_out or NOTHING)
         if not (report.table.left_out and last):
             return chart
-        rows = [["nothing"], ["residual"]]
-        both = [*chart.panels, *last]
-        return dataclasses.replace(chart, panels=both, rows=rows, size=(WIDTH, 2.6))
+        return dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
     ends = holding(turned.time, margin=0.01)
     course = half_cycles.course_of(run, report.peaks)
     spans = half_cycles.first_and_last(turned, NEAR)
@@ -149,7 +147,7 @@ def decays(report: IdentificationReport) -> Chart:
     shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
     shown += [last] if last else []
     heights, size = (1.7, 1.35, 1.5, 0.75)[: len(shown)], (WIDTH, 6.3 + 1.3 * len(last))
-    return Chart.of(title, "", shown, heights=heights, size=size)
+    return Chart(title, "", shown, heights=heights, size=size)
 
 
 def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
@@ -251,7 +249,7 @@ def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Char
     if not known:
         return nothing(title, NOTHING)
     said = ("of each period", "of each peak; time runs to the left")
-    return Chart(title, "", error_panels(known, peaks, said), size=(WIDTH, 3.6))
+    return Chart(title, "", [error_panels(known, peaks, said)], size=(WIDTH, 3.6))
 
 
 def error_panels(
@@ -343,7 +341,7 @@ def table(report: IdentificationReport) -> Chart:
     high = down + len(notes) - 0.9
     panel = bare("table", Table(head, body), *words, high=high)
     title = "Damping by each method, and errors of its simulation (%)"
-    return Chart(title, "", [panel], size=(WIDTH, 0.55 + LINE * high))
+    return Chart(title, "", [[panel]], size=(WIDTH, 0.55 + LINE * high))
 
 
 PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {

@@ -49,7 +49,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     starts = counted(int(dataset.attrs["starts"]), "start")
     subtitle = f"{names.parameters(dataset.attrs)};   {starts}"
     size = (9.6 if len(panels) > 1 else 6.0, 4.6)
-    return Chart(_title(dataset), subtitle, panels, size=size).only(layer, (6.0, 4.6))
+    return Chart(_title(dataset), subtitle, [panels], size=size).only(layer, (6.0, 4.6))
 
 
 def curves(dataset: xr.Dataset) -> list[Curve]:

@@ -36,15 +36,13 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     units = Units.of(a)
     start = f"from \N{GREEK SMALL LETTER THETA} = {float(a['theta0']):.6g}, "
     start += f"{names.velocity(units)} = {units.spoken(format(float(a['velocity0']), '.6g'))}"
-    rows = [[panel.name for panel in panels]]
-    if dataset.sizes["point"]:
-        panels.append(_attractor(dataset))
+    attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
     return Chart(
         _title(dataset),
         f"{names.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
-        panels,
-        rows=rows,
-        size=(_WIDTHS[len(rows[0])], 4.3),
+        [panels],
+        recorded=[*panels, *attractor],
+        size=(_WIDTHS[len(panels)], 4.3),
     ).only(layer, (_WIDTHS[1], 4.3))
 
 

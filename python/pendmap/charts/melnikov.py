@@ -62,7 +62,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     up = Axis("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g", (0.0, top))
     panel = Panel("melnikov", "", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
-    return Chart(title, names.parameters(a), [panel], ratio=0.68).only(layer)
+    return Chart(title, names.parameters(a), [[panel]], ratio=0.68).only(layer)
 
 
 def _highest(p: np.ndarray, own: float) -> float:

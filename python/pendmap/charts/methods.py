@@ -69,4 +69,4 @@ def nothing(title: str, why: str, letters: int = 90) -> Chart:
     """Return a chart with the reason for an empty figure, in lines of at most ``letters``."""
     why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
     words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
-    return Chart(title, "", [bare("nothing", words)], size=(8.6, 0.9))
+    return Chart(title, "", [[bare("nothing", words)]], size=(8.6, 0.9))

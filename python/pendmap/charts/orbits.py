@@ -51,7 +51,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     return Chart(
         _title(dataset),
         names.parameters(dataset.attrs) + over,
-        [Panel("phase", "", across, up, marks)],
+        [[Panel("phase", "", across, up, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         remark="" if dataset.sizes["orbit"] else "No orbit was found.",
     ).only(layer)

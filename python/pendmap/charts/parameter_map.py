@@ -171,8 +171,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     return Chart(
         f"Attractors over {' and '.join(name.split(' (')[0] for name in symbols)}",
         f"{fixed};   {size}",
-        panels,
-        rows=[shown if layer else leading],
+        [panels[: len(leading)]],
+        recorded=panels,
         ratio=0.85,
         tabs=True,
     )

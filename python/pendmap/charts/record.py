@@ -43,12 +43,10 @@ def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
 def _one(run: Run, width: float) -> Chart:
     noted = _listed(run, max(int((width - 1.0) / 0.073), 20))
     last = _decay(run) if run.peaks_only else _residuals(run)
-    panels = [_flags(run, width), _history(run), _intervals(run), last]
     return Chart(
         f"Record {run.name}",
         _subtitle(run),
-        panels,
-        rows=[["flags"], ["history"], ["clock", "last"]],
+        [[_flags(run, width)], [_history(run)], [_intervals(run), last]],
         heights=(0.15, 1.25, 1.0),
         size=(width, 6.3 + 0.19 * len(noted)),
         notes=noted,
@@ -224,8 +222,7 @@ def _many(experiment: Experiment, width: float) -> Chart:
     return Chart(
         f"Experiment {experiment.path.resolve().name}",
         f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; "),
-        panels,
-        rows=[[panel.name] for panel in panels],
+        [[panel] for panel in panels],
         size=(width, 1.4 + 1.25 * len(runs)),
         letters=False,
     )

@@ -58,7 +58,7 @@ def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
     wide, high = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * rows)
     grid = [panels[k : k + columns] for k in range(0, len(runs), columns)]
     look = {"columns": columns, "size": (wide, high), "letters": False}
-    return Chart.of(title, subtitle, grid, **look)
+    return Chart(title, subtitle, grid, **look)
 
 
 def _curve(run: RunPanel) -> tuple[Floats, Floats]:

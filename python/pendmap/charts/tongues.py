@@ -71,11 +71,12 @@ def chart(
     if first not in PLANES:
         raise InputError(f"layer must be one of {', '.join(PLANES)}, got {first!r}")
     order = sorted(_ROOTS, key=lambda plane: plane != first)
+    panels = [_panel(dataset, plane, marks) for plane in order]
     return Chart(
         title,
         names.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
-        [_panel(dataset, plane, marks) for plane in order],
-        rows=[[first]],
+        [panels[:1]],
+        recorded=panels,
         ratio=0.72,
         tabs=True,
     )

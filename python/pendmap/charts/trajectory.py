@@ -45,12 +45,10 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         "Trajectory",
         f"{names.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
         [
-            _history(dataset, Axis(names.clock(units) if layer else "", ends)),
-            _energy(dataset, Axis(names.clock(units), ends)),
-            _phase(dataset),
-            _section(dataset),
+            [_history(dataset, Axis(names.clock(units) if layer else "", ends))],
+            [_energy(dataset, Axis(names.clock(units), ends))],
+            [_phase(dataset), _section(dataset)],
         ],
-        rows=[["history"], ["energy"], ["phase", "section"]],
         heights=(0.32, 0.2, 0.48),
         size=(8.6, 8.2),
     ).only(layer, _SIZES.get(layer or "", (5.6, 5.3)))

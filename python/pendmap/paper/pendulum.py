@@ -49,7 +49,7 @@ def chart(size: Ends | None = None, title: str | None = None) -> Chart:
     font = 11.0 * min(scale, 1.2)
     marks = [*_guide(font), *_rod(font), *_forces(font)]
     panel = Panel("pendulum", "", *sides, marks, bare=True)
-    return Chart(title or TITLE, equation, [panel], size=(width, height))
+    return Chart(title or TITLE, equation, [[panel]], size=(width, height))
 
 
 def _guide(font: float) -> list[Mark]:

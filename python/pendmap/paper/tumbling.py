@@ -32,7 +32,7 @@ def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
     )
     rows = list(zip(*(_column(run, k) for k, run in enumerate(runs)), strict=True))
     size = (0.6 + 3.1 * len(runs), 9.0)
-    return Chart.of(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
+    return Chart(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
 
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:

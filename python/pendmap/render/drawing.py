@@ -84,7 +84,7 @@ def figure(
 
 def _recoloured(chart: Chart, colormap: str) -> Chart:
     """Return a chart with another colour map in its images of numbers."""
-    shown = {panel.name for row in chart.shown for panel in row}
+    shown = {panel.name for row in chart.rows for panel in row}
     panels, found = [], False
     for panel in chart.panels:
         marks: list[Mark] = []
@@ -124,7 +124,7 @@ def _size(chart: Chart) -> Ends:
     """Return the size of a chart in inches: its own, or one from its panels' proportions."""
     if chart.size is not None:
         return chart.size
-    rows = chart.shown
+    rows = chart.rows
     stacked = len(rows) > 1 and all(len(row) == 1 for row in rows)
     wide = STACKED if stacked else ALONE if len(rows[0]) == 1 else WIDE
     across = [sum(panel.share for panel in row) * wide + _aside(row) for row in rows]
@@ -146,7 +146,7 @@ def _rows(named: list[Mark], width: float) -> float:
 
 
 def _all_marks(chart: Chart) -> list[Mark]:
-    return [mark for row in chart.shown for panel in row for mark in panel.marks]
+    return [mark for panel in chart.panels for mark in panel.marks]
 
 
 def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
@@ -161,7 +161,7 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     above = LINE * len(chart.notes) / size[1]
     where: dict[str, Any] = {"bbox_to_anchor": (0.0, above, 1.0, 1.0)} if above else {}
     _legend(figure, _all_marks(chart), size[0], loc="outside lower left", borderpad=0.1, **where)
-    fits = settle(figure, [(axes[p.name], p) for row in chart.shown for p in row])
+    fits = settle(figure, [(axes[p.name], p) for row in chart.rows for p in row])
     return figure, _needed(figure, chart, axes) if fits else (1.15 * size[0], 1.15 * size[1])
 
 
@@ -209,7 +209,7 @@ def fill(
 
     ``letters`` label the panels; without them several panels are labelled from (a).
     """
-    rows = chart.shown
+    rows = chart.rows
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
     shares = [panel.share for panel in rows[0]] if len(rows) == 1 else []
     columns = chart.columns or math.lcm(*(len(row) for row in rows))
@@ -286,7 +286,7 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
         blocks = part.subfigures(len(column), 1, squeeze=False, height_ratios=shares)[:, 0]
         for block, chart in zip(blocks, column, strict=True):
             axes = _block(block, chart, room * _size(chart)[1], letters, own=not sheet.legend)
-            panels += [(axes[panel.name], panel) for row in chart.shown for panel in row]
+            panels += [(axes[panel.name], panel) for row in chart.rows for panel in row]
     settle(figure, panels)
     return figure
 
@@ -373,7 +373,7 @@ def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
     """Return the size in inches at which every panel has room for its text."""
     width, height = figure.get_size_inches()
     across, down = [], 0.0
-    for row in chart.shown:
+    for row in chart.rows:
         have = [_inches(axes[panel.name]) for panel in row]
         least = [_room(axes[panel.name], panel) for panel in row]
         unit = max(
