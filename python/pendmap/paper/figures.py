@@ -99,7 +99,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import motions, pendulum  # noqa: PLC0415
     from pendmap.paper import tumbling as chaos  # noqa: PLC0415
-    from pendmap.render.written import save  # noqa: PLC0415
+    from pendmap.render.drawing import save  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:

@@ -137,7 +137,7 @@ def _table(axes: Axes, mark: charts.Table) -> None:
                 edges[k] / edges[-1] if k else 0.0,
                 down + 1.4,
                 text,
-                color=style.INK if down else style.QUIET,
+                color=charts.INK if down else charts.QUIET,
                 ha="right" if k else "left",
                 va="bottom",
                 fontsize=TABLE,
@@ -217,7 +217,7 @@ def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
             for name, colour in mark.classes:
                 if name:
                     named.setdefault(name, []).append(
-                        Patch(facecolor=colour, edgecolor=style.QUIET, linewidth=0.5)
+                        Patch(facecolor=colour, edgecolor=charts.QUIET, linewidth=0.5)
                     )
         elif mark.name:
             named.setdefault(mark.name, []).append(_handle(mark))

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import functools
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
+from pendmap.charts.marks import INK
 from pendmap.errors import InputError
+from pendmap.files import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    import os
+    from collections.abc import Callable, Sequence
 
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-INK = "#222222"
-QUIET = "#666666"
-ALARM = "#a61c00"
+SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
 
 RC: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -123,8 +124,22 @@ def check_size(size: tuple[float, float] | None, dpi: float) -> None:
         raise InputError(f"size {size} at {dpi:g} dpi: at most {PIXELS} pixels a side are possible")
 
 
-def write(figure: Figure, path: Path) -> None:
-    """Write a figure in its suffix's format, undated, so that equal figures give equal files."""
-    suffix = path.suffix.lower().lstrip(".")
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
-    figure.savefig(path, format=suffix, dpi=figure.dpi, metadata=metadata)
+def written(
+    path: str | os.PathLike[str],
+    make: Callable[[float], Figure],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Write the figure that ``make`` returns for a resolution into a file; return its path.
+
+    ``size`` and ``dpi`` are the requested values; impossible ones are refused. Files are undated,
+    so that equal figures give equal files.
+    """
+    pixels = resolution(dpi)
+    check_size(size, pixels)
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
+        figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
+        figure.savefig(part, format=suffix, dpi=figure.dpi, metadata=metadata)
+    return Path(path)
