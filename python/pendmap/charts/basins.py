@@ -14,7 +14,7 @@ from pendmap.charts import legend, names, palette, plane
 from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.marks import ALARM, INK, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
-from pendmap.formatting import counted, with_error
+from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     rows, columns = dataset["label"].shape
     return Chart(
         _title(dataset, shown),
-        f"{names.parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
+        f"{names.parameters(dataset.attrs)};   {columns} × {rows} cells",
         [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )
@@ -277,7 +277,7 @@ def exponents(dataset: xr.Dataset) -> str:
     errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else without
     known = [x for x in values if math.isfinite(x)]
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
-        listed = with_error(known[0], errors[0], "\N{PLUS-MINUS SIGN}")
+        listed = typographic(with_error(known[0], errors[0]))
     else:
         listed = ", ".join(f"{x:.3g}" for x in known)
     return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
@@ -337,7 +337,7 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
     """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
     driven = float(dataset.attrs.get("p", 1.0)) != 0.0
     units = Units.of(dataset.attrs)
-    own = units.own_period.replace(" pi", "\N{GREEK SMALL LETTER PI}").replace(" ", "")
+    own = units.own_period.replace(" pi", "π").replace(" ", "")
     return {
         "settle": "periods to settle" if driven else f"periods of {own} to settle",
         "turns": "net turns",

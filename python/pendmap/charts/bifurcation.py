@@ -90,7 +90,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
 _STRIP: Final = Axis(
     "",
     (-1.0, 1.0),
-    ticks=((0.5, "up \N{RIGHTWARDS ARROW}"), (-0.5, "\N{LEFTWARDS ARROW} down")),
+    ticks=((0.5, "up →"), (-0.5, "← down")),
 )
 
 

@@ -147,7 +147,7 @@ def _over_record(one: RunComparison) -> Panel:
     ]
     up = names.angle(holding(shown))
     if sensor is not None:
-        unit = sensor.unit.replace("s2", "s\u00b2")
+        unit = sensor.unit.replace("s2", "s²")
         up = Axis(f"acceleration ({unit})", holding(shown))
     return Panel("record", "record and model", names.seconds(run.time), up, marks)
 
@@ -174,7 +174,7 @@ def history(
     if high - low < WELLS:
         wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
         marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
-    up = "\N{GREEK SMALL LETTER THETA}/2\N{GREEK SMALL LETTER PI} (turns)"
+    up = "θ/2π (turns)"
     ends = holding(turns, margin=0.08)
     clock = Axis(names.TIME, (float(one.time[0]), float(one.time[-1])))
     return Panel(f"history {title}", title, clock, Axis(up, ends), marks)
@@ -290,7 +290,7 @@ def _reached(one: ForcedComparison) -> str:
 def _drive(one: ForcedComparison) -> str:
     given = one.run.drive or {}
     p, frequency = given.get("p") or 0.0, given.get("Omega") or 0.0
-    return f"p = {p:g}, \N{GREEK CAPITAL LETTER OMEGA} = {frequency:.4g} rad/s"
+    return f"p = {p:g}, Ω = {frequency:.4g} rad/s"
 
 
 def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:

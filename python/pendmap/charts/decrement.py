@@ -14,8 +14,8 @@ import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points
-from pendmap.charts.methods import EVEN, MEASURED, MINUS, NOISE, NOISE_SAID, ODD, Z95, look, nothing
-from pendmap.formatting import Estimate, estimate_text
+from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, Z95, look, nothing
+from pendmap.formatting import Estimate, estimate_text, typographic
 from pendmap.identification.methods.combined import CUT, triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
     from pendmap.identification import Identification, IdentificationReport, Peaks
 
-DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"
+DELTA: Final = "δ"
 TITLE: Final = f"The decrement {DELTA} of each three peaks"
-SIZE: Final = "middle peak |\N{GREEK SMALL LETTER THETA}| (rad)"
+SIZE: Final = "middle peak |θ| (rad)"
 REACH: Final = 3.0
 """Range of a signed panel with few triplets, over the 90th percentile of their absolute values."""
 
@@ -82,7 +82,7 @@ def part(report: IdentificationReport) -> Chart:
     columns = [("as recorded", "", raw, 0.0 if zero is None else zero.value)]
     if zero is not None:
         error = None if zero.stderr is None else 1e3 * zero.stderr
-        removed = estimate_text(Estimate(1e3 * zero.value, error), minus=MINUS)
+        removed = typographic(estimate_text(Estimate(1e3 * zero.value, error)))
         without = triplets_of(report.peaks, zero.value)
         columns.append(("zero error removed", f", {removed} mrad removed", without, 0.0))
     known = np.concatenate([some.delta[np.isfinite(some.delta)] for _, _, some, _ in columns])
@@ -183,7 +183,7 @@ def _model(
         Level(
             abs(level) if absolute else level, colour=MEASURED, width=1.0, dash="--", name=dashed
         ),
-        Level(CUT, axis="x", colour=QUIET, dash=":", name="12\N{DEGREE SIGN}"),
+        Level(CUT, axis="x", colour=QUIET, dash=":", name="12°"),
     ]
     turned, start = peaks.turned, first_state(peaks)
     own = source["offset"] if "offset" in source.estimates else 0.0

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
 
-ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"  # Unit of a torque per moment of inertia
+ACCELERATION: Final = "rad/s²"  # Unit of a torque per moment of inertia
 OVER_SAID: Final = {
     "angle": "angle (rad)",
     "velocity": "velocity (rad/s)",

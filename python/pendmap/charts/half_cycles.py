@@ -13,6 +13,7 @@ from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, bars
 from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
 from pendmap.charts.record import UNUSED
+from pendmap.formatting import typographic
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def _near(
         velocity, values = _velocity(run, course, peaks, ends)
         up = names.angle(holding(values), names.speed(Units(si=True)))
         panels.append(Panel(f"velocity {title}", "", bare, up, velocity))
-    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, "\N{MINUS SIGN}1"), (0, "0"), (1, "1")])
+    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, typographic("-1")), (0, "0"), (1, "1")])
     return [*panels, Panel(f"sign {title}", "", clock, signs, _sign(peaks))]
 
 

@@ -13,9 +13,9 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.charts import decrement, half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
-from pendmap.charts.methods import MEASURED, MINUS, NOISE, NOISE_SAID, Z95, drawn, look, nothing
+from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, Z95, drawn, look, nothing
 from pendmap.errors import InputError
-from pendmap.formatting import estimate_text
+from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import span
@@ -39,7 +39,7 @@ LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
 RESTS: Final = "at rest"  # Entry for an error if the simulation has already come to rest
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
-QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s\u00b2)"}
+QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s²)"}
 """Estimates in the table, with the heads of their columns."""
 
 
@@ -155,7 +155,7 @@ def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float
     spots: dict[str, Any] = {"colour": MEASURED, "size": 2.4, "order": 5.0, "name": "measured"}
     marks: list[Mark] = [Points(turned.time, size, **spots)]
     marks += [_line(one.peak_time, np.abs(one.peak), name, 1.3) for name, one in made.items()]
-    up = Axis("peak |\N{GREEK SMALL LETTER THETA}| (rad)", (0.0, 1.06 * float(size.max())))
+    up = Axis("peak |θ| (rad)", (0.0, 1.06 * float(size.max())))
     title = "peaks, simulated from the first one on"
     return Panel("peaks", title, Axis("", ends, ticks=()), up, marks)
 
@@ -263,7 +263,7 @@ def error_panels(
     order = np.argsort(some.peak)
     wide = Z95 * 100 * (turned.stderr_amplitude / some.peak)[order]
     ends = (max(float(np.min(some.peak[1:])), 1e-9) / 1.15, float(np.max(some.peak[1:])) * 1.15)
-    size = Axis("measured peak |\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
+    size = Axis("measured peak |θ| (rad)", ends, "log")
     time = holding(some.period_time, margin=0.02)
     panels: list[Panel] = []
     for name, across, noise, curves in (
@@ -305,7 +305,7 @@ def rows(report: IdentificationReport) -> list[list[str]]:
         if not found.applicable:
             continue
         known = [found.estimates.get(key) for key in QUANTITIES]
-        cells = [dash if one is None else estimate_text(one, minus=MINUS) for one in known]
+        cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
         if not report.table.left_out:
             errors = report.table.errors.get(name)

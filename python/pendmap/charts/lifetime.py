@@ -13,7 +13,7 @@ from pendmap.charts import names, palette
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
-from pendmap.formatting import counted, written
+from pendmap.formatting import counted, typographic, with_error, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,8 +98,8 @@ def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
         first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
         for way in (-1, 0, 1)
     )
-    said = f"{written(mean, error)} \N{PLUS-MINUS SIGN} {written(error, error)} periods"
-    text = f"tail from period {a['from_period']}: mean lifetime {said}"
+    said = typographic(with_error(mean, error))
+    text = f"tail from period {a['from_period']}: mean lifetime {said} periods"
     return [
         Band(periods, low, high, colour=_BAND, name=text, path="band", order=1.0),
         Line(periods, share, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),

@@ -11,7 +11,7 @@ from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import DASHED, INK, QUIET, Band, Level, Line, Mark, Points, Span, Steps
-from pendmap.formatting import counted, with_error
+from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -27,19 +27,15 @@ _WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Width of a figure by its number of
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return growth and exponent; for chaos the distribution, and in recordings the attractor."""
     del cells
-    a = dataset.attrs
     panels = [_growth(dataset)]
     if dataset.sizes["window"]:
         panels += [_average(dataset), _distribution(dataset)]
     else:
         panels.append(_sliding(dataset))
-    units = Units.of(a)
-    start = f"from \N{GREEK SMALL LETTER THETA} = {float(a['theta0']):.6g}, "
-    start += f"{names.velocity(units)} = {units.spoken(format(float(a['velocity0']), '.6g'))}"
     attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
     return Chart(
         _title(dataset),
-        f"{names.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        names.with_start(dataset.attrs),
         [panels],
         recorded=[*panels, *attractor],
         size=(_WIDTHS[len(panels)], 4.3),
@@ -64,8 +60,8 @@ def _value(dataset: xr.Dataset) -> str:
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}").replace("-", "\N{MINUS SIGN}")
-    return f"\N{GREEK SMALL LETTER LAMDA} = {said} {names.per_time(Units.of(a))}"
+    said = typographic(with_error(exponent, error))
+    return f"λ = {said} {names.per_time(Units.of(a))}"
 
 
 def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
@@ -75,7 +71,7 @@ def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
 
 
 def _rate(dataset: xr.Dataset) -> str:
-    return f"\N{GREEK SMALL LETTER LAMDA} ({names.per_time(Units.of(dataset.attrs))})"
+    return f"λ ({names.per_time(Units.of(dataset.attrs))})"
 
 
 def _transient(dataset: xr.Dataset) -> list[Mark]:
@@ -114,7 +110,7 @@ def _growth(dataset: xr.Dataset) -> Panel:
     elif math.isfinite(float(a["exponent"])):
         marks.append(Line(periods[:0], growth[:0], **look))
     across = Axis("periods since the start", _elapsed(dataset))
-    up = Axis("ln |\N{GREEK SMALL LETTER DELTA}x|", holding(growth, 0.0))
+    up = Axis("ln |δx|", holding(growth, 0.0))
     return Panel("growth", "growth along the start's own trajectory", across, up, marks)
 
 
@@ -126,12 +122,12 @@ def _average(dataset: xr.Dataset) -> Panel:
     shown = [mean]
     if math.isfinite(a["stderr"]):
         low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
-        said = f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean"
+        said = f"±{_SIGMAS} standard errors of the mean"
         marks.append(Band(periods, low, high, colour=_BAND, name=said, path="band"))
         shown += [low, high]
     if a["end"] == "undamped":
         regular = np.log1p(periods / a["dropped_periods"]) / (periods * a["forcing_period"])
-        said = "regular motion: deviations grow as \N{GREEK SMALL LETTER TAU}"
+        said = "regular motion: deviations grow as τ"
         marks.append(Line(periods, regular, width=1.0, dash=":", name=said, colour=INK, order=4.0))
         shown.append(regular)
     marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]

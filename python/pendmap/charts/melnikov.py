@@ -58,8 +58,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Text(0.5, 0.93, f"manifolds cross: {follows}", inside=True, boxed=True, colour=QUIET),
     ]
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
-    across = Axis("\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0", x)
-    up = Axis("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g", (0.0, top))
+    across = Axis("ω = Ω/w0", x)
+    up = Axis("p = YΩ²/g", (0.0, top))
     panel = Panel("melnikov", "", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
     return Chart(title, names.parameters(a), [[panel]], ratio=0.68).only(layer)

@@ -10,6 +10,7 @@ import numpy as np
 from pendmap.charts import plane
 from pendmap.charts.chart import Axis, holding
 from pendmap.charts.marks import DOTTED, QUIET, Level, Mark
+from pendmap.formatting import typographic
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.quantities import COUNTERPARTS
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Ends, Floats
 
-_TAU: Final = "\N{GREEK SMALL LETTER TAU}"
-_THETA: Final = "\N{GREEK SMALL LETTER THETA}"
+_TAU: Final = "τ"
+_THETA: Final = "θ"
 
 ANGLE: Final = f"{_THETA} (rad)"  # The angle, with its unit
 TIME: Final = "t (s)"  # Time in SI, with its unit
@@ -88,7 +89,15 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
     ]
     acting = [effect.title(units, without).replace("_", " ") for effect in effects_of(attrs)]
     listed = (",  ".join(part.rstrip() for part in each) for each in (parts, acting) if each)
-    return ";   ".join(listed).replace("-", "\N{MINUS SIGN}")
+    return typographic(";   ".join(listed))
+
+
+def with_start(attrs: Mapping[Any, Any]) -> str:
+    """Return the model's parameters and the start of a trajectory in one line."""
+    units = Units.of(attrs)
+    speed = units.spoken(f"{float(attrs['velocity0']):.6g}")
+    start = f"from {_THETA} = {float(attrs['theta0']):.6g}, {velocity(units)} = {speed}"
+    return f"{parameters(attrs)};   {typographic(start)}"
 
 
 def seconds(time: Floats) -> Axis:
@@ -124,5 +133,5 @@ def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tupl
         return Axis(name, holding([low, high, 0.0])), [zero]
     ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
     bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
-    said = f"{name}\nlog beyond \N{PLUS-MINUS SIGN}{plane.power(inner)}"
+    said = f"{name}\nlog beyond ±{plane.power(inner)}"
     return Axis(said, ends, "signed", straight=inner), [zero, *bends]

@@ -12,7 +12,7 @@ from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import INK, QUIET, Line, Mark, Points
-from pendmap.formatting import counted
+from pendmap.formatting import counted, typographic
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
 def _title(dataset: xr.Dataset) -> str:
     n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
     count = dataset.sizes["orbit"]
-    signed = "0" if w == 0 else f"{w:+d}".replace("-", "\N{MINUS SIGN}")
+    signed = "0" if w == 0 else typographic(f"{w:+d}")
     if count == 0:
         return f"No orbit {n}:{signed}"
     return f"{'The orbit' if count == 1 else f'All {count} orbits'} {n}:{signed}"

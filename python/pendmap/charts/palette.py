@@ -28,6 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.formatting import MINUS
+
 UNDECIDED = "#e4e4e4"
 """Cells not decided within the bound (label 0)."""
 
@@ -234,7 +236,7 @@ def _place(read: _Read) -> tuple[_Shade, int]:
 
 
 def _read(name: str, kind: str | None) -> _Read:
-    words = name.replace("\N{MINUS SIGN}", "-").replace("_", " ").lower().strip()
+    words = name.replace(MINUS, "-").replace("_", " ").lower().strip()
     found = next((k for k in _KINDS if words.startswith(k.replace("_", " "))), None)
     found = found or (kind or "").lower().replace(" ", "_")
     numbers = _NUMBERS.search(words)

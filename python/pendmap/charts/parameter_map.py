@@ -13,6 +13,7 @@ from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -167,7 +168,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     fixed = names.parameters(dataset.attrs, varied)
     shape: tuple[Any, ...] = dataset["regime"].shape
     starts = int(dataset.attrs["starts"])
-    size = f"{shape[1]} \N{MULTIPLICATION SIGN} {shape[0]} cells, {starts} starts each"
+    size = f"{shape[1]} × {shape[0]} cells, {starts} starts each"
     return Chart(
         f"Attractors over {' and '.join(name.split(' (')[0] for name in symbols)}",
         f"{fixed};   {size}",
@@ -246,7 +247,7 @@ def _curves(dataset: xr.Dataset) -> list[Mark]:
     for k, (name, dash, lines) in enumerate(
         (
             ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
-            ("rest: multiplier \N{MINUS SIGN}1", "--", tongues.joined(omega, rows, -1)),
+            (typographic("rest: multiplier -1"), "--", tongues.joined(omega, rows, -1)),
             ("fold of the oscillation born there", ":", [fold]),
         )
     ):

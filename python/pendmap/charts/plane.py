@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.formatting import typographic
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -164,7 +166,7 @@ def power(value: float) -> str:
     size = math.log10(abs(value))
     if abs(size - round(size)) < 1e-9 and not -3 <= size <= 3:  # noqa: PLR2004
         return f"${'-' * (value < 0)}10^{{{round(size)}}}$"
-    return f"{value:g}".replace("-", "\N{MINUS SIGN}", value < 0)
+    return typographic(f"{value:g}")
 
 
 def shifted(name: str, shift: float) -> str:
@@ -172,8 +174,8 @@ def shifted(name: str, shift: float) -> str:
     if not shift:
         return name
     symbol, _, unit = name.partition(" ")
-    sign = "\N{MINUS SIGN}" if shift > 0 else "+"
-    return f"{symbol} {sign} {abs(shift):.15g} {unit}".strip()
+    sign = "-" if shift > 0 else "+"
+    return typographic(f"{symbol} {sign} {abs(shift):.15g} {unit}".strip())
 
 
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
@@ -221,7 +223,7 @@ def _offset(low: float, high: float) -> float:
 
 
 def _written(value: float, digits: int) -> str:
-    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+    return typographic(f"{value:.{digits}g}")
 
 
 def _between(low: float, high: float, step: float) -> tuple[int, int]:
@@ -234,6 +236,5 @@ def _multiple_of_pi(quarters: int) -> str:
         return "0"
     divisor = math.gcd(quarters, 4)
     top, bottom = abs(quarters) // divisor, 4 // divisor
-    sign = "\N{MINUS SIGN}" if quarters < 0 else ""
-    below = f"/{bottom}" if bottom > 1 else ""
-    return f"{sign}{top if top > 1 else ''}\N{GREEK SMALL LETTER PI}{below}"
+    sign, below = "-" if quarters < 0 else "", f"/{bottom}" if bottom > 1 else ""
+    return typographic(f"{sign}{top if top > 1 else ''}π{below}")

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
-from pendmap.formatting import moment
+from pendmap.formatting import moment, typographic
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
 from pendmap.signal.local_polynomial import local_fit
@@ -57,9 +57,8 @@ def _subtitle(run: Run) -> str:
     if run.peaks_only:
         return f"{run.time.size} turning points, {moment(run.time[0])} to {moment(run.time[-1])} s"
     said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
-    said = said.replace("+-", "\N{PLUS-MINUS SIGN}")
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {said}"
+    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(said)}"
 
 
 def _listed(run: Run, letters: int) -> list[str]:
@@ -173,7 +172,7 @@ def _decay(run: Run) -> Panel:
     size = np.maximum(np.abs(run.theta), 1e-9)
     clock = Axis("t (s)", (float(run.time[0]), float(run.time[-1])))
     ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
-    up = Axis("|\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
+    up = Axis("|θ| (rad)", ends, "log")
     return Panel("last", "the decay", clock, up, [Points(run.time, size, colour=USED, size=2.5)])
 
 
@@ -196,10 +195,10 @@ def _residuals(run: Run) -> Panel:
         marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
     # An angle changes with the velocity, a rate with the acceleration.
-    speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
+    speeds = "|dθ/dt| (rad/s)"
     if run.gyroscope is not None:
-        two = "\N{SUPERSCRIPT TWO}"
-        speeds = f"|d{two}\N{GREEK SMALL LETTER THETA}/dt{two}| (rad/s{two})"
+        two = "²"
+        speeds = f"|d{two}θ/dt{two}| (rad/s{two})"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
     up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))
@@ -231,9 +230,7 @@ def _many(experiment: Experiment, width: float) -> Chart:
 def _said(run: Run) -> str:
     said: list[str] = [run.kind]
     if run.drive is not None:
-        said.append(
-            f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s"
-        )
+        said.append(f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s")
     if run.hold_out:
         said.append("held out")
     keys = [found.what for found in run.findings][:3]

@@ -14,6 +14,7 @@ from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
 from pendmap.errors import InputError
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
 
 _CURVES: Final = {
-    -1: ("minus", "exact, multiplier \N{MINUS SIGN}1 (period 2)", "#0072b2", "#56b4e9"),
+    -1: ("minus", typographic("exact, multiplier -1 (period 2)"), "#0072b2", "#56b4e9"),
     1: ("plus", "exact, multiplier +1 (period 1)", "#d55e00", "#e69f00"),
 }
 """Path, name and colours of the curves of hanging and inverted rest, by multiplier; +1 has
@@ -33,15 +34,15 @@ _ROOTS: Final = {"omega-p": ("tongues", ""), "e-alpha2": ("paper", "")}
 """Path and title of each plane in a recording."""
 _DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}  # Parameters that vary
 
-_SQUARED = "\N{SUPERSCRIPT TWO}"
+_SQUARED = "²"
 _NAMES = {
     "omega-p": (
-        "\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0",
-        f"p = Y\N{GREEK CAPITAL LETTER OMEGA}{_SQUARED}/g",
+        "ω = Ω/w0",
+        f"p = YΩ{_SQUARED}/g",
     ),
     "e-alpha2": (
-        f"\N{GREEK SMALL LETTER ALPHA}{_SQUARED} = 1/\N{GREEK SMALL LETTER OMEGA}{_SQUARED}",
-        f"e = p/\N{GREEK SMALL LETTER OMEGA}{_SQUARED} = Y/l",
+        f"α{_SQUARED} = 1/ω{_SQUARED}",
+        f"e = p/ω{_SQUARED} = Y/l",
     ),
 }
 

@@ -37,13 +37,11 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     """Return the four parts; late parts of curves are dark."""
     del cells
     attrs, units = dataset.attrs, Units.of(dataset.attrs)
-    start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
-    start += f"{names.velocity(units)} = {units.spoken(format(float(attrs['velocity0']), '.6g'))}"
     time = dataset["time"].values
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
     return Chart(
         "Trajectory",
-        f"{names.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
+        names.with_start(attrs),
         [
             [_history(dataset, Axis(names.clock(units) if layer else "", ends))],
             [_energy(dataset, Axis(names.clock(units), ends))],
@@ -135,7 +133,7 @@ def _section(dataset: xr.Dataset) -> Panel:
         Points(theta[which], velocity[which], colour=colour, size=size)
         for which, colour in ((~late, _EARLY), (late, _LATE))
     ]
-    title = "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period"
+    title = "Poincaré section, once a period"
     return Panel("section", title, *_sides(dataset), marks)
 
 

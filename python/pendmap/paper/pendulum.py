@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Areas, Ends, Line, Mark, Text
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
@@ -25,7 +26,7 @@ ASIDE: Final = 0.5
 """Lengths in units of the drawing, one inch each: rod, radius of the bob, distance of annotations
 from the rod."""
 
-_DRIVE: Final = "cos(\u03a9t + \u03c6)"
+_DRIVE: Final = "cos(Ωt + φ)"
 _STEEL, _DARK, _RAIL, _HELP = "#3d4f66", "#1d3557", "#b8c2cf", "#8a8a8a"
 _FORCE, _MOTION = "#d55e00", "#0072b2"
 _WHITE: Final = "#ffffff"
@@ -40,9 +41,9 @@ def chart(size: Ends | None = None, title: str | None = None) -> Chart:
     ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
     """
     width, height = size or SIZE
-    equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
-    known = "w0\u00b2 = g/l, p = Y\u03a9\u00b2/g"
-    equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
+    equation = f"th'' + (c/m) th' + w0² (1 + p {_DRIVE}) sin th = -Tr sign(th')"
+    known = "w0² = g/l, p = YΩ²/g"
+    equation = typographic(f"{equation};   {known}").replace("th", "θ").replace("w0", "ω₀")
     scale = min((width - 0.2) / 5.8, (height - HEAD) / 4.85)
     wide, high = (width - 0.2) / scale, (height - HEAD) / scale
     sides = Axis("", (0.55 - wide / 2, 0.55 + wide / 2)), Axis("", (1.25 - high, 1.25))
@@ -66,7 +67,7 @@ def _guide(font: float) -> list[Mark]:
         Line(*slider.T, colour=_DARK, width=1.4, order=2.1),
         *_arrow((-0.82, -0.75), (-0.82, 0.75), _MOTION, both=True),
         _line((-0.94, 0.0), (-0.6, 0.0), _HELP, 0.8, dash=_DASHED),
-        Text(-0.98, 0.3, f"\u2212Y {_DRIVE}", **moves),
+        Text(-0.98, 0.3, typographic(f"-Y {_DRIVE}"), **moves),
         Text(-0.98, -0.02, "the pivot's place,\nupward", **place),
     ]
 
@@ -91,7 +92,7 @@ def _rod(font: float) -> list[Mark]:
         Text(
             (radius + 0.22) * math.sin(half),
             -(radius + 0.22) * math.cos(half),
-            "\u03b8",
+            "θ",
             colour=_DARK,
             size=1.3 * font,
         ),
@@ -112,7 +113,7 @@ def _forces(font: float) -> list[Mark]:
     side = (math.cos(THETA), math.sin(THETA))
     # The velocity is along the arc, upward.
     start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
-    torque = "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)"
+    torque = "drag and dry friction over m l²:\n(c/m) dθ/dt + Tr sign(dθ/dt)"
     pull: dict[str, Any] = {"colour": _FORCE, "align": _LEFT}
     end = (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1])
     above: dict[str, Any] = {"colour": _MOTION, "align": ("center", "bottom"), "size": font}
@@ -120,9 +121,7 @@ def _forces(font: float) -> list[Mark]:
         *_arrow((x, y - BOB), (x, y - BOB - 0.75), _FORCE),
         Text(x + 0.14, y - BOB - 0.5, "$m\\,g$", size=font, **pull),
         *_arrow(start, end, _MOTION),
-        Text(
-            start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0", **above
-        ),
+        Text(start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "dθ/dt > 0", **above),
         # Torque about the axle, opposite to the rotation.
         *_turn(0.98, math.radians(52), math.radians(-14), _FORCE, 1.6),
         Text(1.14, 0.42, torque, size=0.82 * font, **pull),

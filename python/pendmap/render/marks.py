@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from pendmap.charts import marks as charts
+from pendmap.formatting import typographic
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ def _image(axes: Axes, mark: charts.Image) -> None:
         drawn, ax=axes, extend=look.beyond, extendfrac=0.03, pad=0.02, aspect=28, fraction=0.05
     )
     if look.ticks is not None:
-        texts = [f"{tick:.6g}".replace("-", "\N{MINUS SIGN}") for tick in look.ticks]
+        texts = [typographic(f"{tick:.6g}") for tick in look.ticks]
         bar.set_ticks(list(look.ticks), labels=texts)
     bar.ax.minorticks_off()
     bar.outline.set_linewidth(0.7)
