@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points
+from pendmap.charts.marks import NONE, QUIET, ZERO, Band, Level, Line, Mark, Points
 from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, Z95, look, nothing
 from pendmap.formatting import Estimate, estimate_text, typographic
 from pendmap.identification.methods.combined import CUT, triplets
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
     from pendmap.identification import Identification, IdentificationReport, Peaks
 
-DELTA: Final = "δ"
-TITLE: Final = f"The decrement {DELTA} of each three peaks"
+TITLE: Final = "The decrement δ of each three peaks"
 SIZE: Final = "middle peak |θ| (rad)"
 REACH: Final = 3.0
 """Range of a signed panel with few triplets, over the 90th percentile of their absolute values."""
@@ -55,8 +54,7 @@ def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
     turned = peaks.turned
     size = np.abs(turned.amplitude - zero)
     if size.size < 3:  # noqa: PLR2004
-        none = np.empty(0)
-        return Triplets(none, none, none, np.empty(0, bool))
+        return Triplets(NONE, NONE, NONE, np.empty(0, bool))
     delta, _ = triplets(size)
     row = turned.index[2:] - turned.index[:-2] == 2  # noqa: PLR2004
     stderr = _stderr(size, turned.stderr_amplitude)
@@ -93,16 +91,14 @@ def part(report: IdentificationReport) -> Chart:
     for text, removed, some, shift in columns:
         lost = int(np.isnan(some.delta).sum())
         count = f": {lost} of {some.delta.size} have none" if lost else ""
-        for up, title in zip(
-            sides, (f"|{DELTA}|, {text}{count}", f"{DELTA}{removed}"), strict=True
-        ):
+        for up, title in zip(sides, (f"|δ|, {text}{count}", f"δ{removed}"), strict=True):
             absolute = up is sides[0]
             across = Axis("" if absolute else SIZE, ends, "log", ticks=() if absolute else None)
             marks = _points(some, up, absolute=absolute)
             if source is not None:
                 marks += _model(report.peaks, source, shift, (ends[0], up), absolute=absolute)
             if not absolute:
-                marks.append(Level(0.0, colour=QUIET, width=0.6, order=0.0))
+                marks.append(ZERO)
             panels.append(Panel(f"{title} {text}", title, across, up, marks))
     return Chart(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
 
@@ -141,14 +137,14 @@ def _absolute(known: Floats, level: float) -> Axis:
         everything = np.array([1e-3, 1.0])
     low = max(float(np.percentile(everything, 2)), float(everything.max()) * 1e-4)
     low = min(low, level) if level else low
-    return Axis(f"|{DELTA}|", (low / 1.6, float(everything.max()) * 1.6), "log")
+    return Axis("|δ|", (low / 1.6, float(everything.max()) * 1.6), "log")
 
 
 def _signed(known: Floats, level: float) -> Axis:
     """Return an axis that contains most of the triplets; those beyond are drawn at its ends."""
     far = float(np.percentile(np.abs(known), 90)) if known.size else 1.0
     far = max(REACH * far if known.size < 10 else 1.35 * far, 4 * level, 1e-6)  # noqa: PLR2004
-    return Axis(DELTA, (-far, far))
+    return Axis("δ", (-far, far))
 
 
 def _points(some: Triplets, up: Axis, *, absolute: bool) -> list[Mark]:
@@ -174,15 +170,11 @@ def _model(
     peaks: Peaks, source: Identification, shift: float, place: tuple[float, Axis], *, absolute: bool
 ) -> list[Mark]:
     """Return the triplets of simulated peaks with a zero error, and the band of the noise."""
-    level, none = _delta(source), np.empty(0)
-    dashed = f"its {DELTA} = {level:.3g}"
+    level, solid = _delta(source), f"{look(source.method).label}, simulated"
+    dashed: dict[str, Any] = {"dash": "--", "name": f"its δ = {level:.3g}"}
     marks: list[Mark] = [
-        Line(
-            none, none, colour=MEASURED, width=1.0, name=f"{look(source.method).label}, simulated"
-        ),
-        Level(
-            abs(level) if absolute else level, colour=MEASURED, width=1.0, dash="--", name=dashed
-        ),
+        Line(NONE, NONE, colour=MEASURED, width=1.0, name=solid),
+        Level(abs(level) if absolute else level, colour=MEASURED, width=1.0, **dashed),
         Level(CUT, axis="x", colour=QUIET, dash=":", name="12°"),
     ]
     turned, start = peaks.turned, first_state(peaks)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, bars
+from pendmap.charts.marks import NONE, QUIET, ZERO, Areas, Level, Line, Mark, Points, bars
 from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
 from pendmap.charts.record import UNUSED
 from pendmap.formatting import typographic
@@ -90,17 +90,16 @@ def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     """Return the whole record, as a line if ``thin``, else as its peaks alone."""
-    none = np.empty(0)
     cross: dict[str, Any] = {"marker": "|", "edge_width": 1.2, "name": "crossings of zero"}
     circle: dict[str, Any] = {"fill": "white", "edge_width": 0.9, "name": "peaks"}
     marks: list[Mark] = [
-        Line(none, none, colour=EVEN, width=2.0, name="even half cycles"),
-        Line(none, none, colour=ODD, width=2.0, name="odd half cycles"),
-        Points(none, none, colour=MEASURED, size=4.5, **circle),
+        Line(NONE, NONE, colour=EVEN, width=2.0, name="even half cycles"),
+        Line(NONE, NONE, colour=ODD, width=2.0, name="odd half cycles"),
+        Points(NONE, NONE, colour=MEASURED, size=4.5, **circle),
         Points(course.other_time, course.other_theta, colour=UNUSED, size=1.2),
     ]
     if peaks.crossing_time.size:
-        marks.append(Points(none, none, colour=MEASURED, size=7.0, **cross))
+        marks.append(Points(NONE, NONE, colour=MEASURED, size=7.0, **cross))
     if thin:
         marks += _coloured(course.time, course.theta, course.half, 0.6)
     marks += _peaks(peaks, 1.6 if thin else 3.0, by_parity=not thin)
@@ -172,7 +171,7 @@ def _angle(
     marks += [
         Line(*lines, colour=MEASURED, width=0.8, order=3.0),
         *_peaks(some, 4.5, by_parity=only),
-        Level(0.0, colour=QUIET, width=0.6, order=0.0),
+        ZERO,
         Points(cross, 0 * cross, colour=MEASURED, marker="|", size=8.0, edge_width=1.2),
     ]
     return marks, np.concatenate([course.theta[near], some.amplitude])
@@ -191,8 +190,7 @@ def _velocity(
         time, half = time[::every], half[::every]
         within = (peaks.time >= ends[0]) & (peaks.time <= ends[1])
         speed = _slopes(course, time, SPAN * float(np.median(np.diff(peaks.time[within]))))
-    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
-    return [*_coloured(time, speed, half, 1.1), zero], speed
+    return [*_coloured(time, speed, half, 1.1), ZERO], speed
 
 
 def _slopes(course: Course, at: Floats, reach: float) -> Floats:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import palette
+from pendmap.charts import palette, plane
 from pendmap.formatting import MINUS, typographic, with_error
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
         for i, name in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
     }
     owner = dataset["point_attractor"].values
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    points = plane.points(dataset)
     found = []
     for k, (i, name) in enumerate(names.items()):
         row = dataset.isel(attractor=k)

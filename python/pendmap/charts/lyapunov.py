@@ -10,7 +10,20 @@ import numpy as np
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import DASHED, INK, QUIET, Band, Level, Line, Mark, Points, Span, Steps
+from pendmap.charts.marks import (
+    DASHED,
+    INK,
+    NONE,
+    QUIET,
+    ZERO,
+    Band,
+    Level,
+    Line,
+    Mark,
+    Points,
+    Span,
+    Steps,
+)
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
 
@@ -33,13 +46,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     else:
         panels.append(_sliding(dataset))
     attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
-    return Chart(
-        _title(dataset),
-        names.with_start(dataset.attrs),
-        [panels],
-        recorded=[*panels, *attractor],
-        size=(_WIDTHS[len(panels)], 4.3),
-    ).only(layer, (_WIDTHS[1], 4.3))
+    title, subtitle = _title(dataset), names.with_start(dataset.attrs)
+    look: dict[str, Any] = {"recorded": [*panels, *attractor], "size": (_WIDTHS[len(panels)], 4.3)}
+    return Chart(title, subtitle, [panels], **look).only(layer, (_WIDTHS[1], 4.3))
 
 
 def _title(dataset: xr.Dataset) -> str:
@@ -77,30 +86,26 @@ def _rate(dataset: xr.Dataset) -> str:
 def _transient(dataset: xr.Dataset) -> list[Mark]:
     periods = max(int(dataset.attrs["transient_periods"]), 0)
     said = f"transient, {counted(periods, 'period')}"
-    marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
-    return [Span((0, periods), colour=_TRANSIENT, name=said), *marks] if periods else marks
+    return [Span((0, periods), colour=_TRANSIENT, name=said), ZERO] if periods else [ZERO]
+
+
+def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the look and the name of lines that show the exponent."""
+    return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
 
 
 def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
     value = float(dataset.attrs["exponent"])
-    if not math.isfinite(value):
-        return []
-    said = _value(dataset)
-    look: dict[str, Any] = {
-        "colour": _MEAN,
-        "width": 1.6,
-        "dash": DASHED,
-        "name": said,
-        "path": "value",
-    }
-    return [Level(value, axis=axis, order=2.0, **look)]
+    known = math.isfinite(value)
+    look = _mean_look(dataset)
+    return [Level(value, axis=axis, order=2.0, path="value", **look)] if known else []
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
     a, periods, growth = dataset.attrs, dataset["elapsed"].values, dataset["growth"].values
     marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
-    look: dict[str, Any] = {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
+    look = _mean_look(dataset)
     if math.isfinite(rate) and math.isfinite(a["stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.
@@ -108,7 +113,7 @@ def _growth(dataset: xr.Dataset) -> Panel:
         line = last + rate * (periods[begin:] - periods[-1])
         marks.append(Line(periods[begin:], line, **look))
     elif math.isfinite(float(a["exponent"])):
-        marks.append(Line(periods[:0], growth[:0], **look))
+        marks.append(Line(NONE, NONE, **look))
     across = Axis("periods since the start", _elapsed(dataset))
     up = Axis("ln |δx|", holding(growth, 0.0))
     return Panel("growth", "growth along the start's own trajectory", across, up, marks)
@@ -174,7 +179,7 @@ def _distribution(dataset: xr.Dataset) -> Panel:
 def _attractor(dataset: xr.Dataset) -> Panel:
     name, kind = (str(dataset[key].values[0]) for key in ("attractor", "kind"))
     theta = plane.angles(dataset, dataset["point_theta"].values)
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    points = plane.points(dataset)
     at = plane.copies(dataset, points, *theta)
     size = 2.0 if kind.endswith("chaos") else 7.0
     spots = Points(*at.T, colour=palette.colour(name, kind), size=size, path="points")

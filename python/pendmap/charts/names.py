@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap.charts import plane
 from pendmap.charts.chart import Axis, holding
-from pendmap.charts.marks import DOTTED, QUIET, Level, Mark
+from pendmap.charts.marks import DOTTED, QUIET, ZERO, Level, Mark
 from pendmap.formatting import typographic
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Ends, Floats
 
-_TAU: Final = "τ"
-_THETA: Final = "θ"
-
-ANGLE: Final = f"{_THETA} (rad)"  # The angle, with its unit
+ANGLE: Final = "θ (rad)"  # The angle, with its unit
 TIME: Final = "t (s)"  # Time in SI, with its unit
 _TURN: Final = 2.0  # Range of angles above which labels are multiples of pi, rad
 _LONG: Final = 5  # Characters of a label above which an axis is in thousandths of its unit
@@ -42,7 +39,7 @@ _LABORATORY: Final = {"stroke_mm": "p", "frequency_hz": "Omega"}
 
 def velocity(units: Units) -> str:
     """Return the symbol of the velocity."""
-    return f"d{_THETA}/dt" if units.si else f"d{_THETA}/d{_TAU}"
+    return "dθ/dt" if units.si else "dθ/dτ"
 
 
 def speed(units: Units) -> str:
@@ -52,12 +49,12 @@ def speed(units: Units) -> str:
 
 def clock(units: Units) -> str:
     """Return the symbol of time with its unit, separated by a blank."""
-    return TIME if units.si else _TAU
+    return TIME if units.si else "τ"
 
 
 def per_time(units: Units) -> str:
     """Return the unit of an exponent in words."""
-    return "per second" if units.si else f"per unit {_TAU}"
+    return "per second" if units.si else "per unit τ"
 
 
 def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
@@ -96,7 +93,7 @@ def with_start(attrs: Mapping[Any, Any]) -> str:
     """Return the model's parameters and the start of a trajectory in one line."""
     units = Units.of(attrs)
     speed = units.spoken(f"{float(attrs['velocity0']):.6g}")
-    start = f"from {_THETA} = {float(attrs['theta0']):.6g}, {velocity(units)} = {speed}"
+    start = f"from θ = {float(attrs['theta0']):.6g}, {velocity(units)} = {speed}"
     return f"{parameters(attrs)};   {typographic(start)}"
 
 
@@ -128,10 +125,9 @@ def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tupl
     inner = min(float(np.percentile(np.abs(each), _MOSTLY)) for each in known)
     inner = 10.0 ** math.ceil(math.log10(max(inner, least)) - 0.3)
     low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
-    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
     if max(-low, high) <= _NEAR * inner:
-        return Axis(name, holding([low, high, 0.0])), [zero]
+        return Axis(name, holding([low, high, 0.0])), [ZERO]
     ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
     bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
     said = f"{name}\nlog beyond ±{plane.power(inner)}"
-    return Axis(said, ends, "signed", straight=inner), [zero, *bends]
+    return Axis(said, ends, "signed", straight=inner), [ZERO, *bends]

@@ -98,6 +98,11 @@ def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
     return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
 
 
+def points(dataset: xr.Dataset) -> Floats:
+    """Return the stroboscopic points of a result, shape (m, 2): angle in rad, velocity."""
+    return np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+
+
 def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
     """Return the points, shape (m, 2), in [low, high], with their copies shifted by 2 pi k.
 
