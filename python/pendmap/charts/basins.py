@@ -254,7 +254,7 @@ def exponents(dataset: xr.Dataset) -> str:
     """Return the largest exponents of the chaotic attractors in one line; empty if unknown."""
     chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
     values = dataset["exponent"].values[chaotic]
-    errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else []
+    errors = dataset.get("exponent_stderr", dataset["exponent"] * math.nan).values[chaotic]
     known = [x for x in values if math.isfinite(x)]
     listed = ", ".join(f"{x:.3g}" for x in known)
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):

@@ -58,8 +58,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
     known = dataset["entry_exponent"].values
     growth = plane.padded(np.append(known[np.isfinite(known)], 0.0))
-    across, bare = Axis(name, ends), Axis("", ends, ticks=())
-    rate = Axis(f"exponent {names.per_time(units)}", growth)
+    bare, rate = Axis("", ends, ticks=()), Axis(f"exponent {names.per_time(units)}", growth)
     exponents: list[Mark] = [Level(0.0, colour=QUIET)]
     exponents += [
         _dots(one, one.exponents, 1.6, f"{k}/points") for k, one in reversed([*enumerate(every)])
@@ -69,7 +68,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
         Panel("velocity", "", bare, speed, _points(dataset, every, "velocity")),
         Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends)),
-        Panel("exponent", "", across, rate, exponents),
+        Panel("exponent", "", Axis(name, ends), rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
     fixed = names.parameters(dataset.attrs, [own])
@@ -145,9 +144,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
     every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     which = which.reshape(-1)
     owner = dataset["point_entry"].values
-    points = np.stack(
-        [dataset[f"point_{key}"].values for key in ("value", "theta", "velocity")], axis=1
-    )
+    points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
     found: list[Family] = []
     rare = np.array(["chaos" not in str(dataset["kind"].values[word]) for word in every[:, 0]])
@@ -158,16 +155,8 @@ def families(dataset: xr.Dataset) -> list[Family]:
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
         shade = palette.colour(called) if len(found) < MOST else palette.UNNAMED
-        found.append(
-            Family(
-                called,
-                shade,
-                points[mine[owner]],
-                exponents,
-                sweeps["up"] == k,
-                sweeps["down"] == k,
-            )
-        )
+        on = (sweeps["up"] == k, sweeps["down"] == k)
+        found.append(Family(called, shade, points[mine[owner]], exponents, *on))
     return found
 
 

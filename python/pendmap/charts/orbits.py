@@ -81,7 +81,7 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     line |= {"width": 1.6} if stable else {"width": 1.0, "dash": DASHED}
     spots: dict[str, Any] = {"edge": INK, "edge_width": 1.0, "fill": "" if stable else "white"}
     spots |= {"size": 5.0, "order": 4.0, "clip": False, "path": f"{number}/points"}
-    return [Line(*path.T, **line, **look), Points(*at.T, **spots, **look)]
+    return [Line(*path.T, **(line | look)), Points(*at.T, **(spots | look))]
 
 
 def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
-from pendmap.formatting import moment, typographic
+from pendmap.formatting import listed, moment, typographic
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
 from pendmap.signal.local_polynomial import local_fit
@@ -76,7 +76,6 @@ def _listed(run: Run, letters: int) -> list[str]:
 
 def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
     """Return marks of the samples: those for fitting, others, and isolated outliers."""
-    few: dict[str, Any] = {"size": 2.2}
     alone = _lone(~run.trusted)
     steps = np.diff(run.time)
     # A line from the previous sample would cross a gap.
@@ -92,7 +91,7 @@ def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
             line = np.insert(time, breaks, time[breaks]), np.insert(shown, breaks, np.nan)
             marks.append(Line(*line, width=width, **look))
         if run.peaks_only or time.size < FEW:
-            marks.append(Points(time[which], run.theta[which], **few, **look))
+            marks.append(Points(time[which], run.theta[which], size=2.2, **look))
     if alone.any():
         cross: dict[str, Any] = {"colour": FALSE, "marker": "x", "size": 4.5, "edge_width": 1.0}
         marks.append(Points(time[alone], run.theta[alone], name="outliers", **cross))
@@ -119,8 +118,8 @@ def _history(run: Run) -> Panel:
 def _flags(run: Run, width: float) -> Panel:
     """Return the numbers of findings at their times, in two rows without overlap."""
     low, high = float(run.time[0]), float(run.time[-1])
-    ends = holding(run.time, margin=0.01)
-    inches = (width - 1.0) / (ends[1] - ends[0])
+    begin, end = holding(run.time, margin=0.01)
+    inches = (width - 1.0) / (end - begin)
     taken: list[list[float]] = [[], []]
     marks: list[Mark] = []
     for number, found in enumerate(run.findings, 1):
@@ -129,23 +128,20 @@ def _flags(run: Run, width: float) -> Panel:
         left, right = max(found.from_s, low), min(found.to_s, high)
         if right < low or left > high:
             continue
-        at = (left - ends[0]) * inches
+        at = (left - begin) * inches
         row = next((r for r in (0, 1) if all(abs(at - x) > APART for x in taken[r])), None)
         if row is None:
             continue
         taken[row].append(at)
         colour = QUIET if found.mended else ALARM
-        wide = right - left > SHORT * (high - low) and not found.where.startswith("row")
-        place = np.array([left, right]) if wide else np.array([left])
-        height = np.full(place.size, row + 0.12)
-        marks.append(
-            Line(place, height, colour=colour, width=1.6)
-            if wide
-            else Points(place, height, colour=colour, marker="v", size=3.5)
-        )
+        ends, height = np.array([left, right]), np.full(2, row + 0.12)
+        if right - left > SHORT * (high - low) and not found.where.startswith("row"):
+            marks.append(Line(ends, height, colour=colour, width=1.6))
+        else:
+            marks.append(Points(ends[:1], height[:1], colour=colour, marker="v", size=3.5))
         side = ("center", "bottom")
         marks.append(Text(left, row + 0.28, str(number), colour=colour, align=side, size=8.0))
-    return Panel("flags", "", Axis("", ends), Axis("", (0.0, 2.0)), marks, bare=True)
+    return Panel("flags", "", Axis("", (begin, end)), Axis("", (0.0, 2.0)), marks, bare=True)
 
 
 def _intervals(run: Run) -> Panel:
@@ -154,12 +150,11 @@ def _intervals(run: Run) -> Panel:
     usual = float(np.median(steps))
     low, high = float(steps.min()), float(steps.max())
     wide = high > 20 * max(low, 1e-9 * usual)
-    pad = max(0.05 * (high - low), 0.02 * usual)
-    edges = (
-        np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
-        if wide
-        else np.linspace(low - pad, high + pad, 61)
-    )
+    if wide:
+        edges = np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
+    else:
+        pad = max(0.05 * (high - low), 0.02 * usual)
+        edges = np.linspace(low - pad, high + pad, 61)
     counts = np.maximum(np.histogram(steps, edges)[0], 1e-3)
     ends = float(edges[0]), float(edges[-1])
     across = Axis("interval (ms)", ends, "log" if wide else "plain")
@@ -233,7 +228,5 @@ def _said(run: Run) -> str:
         said.append(f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s")
     if run.hold_out:
         said.append("held out")
-    keys = [found.what for found in run.findings][:3]
-    more = ", ..." if len(run.findings) > len(keys) else ""
-    said.append(", ".join(keys) + more)
+    said.append(listed([found.what for found in run.findings], 3))
     return f"{run.name}: " + ", ".join(filter(None, said))
