@@ -128,8 +128,7 @@ def angle_ticks(low: float, high: float) -> Ticks:
     for quarters in (2**k for k in range(12)):
         step = quarters * math.pi / 4
         if FEWEST <= (high - low) / step <= MOST:
-            first, last = _between(low, high, step)
-            return [(k * step, _multiple_of_pi(k * quarters)) for k in range(first, last + 1)]
+            return [(k * step, _multiple_of_pi(k * quarters)) for k in _between(low, high, step)]
     return plain_ticks(low, high)
 
 
@@ -141,9 +140,8 @@ def plain_ticks(low: float, high: float) -> Ticks:
         return [(low, _written(low, 17))]  # narrower than the resolution of floating-point numbers
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
-    first, last = _between(low, high, step)
     digits = min(17, max(6, 3 + math.floor(math.log10(size / step))))
-    return [(k * step, _written(k * step, digits)) for k in range(first, last + 1)]
+    return [(k * step, _written(k * step, digits)) for k in _between(low, high, step)]
 
 
 def log_ticks(low: float, high: float) -> list[float]:
@@ -231,8 +229,8 @@ def _written(value: float, digits: int) -> str:
     return typographic(f"{value:.{digits}g}")
 
 
-def _between(low: float, high: float, step: float) -> tuple[int, int]:
-    return math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+def _between(low: float, high: float, step: float) -> range:
+    return range(math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6) + 1)
 
 
 def _multiple_of_pi(quarters: int) -> str:

@@ -69,17 +69,17 @@ def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) 
         return _sheet(chart, size, dpi)
     figure, needed = _made(chart, size or _size(chart), dpi)
     if size is not None and _lacks(size, needed):
-        least = _least(chart, dpi)
-        if _lacks(size, least):
-            raise _no_room(size, least)
+        _refuse(size, _least(chart, dpi))
     return figure
 
 
-def _no_room(size: Ends, least: Ends) -> InputError:
-    return InputError(
-        f"size {size} leaves no room for the panels; it must be at least"
-        f" {least[0]:.1f} x {least[1]:.1f} inches"
-    )
+def _refuse(size: Ends, least: Ends) -> None:
+    """Raise InputError for a size in inches below the least one."""
+    if _lacks(size, least):
+        raise InputError(
+            f"size {size} leaves no room for the panels; it must be at least"
+            f" {least[0]:.1f} x {least[1]:.1f} inches"
+        )
 
 
 def figure(
@@ -289,9 +289,7 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     high = [sum(_size(chart)[1] for chart in column) for column in sheet.columns]
     foot = _rows(named, sum(wide))
     given = size or (sum(wide), max(high) + HEAD + foot)
-    least = (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot)
-    if _lacks(given, least):
-        raise _no_room(given, least)
+    _refuse(given, (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot))
     figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)
     engine: Any = figure.get_layout_engine()
     _, low, _, tall = engine.get()["rect"]
@@ -410,10 +408,7 @@ def _room(axes: Axes, panel: Panel) -> Ends:
     high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
     title = axes.get_title(loc="left").replace("\n", " ")
     wide = max(LEAST, style.width_of(style.folded(title, 0.0)) - 0.15)
-    if panel.note:
-        wide = max(wide, 1.2)
-        high = max(high, 0.9)
-    return wide, high
+    return (max(wide, 1.2), max(high, 0.9)) if panel.note else (wide, high)
 
 
 def _inches(axes: Axes) -> Ends:
