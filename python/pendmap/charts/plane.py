@@ -1,4 +1,4 @@
-"""Phase-plane geometry: cell edges, ticks, thinned maps, copies of points, wrapped curves."""
+"""Geometry of panels: cell edges, ticks, thinned maps and curves, copies of points, wrapping."""
 
 from __future__ import annotations
 
@@ -198,6 +198,24 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
     gap = np.full_like(edge, np.nan)
     extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
     return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def envelope(time: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest sample of a curve in each of ``bins`` bins.
+
+    The samples are in order of time, with the first and the last one. A curve of at most two
+    samples per bin is returned unchanged.
+    """
+    count = values.size
+    if count <= 2 * bins:
+        return time, values
+    edges = np.linspace(0, count, bins + 1).astype(np.int64)
+    # Bins differ by at most one sample: padded to the longest, each bin is a row.
+    rows = np.minimum(edges[:-1, None] + np.arange(np.diff(edges).max()), edges[1:, None] - 1)
+    of_rows, each = values[rows], np.arange(bins)
+    lowest, highest = (rows[each, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
+    at = np.unique(np.concatenate([[0, count - 1], lowest, highest]))
+    return time[at], values[at]
 
 
 def wrapped(theta: Floats) -> Floats:

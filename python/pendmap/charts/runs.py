@@ -10,7 +10,6 @@ import numpy as np
 
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.curves import envelope
 from pendmap.charts.marks import Line
 from pendmap.units import Units
 
@@ -63,7 +62,7 @@ def _curve(run: RunPanel) -> tuple[Floats, Floats]:
     """Return the line of a record: broken at lost samples, thinned if it has many."""
     time, theta = run.time, run.angle
     if time.size > 2 * BINS:
-        return envelope(time, theta, BINS)
+        return plane.envelope(time, theta, BINS)
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else math.inf
     lost = np.flatnonzero(steps > LOST * usual) + 1

@@ -10,7 +10,6 @@ import numpy as np
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.curves import envelope
 from pendmap.charts.marks import QUIET, Level, Line, Mark, Points, Span
 from pendmap.units import Units
 
@@ -78,7 +77,7 @@ def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
     late = _late(time)
     parts = ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE))
     return [
-        Line(*envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
+        Line(*plane.envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
         for part, colour in parts
     ]
 

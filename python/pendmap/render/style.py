@@ -104,26 +104,6 @@ def colour_map(name: str) -> Colormap:
     return mpl.colormaps[name].copy()
 
 
-def resolution(dpi: float | None) -> float:
-    """Return the pixels per inch, 200 by default; raise InputError if out of range."""
-    if dpi is None:
-        return 200.0
-    low, high = DPI
-    if not low <= dpi <= high:
-        raise InputError(f"dpi {dpi:g} is not between {low} and {high}")
-    return float(dpi)
-
-
-def check_size(size: tuple[float, float] | None, dpi: float) -> None:
-    """Raise InputError for a size in inches or pixels that is out of range."""
-    if size is None:
-        return
-    if not all(0 < side <= MOST for side in size):
-        raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
-    if max(size) * dpi > PIXELS:
-        raise InputError(f"size {size} at {dpi:g} dpi: at most {PIXELS} pixels a side are possible")
-
-
 def written(
     path: str | os.PathLike[str],
     make: Callable[[float], Figure],
@@ -133,11 +113,18 @@ def written(
 ) -> Path:
     """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-    ``size`` and ``dpi`` are the requested values; impossible ones are refused. Files are undated,
+    ``size``, inches, and ``dpi`` are the requested values; InputError is raised for impossible
+    ones. Files are undated,
     so that equal figures give equal files.
     """
-    pixels = resolution(dpi)
-    check_size(size, pixels)
+    pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
+    if not low <= pixels <= high:
+        raise InputError(f"dpi {pixels:g} is not between {low} and {high}")
+    if size is not None and not all(0 < side <= MOST for side in size):
+        raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
+    if size is not None and max(size) * pixels > PIXELS:
+        said = f"at most {PIXELS} pixels a side are possible"
+        raise InputError(f"size {size} at {pixels:g} dpi: {said}")
     with whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
         figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
