@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -66,6 +65,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         marks = _layer(dataset, one, cells, (theta, velocity))
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
+        if one == shown[0]:
+            marks += _names(dataset, listed, shown)
         title = what(dataset, one)
         if shown == ("labels",) and not reliable(dataset):
             title = f"{title}; {warning(dataset)}"
@@ -74,7 +75,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         panels.append(Panel(one, title, *sides, marks, share=share, note=alarm if small else ()))
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
-    panels[0] = _with_names(dataset, panels[0], listed, shown)
     low, high = (units.bare(bound, VELOCITY) for bound in velocity)
     ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
     rows, columns = dataset["label"].shape
@@ -102,10 +102,8 @@ def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
     return "Fractal basins of attraction" if fractal else "Basins of attraction"
 
 
-def _with_names(
-    dataset: xr.Dataset, panel: Panel, listed: list[legend.Entry], shown: tuple[str, ...]
-) -> Panel:
-    """Return a panel with the legend: each basin's colour with the attractor's marker."""
+def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ...]) -> list[Mark]:
+    """Return the legend: each basin's colour with the attractor's marker."""
     named: list[Mark] = []
     for entry in listed:
         text = entry.text
@@ -117,7 +115,7 @@ def _with_names(
         named.append(Points(NONE, NONE, marker="s", size=9.0, edge_width=0.5, **look))
         if entry.id >= 1 and not entry.chaotic:
             named.append(_marker(entry, np.empty((0, 2)), text, 5.0))
-    return dataclasses.replace(panel, marks=[*panel.marks, *named])
+    return named
 
 
 def _marker(

@@ -39,8 +39,6 @@ ALONE: Final = 3.4
 OVERVIEW: Final = 1.95
 """Inches: width of the sheet; heights of a run's row, of a single one, of the panel of all runs.
 The sheet fits the proportions of a screen."""
-SPREAD: Final = 10.0
-"""Ratio of the greatest to the least residual above which their axis is logarithmic."""
 HELD: Final = "#d55e00"
 NAMED: Final = 40  # Greatest number of runs named below a panel
 DOTS: Final = 6_000  # Greatest number of readings of a decay drawn
@@ -89,15 +87,12 @@ def _overview(runs: Sequence[Compared]) -> Chart:
     marks: list[Mark] = [Level(1.0, colour=MEASURED, width=0.8, dash="--")]
     for which, colour in ((~held, look(MODEL).colour), (held, HELD)):
         marks.append(Points(places[which], ratios[which], colour=colour, size=5.0))
-    low, high = min(float(ratios.min()), 1.0), max(float(ratios.max()), 1.0)
-    up = Axis("rms / noise", (0.0, 1.15 * high))
-    if high > SPREAD * low:
-        up = Axis("rms / noise", (low / 1.5, high * 1.5), "log")
     every = -(-len(runs) // NAMED)
     ticks = [(float(k), runs[k].run.name) for k in range(0, len(runs), every)]
     across = Axis("", (-0.5, len(runs) - 0.5), ticks=ticks)
     title = "all runs: the residual over the noise" + ("; orange: held out" if held.any() else "")
-    return Chart("", "", [[Panel("all", title, across, up, marks)]], size=(WIDTH, OVERVIEW))
+    panel = Panel("all", title, across, names.sizes("rms / noise", ratios, 1.0), marks)
+    return Chart("", "", [[panel]], size=(WIDTH, OVERVIEW))
 
 
 def _row(one: Compared, high: float) -> Chart:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
     from pendmap.identification import Identification, IdentificationReport, Peaks
+    from pendmap.identification.table1 import State
+    from pendmap.model import Rig
 
 TITLE: Final = "The decrement δ of each three peaks"
 SIZE: Final = "middle peak |θ| (rad)"
@@ -124,6 +126,18 @@ def _source(report: IdentificationReport) -> Identification | None:
     return None
 
 
+def offset_of(found: Identification) -> float:
+    """Return the zero error of an identification, 0 if it estimates none."""
+    return found["offset"] if "offset" in found.estimates else 0.0
+
+
+def from_first_peak(rig: Rig, peaks: Peaks, zero: float) -> tuple[State, Floats, Floats]:
+    """Return the first peak less a zero error, and times and angles of the peaks from it on."""
+    start = first_state(peaks)
+    begun = dataclasses.replace(start, theta=start.theta - zero)
+    return begun, *simulated_peaks(rig, begun, float(peaks.turned.time[-1]))
+
+
 def _delta(found: Identification) -> float:
     """Return ``zeta / sqrt(1 - zeta^2)`` of an identification."""
     zeta = found["c_over_m"] / (2 * found["w0"])
@@ -177,10 +191,8 @@ def _model(
         Level(abs(level) if absolute else level, colour=MEASURED, width=1.0, **dashed),
         Level(CUT, axis="x", colour=QUIET, dash=":", name="12°"),
     ]
-    turned, start = peaks.turned, first_state(peaks)
-    own = source["offset"] if "offset" in source.estimates else 0.0
-    begun = dataclasses.replace(start, theta=start.theta - own)
-    _, angles = simulated_peaks(source.rig, begun, float(turned.time[-1]))
+    turned = peaks.turned
+    _, _, angles = from_first_peak(source.rig, peaks, offset_of(source))
     size = np.abs(angles + shift)
     if size.size < 3:  # noqa: PLR2004
         return marks

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
 from pendmap.charts.identification import errors_of
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
 
 ACCELERATION: Final = "rad/s²"  # Unit of a torque per moment of inertia
+RMS: Final = "rms (mrad)"  # Root mean square of residuals, with its unit
 LACKED: Final = "Torque that the model lacks"
 OVER_SAID: Final = {
     "angle": "angle (rad)",
@@ -38,8 +40,6 @@ ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 RUNS: Final = 3  # Number of runs whose residuals are drawn: those with the worst baseline fit
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged; model errors are slower."""
-WIDE: Final = 8.0
-"""Ratio of the greatest residual to the least above which their axis is logarithmic."""
 CYCLES: Final = 3  # Number of free runs in figure 7: those held out first, then the longest
 RANKED: Final = 8  # Number of candidates in the ranking
 SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
@@ -108,12 +108,12 @@ def cycles(found: Discrepancy) -> Sheet | None:
 
 def _title(found: Discrepancy) -> str:
     """Return the verdict with its names; for indistinguishable effects with all of them."""
-    alike = {names[0]: names for names in found.equivalent}
-    names = [effect.name for effect in found.effects]
+    alike = {each[0]: each for each in found.equivalent}
+    said = [effect.name for effect in found.effects]
     if found.verdict == "ambiguous":
-        names = [" or ".join(alike.get(name, [name])) for name in names]
+        said = [" or ".join(alike.get(name, [name])) for name in said]
     between = "; " if found.verdict == "ambiguous" else ", "
-    return f"{found.verdict}: {between.join(names) or 'no effect claimed'}"
+    return f"{found.verdict}: {between.join(said) or 'no effect claimed'}"
 
 
 def models(found: Discrepancy) -> list[tuple[str, str]]:
@@ -161,19 +161,9 @@ def _smoothed(residual: Floats, every: int) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), math.nan)
 
 
-def _rms(*values: npt.ArrayLike) -> Axis:
-    """Return the axis of residuals in mrad, logarithmic if they differ much."""
-    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
-    every = every[np.isfinite(every)]
-    low, high = float(every.min()), float(every.max())
-    if high > WIDE * low > 0:
-        return Axis("rms (mrad)", (low / 1.4, 1.5 * high), "log")
-    return Axis("rms (mrad)", (0.0, 1.15 * high))
-
-
-def _runs(names: Sequence[str]) -> Axis:
-    ticks = [(float(k), name.removesuffix(".csv")) for k, name in enumerate(names)]
-    return Axis("", (-0.6, len(names) - 0.4), ticks=ticks)
+def _runs(files: Sequence[str]) -> Axis:
+    ticks = [(float(k), name.removesuffix(".csv")) for k, name in enumerate(files)]
+    return Axis("", (-0.6, len(files) - 0.4), ticks=ticks)
 
 
 def by_run(found: Discrepancy) -> Panel:
@@ -196,7 +186,7 @@ def by_run(found: Discrepancy) -> Panel:
     ]
     if found.adds:
         marks.append(Points(at, after, marker="s", colour=AFTER, size=4.0))
-    across, up = _runs([row.name for row in rows]), _rms(noise, before, after)
+    across, up = _runs([row.name for row in rows]), names.sizes(RMS, noise, before, after)
     return Panel("by run", "Residual by run", across, up, marks)
 
 
@@ -213,7 +203,7 @@ def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel
     across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
     title = f"Error of forecasts, {one.kind} runs"
     root = f"forecast/{one.kind}"
-    up = Axis("rms (mrad)", holding(0.0, *shown)) if plain else _rms(*shown)
+    up = Axis(RMS, holding(0.0, *shown)) if plain else names.sizes(RMS, *shown)
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
@@ -275,7 +265,7 @@ def ranking(found: Discrepancy) -> Panel:
         y = float(len(best) - 1 - place)
         name = score.candidate.name
         ticks.append((y, name))
-        colour = ALIKE if any(name in names for names in found.equivalent) else OTHER
+        colour = ALIKE if any(name in each for each in found.equivalent) else OTHER
         colour = AFTER if name in {effect.name for effect in found.effects} else colour
         corners = [(1.0, y - 0.35), (value, y - 0.35), (value, y + 0.35), (1.0, y + 0.35)]
         boxes.setdefault(colour, []).append(np.array(corners))
@@ -365,5 +355,5 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
     own = shown.rpartition(".")[2]
     claimed = "" if found.effects else " (not claimed)"
     up = Axis(f"{own} ({unit})" if unit else own, (low, high))
-    names = _runs([run.name for run in found.data.fitted])
-    return Panel(f"run by run {shown}", f"{shown}{claimed}", names, up, marks)
+    across = _runs([run.name for run in found.data.fitted])
+    return Panel(f"run by run {shown}", f"{shown}{claimed}", across, up, marks)

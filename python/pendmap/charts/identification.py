@@ -17,7 +17,6 @@ from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, Z95, drawn, look
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
-from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
@@ -98,13 +97,10 @@ class Decay:
     @classmethod
     def of(cls, rig: Rig, peaks: Peaks, zero: float) -> Decay:
         """Return the simulation of a model whose sensor has a zero error, rad."""
-        turned, start = peaks.turned, first_state(peaks)
-        begun = dataclasses.replace(start, theta=start.theta - zero)
-        last = float(turned.time[-1])
-        peak_time, peak = simulated_peaks(rig, begun, last)
-        until = max(last - start.time, 1e-3) * 1.01
+        begun, peak_time, peak = decrement.from_first_peak(rig, peaks, zero)
+        until = max(float(peaks.turned.time[-1]) - begun.time, 1e-3) * 1.01
         run = simulate(rig, begun.theta, 0.0, until, samples=SAMPLES)
-        time, theta = run["time"].values + start.time, run["theta"].values + zero
+        time, theta = run["time"].values + begun.time, run["theta"].values + zero
         return cls(peak_time, peak + zero, time, theta)
 
 
@@ -118,8 +114,7 @@ def _decays(report: IdentificationReport) -> dict[str, Decay]:
         if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
             continue
         rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
-        zero = found["offset"] if "offset" in found.estimates else 0.0
-        made[name] = Decay.of(rig, report.peaks, zero)
+        made[name] = Decay.of(rig, report.peaks, decrement.offset_of(found))
     return made
 
 

@@ -19,6 +19,8 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
+    import numpy.typing as npt
+
     from pendmap.charts.marks import Ends, Floats
 
 ANGLE: Final = "θ (rad)"  # The angle, with its unit
@@ -28,6 +30,7 @@ _LONG: Final = 5  # Characters of a label above which an axis is in thousandths 
 _MOSTLY: Final = 95
 """Percentile of absolute values that the linear part of a signed logarithmic axis contains."""
 _NEAR: Final = 12.0  # Range of an axis over its linear part up to which it is linear
+_WIDE: Final = 8.0  # Ratio of positive values above which their axis is logarithmic
 _BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
 _SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
 """Parameters of a nondimensional model and of one in SI, in the order of a subtitle."""
@@ -110,6 +113,16 @@ def angle(ends: Ends, name: str = ANGLE) -> Axis:
     if max((len(text) for _, text in labels), default=0) > _LONG:
         return Axis(name.replace("(rad", "(mrad"), ends, factor=1e3)
     return Axis(name, ends)
+
+
+def sizes(name: str, *values: npt.ArrayLike) -> Axis:
+    """Return an axis of positive values from 0, or a logarithmic one if they differ much."""
+    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    every = every[np.isfinite(every)]
+    low, high = float(every.min()), float(every.max())
+    if high > _WIDE * low > 0:
+        return Axis(name, (low / 1.4, 1.5 * high), "log")
+    return Axis(name, (0.0, 1.15 * high))
 
 
 def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:

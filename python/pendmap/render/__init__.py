@@ -6,13 +6,15 @@ identifications have functions of their own. No display is needed.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendmap.charts import registry
 from pendmap.charts.runs import RunPanel, of_runs
 from pendmap.errors import InputError
-from pendmap.render.drawing import figure, save
+from pendmap.render import drawing
+from pendmap.render.drawing import save
 from pendmap.render.style import SUFFIXES, written
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
@@ -106,12 +109,13 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     """
     dataset = registry.ready(dataset, "draw")
 
-    return written(
-        path,
-        lambda dpi: figure(dataset, layer=layer, size=size, dpi=dpi, colormap=colormap),
-        size=size,
-        dpi=dpi,
-    )
+    def make(dpi: float) -> Figure:
+        cells = max(drawing.CELLS, math.ceil(max(size or (0.0,)) * dpi))
+        chart = registry.build(dataset, layer=layer, cells=cells)
+        chart = chart if colormap is None else drawing.in_colours(chart, colormap)
+        return drawing.draw(chart, size=size, dpi=dpi)
+
+    return written(path, make, size=size, dpi=dpi)
 
 
 def draw_record(

@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pendmap.charts import registry
 from pendmap.charts.chart import Sheet
 from pendmap.charts.marks import ALARM, QUIET, Image
 from pendmap.errors import InputError
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase, SubFigure
 
@@ -82,25 +80,9 @@ def _refuse(size: Ends, least: Ends) -> None:
         )
 
 
-def figure(
-    dataset: xr.Dataset,
-    *,
-    layer: str | None = None,
-    size: tuple[float, float] | None = None,
-    dpi: float = 200.0,
-    colormap: str | None = None,
-) -> Figure:
-    """Return the figure of a dataset that is ready to be drawn."""
-    pixels = math.ceil(max(size or (0.0,)) * dpi)
-    chart = registry.build(dataset, layer=layer, cells=max(CELLS, pixels))
-    if colormap is not None:
-        style.colour_map(colormap)
-        chart = _recoloured(chart, colormap)
-    return draw(chart, size=size, dpi=dpi)
-
-
-def _recoloured(chart: Chart, colormap: str) -> Chart:
+def in_colours(chart: Chart, colormap: str) -> Chart:
     """Return a chart with another colour map in its images of numbers."""
+    style.colour_map(colormap)
     if not any(_scales(panel) for panel in chart.panels):
         raise InputError(
             f"colormap {colormap!r}: this figure has none; its colours identify attractors"
