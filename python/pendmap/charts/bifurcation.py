@@ -23,6 +23,7 @@ MOST: Final = 16  # Greatest number of families that a legend names; all others 
 _LAYERS: Final = ("theta", "velocity")
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
+_STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
 _SWEEPS: Final = (("up", 0.025), ("down", 0.055))
 """Sweeps, and their height above the angles in a recording, over the range of the angles."""
 
@@ -84,13 +85,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         remark="The two lines above the angles: on which attractor the sweep up (lower) and the"
         " sweep down (upper) are.",
     )
-
-
-_STRIP: Final = Axis(
-    "",
-    (-1.0, 1.0),
-    ticks=((0.5, "up →"), (-0.5, "← down")),
-)
 
 
 def _dots(one: Family, at: npt.NDArray[np.float64], size: float, path: str) -> Points:

@@ -106,7 +106,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         raise InputError(f"key must be one figure, got {key!r}")
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
-    if key in ("1", "2"):
+    if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         return save(tongues.chart(_critical(), title=title, marks=marks), path)
     if key == "2":
