@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
-    from matplotlib.figure import Figure
 
+    from pendmap.charts.chart import Chart
     from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
     from pendmap.identification import IdentificationReport
@@ -109,13 +109,14 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     """
     dataset = registry.ready(dataset, "draw")
 
-    def make(dpi: float) -> Figure:
+    def chart(dpi: float) -> Chart:
         cells = max(drawing.CELLS, math.ceil(max(size or (0.0,)) * dpi))
-        chart = registry.build(dataset, layer=layer, cells=cells)
-        chart = chart if colormap is None else drawing.in_colours(chart, colormap)
-        return drawing.draw(chart, size=size, dpi=dpi)
+        made = registry.build(dataset, layer=layer, cells=cells)
+        return made if colormap is None else drawing.in_colours(made, colormap)
 
-    return written(path, make, size=size, dpi=dpi)
+    return written(
+        path, lambda dpi: drawing.draw(chart(dpi), size=size, dpi=dpi), size=size, dpi=dpi
+    )
 
 
 def draw_record(

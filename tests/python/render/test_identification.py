@@ -225,7 +225,8 @@ def test_labels_over_many_powers_of_ten_have_room(scale: float, spread: float) -
     up, lines = signed([near, -near * spread], "error")
     panel = charts.Panel("error", "", charts.Axis("x", (0.0, 1.0)), up, lines)
     with rc_context(style.RC):
-        figure = drawing.draw(charts.Chart("Errors", "", [panel], size=(4.0, 2.5)), dpi=100.0)
+        chart = charts.Chart("Errors", "", [[panel]], size=(4.0, 2.5))
+        figure = drawing.draw(chart, dpi=100.0)
         figure.draw_without_rendering()
     assert_room(figure)
     assert len([t for t in figure.axes[0].get_yticklabels() if t.get_text()]) >= 3
