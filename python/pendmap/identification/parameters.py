@@ -13,13 +13,12 @@ from pendmap.errors import InputError, short_repr
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.signal import Floats
     from pendmap.units import Units
-
-    Floats = NDArray[np.float64]
 
 
 PLACES: Final[Mapping[str, tuple[str, float]]] = {

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification.coarse_finder import CoarseFinder
     from pendmap.identification.turning import End
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +96,7 @@ class Peaks:
         return bool(np.any(self.stderr_time > 0) or np.any(self.stderr_amplitude > 0))
 
     @property
-    def odd(self) -> NDArray[np.bool_]:
+    def odd(self) -> Mask:
         """Mask of peaks that begin an odd half cycle, shape (P,)."""
         return np.asarray(self.index % 2 == 1)
 
@@ -112,7 +111,7 @@ class Peaks:
             self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
         )
 
-    def select(self, which: NDArray[np.bool_]) -> Peaks:
+    def select(self, which: Mask) -> Peaks:
         """Return the selected peaks, with all crossings."""
         names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
         some = {name: getattr(self, name)[which] for name in names}

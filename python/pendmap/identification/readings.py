@@ -15,10 +15,9 @@ from pendmap.records.resolution import step_of
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records import Run
     from pendmap.records.jitter import SpeedLaw
+    from pendmap.signal import Floats, Mask
 
 
 DITHERED: Final = 0.45
@@ -35,12 +34,12 @@ class Reading:
 
     sigma: float  # standard error of one reading, rad
     count: float  # step of the sensor, rad; 0 for none
-    each: NDArray[np.float64]  # standard error of each reading, rad, from the law if any
+    each: Floats  # standard error of each reading, rad, from the law if any
     doubt: float  # relative standard error of sigma
     coarse: bool  # whether the count is coarser than the noise
-    alike: NDArray[np.float64]  # uniform standard errors, for a model that lacks an effect
+    alike: Floats  # uniform standard errors, for a model that lacks an effect
     law: SpeedLaw | None = None  # growth of the noise with speed, if significant
-    shift: NDArray[np.float64] | float = 0.0  # bias by timing jitter, rad; subtracted
+    shift: Floats | float = 0.0  # bias by timing jitter, rad; subtracted
     gain: float = 1.0  # sensor's reading over the equivalent angle
     unit: str = "rad"  # unit of the sensor's readings
 
@@ -51,11 +50,11 @@ class Reading:
 
 
 def reading_of(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     sigma: float | None = None,
     *,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: Mask | None = None,
     count: float | None = None,
 ) -> Reading:
     """Return the standard errors of readings (rad, at times in s), from the trusted ones.
@@ -115,7 +114,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
     )
 
 
-def as_angles(run: Run) -> NDArray[np.float64]:
+def as_angles(run: Run) -> Floats:
     """Return a run's angles; for a sensor on the rod, readings over the gain of small swings."""
     return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 

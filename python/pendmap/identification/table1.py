@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from pendmap.identification.methods.base import Identification
     from pendmap.model import Rig
     from pendmap.records import Run
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s; on a slower rig the first is that of small swings."""

@@ -12,9 +12,7 @@ from pendmap.formatting import Estimate
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices
 
 
 Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
@@ -89,9 +87,7 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
     return coefficients, inverse * max(misfit, 1.0), misfit
 
 
-def chain_covariance(
-    pairs: NDArray[np.intp], left: Floats, right: Floats, variance: Floats
-) -> Floats:
+def chain_covariance(pairs: Indices, left: Floats, right: Floats, variance: Floats) -> Floats:
     """Return the covariance of ``left_j e_k + right_j e_{k+1}``, ``k = pairs_j``, shape (2, Q).
 
     Differences of successive peaks share a peak and its error; ``variance``, shape (P,), is that of

@@ -15,7 +15,7 @@ from pendmap.model import Rig
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from pendmap.signal import Floats
 
 
 MISFIT: Final = 2.0  # chi^2 per degree of freedom above which a method of peaks warns
@@ -54,7 +54,7 @@ class Identification:
     used: str = ""
     warnings: tuple[str, ...] = ()
     applicable: bool = True
-    covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
+    covariance: tuple[tuple[str, ...], Floats] | None = None
     misfit: float | None = None
     model: Rig | None = None
     converged: bool = True

@@ -16,11 +16,8 @@ from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import bootstrap, estimates, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 Reading = Literal["all", "odd_ends", "odd_triplets"]  # Interpretations of the peaks to be used

@@ -17,11 +17,8 @@ from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 FAST: Final = (CUT, math.radians(90.0))

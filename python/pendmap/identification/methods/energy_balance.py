@@ -17,11 +17,8 @@ from pendmap.identification.uncertainty import chain_covariance, chain_least_squ
 from pendmap.signal.local_polynomial import smoothed_velocity
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices
 
 
 _FEWEST: Final = 5  # Fewest peaks
@@ -92,7 +89,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
 
 
 def _balance(
-    peaks: Peaks, pairs: NDArray[np.intp], work: Floats, w0: float, zero: float
+    peaks: Peaks, pairs: Indices, work: Floats, w0: float, zero: float
 ) -> tuple[Floats, Floats, float]:
     """Return ``c_over_m``, ``Tr``, change of the zero; covariance; chi^2 per degree of freedom."""
     x = peaks.amplitude - zero
@@ -111,7 +108,7 @@ def _balance(
 
 
 def _measured_work(
-    record: tuple[Floats, Floats], peaks: Peaks, pairs: NDArray[np.intp], w0: float
+    record: tuple[Floats, Floats], peaks: Peaks, pairs: Indices, w0: float
 ) -> Floats:
     """Return ``int th'^2 dt`` over each half cycle, rad^2/s."""
     time, theta = record

@@ -13,11 +13,8 @@ from pendmap.identification.period import mean_period
 from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 Reading = Literal["ends", "line"]

@@ -25,11 +25,10 @@ from pendmap.signal.robust import from_first, normal_scale
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 @dataclasses.dataclass(frozen=True)

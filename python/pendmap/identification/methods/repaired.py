@@ -15,11 +15,8 @@ from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import estimates, jacobian
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _FEWEST: Final = 6  # Fewest peaks below the cut

@@ -16,11 +16,10 @@ from pendmap.identification.peaks import Peaks, find_peaks, samples
 from pendmap.identification.period import envelope
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.identification.methods.base import Identification
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 _DAMPING: Final = (1e-5, 0.5)  # Searched range of ``c_over_m / w0``
 _FRICTION: Final = (1e-6, 0.3)  # Searched range of ``Tr / w0^2``, rad

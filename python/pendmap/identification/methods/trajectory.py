@@ -28,14 +28,11 @@ from pendmap.signal.robust import from_first, span
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 TOO_GOOD: Final = 0.7
@@ -103,7 +100,7 @@ def fit_decay(
     theta: Floats,
     *,
     sigma: float | None = None,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: Mask | None = None,
     **choices: Any,  # noqa: ANN401 (those of fit_from_start)
 ) -> tuple[TrajectoryFit, Reading]:
     """Return the fit to a free decay (s, and rad from the downward rest) and its readings.
