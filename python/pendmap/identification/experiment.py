@@ -13,10 +13,10 @@ from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
+from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
     OFFSET,
     JointFit,
-    TooShortError,
     fit_together,
     identification_of,
 )

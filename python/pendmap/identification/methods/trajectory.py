@@ -16,7 +16,7 @@ import numpy as np
 from pendmap.errors import FitDiverged, InputError, check_number
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.start import starting_values
+from pendmap.identification.methods.start import TooShortError, starting_values
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
@@ -41,10 +41,6 @@ OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
 POOR: Final = 0.1  # Rms residual over the record's standard deviation above which a fit is poor
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
-
-
-class TooShortError(InputError):
-    """Error raised for a record with too few decaying half swings for starting values."""
 
 
 def identify(
@@ -215,8 +211,8 @@ def fit_from_start(
     if isinstance(start, Rig) or not poor:
         return found, tuple(readings)
     try:
-        found_by_peaks = _by_peaks(time, theta, readings[0].sigma)
-        again = fitted(dict(start or {}) | found_by_peaks)
+        by_peaks = starting_values(time, theta, sigma=readings[0].sigma)
+        again = fitted(dict(start or {}) | by_peaks)
     except (FitDiverged, TooShortError):
         return found, tuple(readings)
     better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
@@ -231,22 +227,10 @@ def _start_of(
         return start
     known: dict[str, Any] = dict(start or {})
     if "w0" not in known:
-        known = (rough_start(time, theta, sigma) or _by_peaks(time, theta, sigma)) | known
+        # The methods of peaks also handle rotations.
+        rough = rough_start(time, theta, sigma) or starting_values(time, theta, sigma=sigma)
+        known = rough | known
     return Rig(**known)
-
-
-def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
-    """Return starting values from the methods of peaks, which also handle rotations."""
-    try:
-        start = starting_values(time, theta, sigma=sigma)
-    except InputError:
-        start = None
-    if start is None or start.source == "guess":
-        raise TooShortError(
-            "the record must show three half swings or more of a free decay, or a natural frequency"
-            " must be given: w0 = 6.2 under [rig] in experiment.toml"
-        )
-    return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}
 
 
 @dataclasses.dataclass(frozen=True)
