@@ -22,7 +22,7 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
+from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
 from pendmap.identification.methods import combined, de_paula, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
@@ -278,7 +278,7 @@ def spoilers(path: Motion, count: int) -> None:
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
                 start = State(0.0, float(find_peaks(times, angles).amplitude[0]), 0.0)
-                found = METHODS[name].identify(times, angles)
+                found = identify(times, angles, methods=[name])[name]
                 if found.applicable:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_callable, check_type, instruction_set
-from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
@@ -29,7 +28,6 @@ from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import Experiment
 from pendmap.records.summary import unit_wrong
-from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -167,9 +165,7 @@ def _best(
             [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
             joint.fit,
         )
-    part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
-    found = identification_of(joint.fit, joint.readings, part)
-    return joint, dataclasses.replace(found, method=BEST)
+    return joint, dataclasses.replace(identification_of(joint), method=BEST)
 
 
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:

@@ -139,6 +139,12 @@ def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
     return Identification(warnings=(*warnings, text), applicable=False)
 
 
+def needs_samples() -> Identification:
+    """Return an inapplicable result: the record has peaks only."""
+    text = "not applicable: the record has peaks only, and this method needs every sample"
+    return Identification(warnings=(text,), applicable=False)
+
+
 def unphysical(values: Mapping[str, float]) -> list[str]:
     """Return a warning for each negative damping parameter."""
     return [

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.base import (
+    MISFIT,
+    Identification,
+    needs_samples,
+    too_few,
+    unphysical,
+)
 from pendmap.identification.period import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
 from pendmap.signal.local_polynomial import smoothed_velocity
@@ -30,7 +36,7 @@ _SAMPLES: Final = 25
 """Samples per period below which a warning is given: the quartic smooths the velocity."""
 
 
-def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
+def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identification:
     """Identify viscous damping and Coulomb friction from the energy loss of each half cycle.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
@@ -38,6 +44,8 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     over measured velocities from local quartics, less the noise's share; across a gap it is that of
     an undamped pendulum. Generalized least squares account for peaks shared by half cycles.
     """
+    if record is None:
+        return needs_samples()
     turned = peaks.turned
     if len(turned) < _FEWEST:
         return too_few(len(turned), _FEWEST)
