@@ -91,7 +91,7 @@ def identify_experiment(
     names = check_names(methods)
     for effect in effects:
         name = effect if isinstance(effect, str) else effect.name
-        if definition(name)["group"] == "drive":
+        if definition(name).group == "drive":
             raise InputError(
                 f"effect {name} acts on the drive: it must be one that acts on free decays, of "
                 "damping, torque or reading"

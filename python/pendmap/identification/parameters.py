@@ -105,8 +105,8 @@ def _found_in(
     effect = next(effects, None)
     if effect is None:
         return None
-    entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
-    power, less = float(entry["power_of_w0"]), entry["power_of_w0_less"]
+    entry = effect.definition[parameter]
+    power, less = float(entry.power_of_w0), entry.power_of_w0_less
     exponent = None if less is None else f"{own}.{less}"
     if less is not None and exponent not in free:
         power, exponent = power - effect.parameters[less], None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import read_toml
-from pendmap.model.effects import Effect, FormulaKey, ParameterKey
+from pendmap.model.effects import Effect, EffectDefinition, FormulaKey, ParameterKey
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -92,7 +92,7 @@ class Formula:
     parameters: Mapping[str, Any]
     revealed_by: str = ""
     key: FormulaKey = dataclasses.field(init=False, repr=False, compare=True)
-    entry: dict[str, Any] = dataclasses.field(init=False, repr=False, compare=False)
+    definition: EffectDefinition = dataclasses.field(init=False, repr=False, compare=False)
     proportional: bool = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -124,8 +124,9 @@ class Formula:
         with core_errors():
             entry, proportional = _core.formula(key)
         kept = dict(zip(names, tables, strict=True))
-        found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
-        for what, value in found.items():
+        definition = EffectDefinition.of(entry)
+        found = {"key": key, "definition": definition, "proportional": proportional}
+        for what, value in (found | {"parameters": kept}).items():
             object.__setattr__(self, what, value)
 
     def __hash__(self) -> int:

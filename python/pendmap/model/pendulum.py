@@ -162,7 +162,7 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
         if effect.formula is not None:
             continue
         # The only parameter of an effect that duplicates one of the model has its name.
-        names = [entry["name"] for entry in effect.definition["parameters"]]
+        names = [parameter.name for parameter in effect.definition.parameters]
         if len(names) == 1 and names[0] in own:
             called, value = own[names[0]]
             if value != 0:

@@ -22,7 +22,7 @@ from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
-from pendmap.model.effects import Effect, opposes
+from pendmap.model.effects import Effect
 from pendmap.records import Run
 from pendmap.signal.robust import from_first, span
 
@@ -129,7 +129,7 @@ def _warnings(
 ) -> list[str]:
     found = []
     opposing = [
-        f"{e.name}.{size}" for e in fit.model.effects if opposes(e.definition) for size in e.sizes
+        f"{e.name}.{size}" for e in fit.model.effects if e.definition.opposes for size in e.sizes
     ]
     for name in ("c_over_m", "Tr", *opposing):
         if name in estimates and estimates[name].value < 0:
