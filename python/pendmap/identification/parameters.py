@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
+from pendmap.model.quantities import COUNTERPARTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,14 +22,8 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-PLACES: Final[Mapping[str, tuple[str, float]]] = {
-    "w0": ("gravity", 1),
-    "c_over_m": ("gamma", 1),
-    "Tr": ("theta_r", 2),
-    "torque": ("torque", 2),
-    "p": ("p", 0),
-    "Omega": ("omega", 1),
-    "phi": ("phase", 0),
+PLACES: Final[Mapping[str, tuple[str, float]]] = {"w0": ("gravity", 1)} | {
+    si: (bare, power) for bare, (si, power) in COUNTERPARTS.items() if bare != "lab_time"
 }
 """Name in the core of each parameter of a rig, and the power of ``w0`` in its SI value."""
 

@@ -37,11 +37,15 @@ class Reading:
     each: Floats  # standard error of each reading, rad, from the law if any
     doubt: float  # relative standard error of sigma
     coarse: bool  # whether the count is coarser than the noise
-    alike: Floats  # uniform standard errors, for a model that lacks an effect
     law: SpeedLaw | None = None  # growth of the noise with speed, if significant
     shift: Floats | float = 0.0  # bias by timing jitter, rad; subtracted
     gain: float = 1.0  # sensor's reading over the equivalent angle
     unit: str = "rad"  # unit of the sensor's readings
+
+    @property
+    def alike(self) -> Floats:
+        """Uniform standard errors, rad, for a model that lacks an effect."""
+        return np.full(self.each.shape, self.sigma)
 
     @property
     def interval(self) -> float | None:
@@ -81,11 +85,10 @@ def reading_of(
     least = max(count / math.sqrt(12), 1e-15)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
-    each = alike = np.full(theta.shape, sigma)
     if law is None:
-        return Reading(sigma, count, each, doubt, coarse, alike)
+        return Reading(sigma, count, np.full(theta.shape, sigma), doubt, coarse)
     each = np.maximum(law.sigma(time, theta), least)
-    return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
+    return Reading(sigma, count, each, doubt, coarse, law, law.shift(time, theta))
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:

@@ -7,36 +7,14 @@ import difflib
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from pendmap.errors import InputError, check_flag, check_number, short_repr
+from pendmap.errors import InputError, check_flag, check_keys, check_number, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from pendmap.units import Units
-
-
-class ParameterKey(NamedTuple):
-    """A formula's parameter as passed to the core; ``less`` is an index into the parameters."""
-
-    name: str
-    power: float
-    less: int | None
-    unit: str
-    range: tuple[float, float]
-    typical: tuple[float, float]
-    meaning: str
-    role: str | None
-
-
-class FormulaKey(NamedTuple):
-    """A formula as passed to the core."""
-
-    name: str
-    term: str
-    revealed_by: str
-    parameters: tuple[ParameterKey, ...]
 
 
 class Described(Protocol):
@@ -45,10 +23,6 @@ class Described(Protocol):
     @property
     def name(self) -> str:
         """Name of the formula."""
-
-    @property
-    def key(self) -> FormulaKey:
-        """The formula as passed to the core."""
 
     @property
     def definition(self) -> EffectDefinition:
@@ -340,11 +314,7 @@ class Effect:
 def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise InputError(f"{what} must be a mapping of {', '.join(names)}, got {short_repr(value)}")
-    unknown = [name for name in value if name not in names]
-    if unknown:
-        raise InputError(
-            f"{what}: {short_repr(unknown[0])} is not known: it must be one of {', '.join(names)}"
-        )
+    check_keys(f"{what}: ", value, names)
     return value
 
 

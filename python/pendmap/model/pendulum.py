@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
-from pendmap.model.covariance import misses_attribute
+from pendmap.model.covariance import misses
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS, unit_of
@@ -208,7 +208,8 @@ def attributes_of(
     ]
     angle = {"angle": "line"} if pendulum.counts_turns else {}
     found = {"units": model.units.name} | numbers | bare | {"effects": json.dumps(effects)} | angle
-    return found | misses_attribute(model.notes)
+    ratio = misses(model.notes)
+    return found | ({"misses_record": ratio} if math.isfinite(ratio) else {})
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any
 
-from pendmap.errors import InputError, check_number, check_type
+from pendmap.errors import InputError, check_keys, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.effects import library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
@@ -147,9 +147,7 @@ class Rig:
         >>> round(rig.w0, 4), round(rig.p, 4), round(rig.pendulum.gamma, 4)
         (6.2642, 0.2906, 0.02)
         """
-        unknown = [name for name in given if name not in SI_KEYS]
-        if unknown:
-            raise InputError(f"{unknown[0]} is not known: it must be one of {', '.join(SI_KEYS)}")
+        check_keys("", given, SI_KEYS)
         return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
 
     @classmethod
