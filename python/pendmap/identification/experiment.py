@@ -23,7 +23,7 @@ from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
-from pendmap.identification.table1 import table_of, table_of_run
+from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import Experiment
@@ -100,7 +100,8 @@ def identify_experiment(
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
         found = identify_peaks(peaks, names)
-        return IdentificationReport(experiment, run, peaks, found, None, table_of(peaks, found))
+        table = table_of_run(run, peaks, found)
+        return IdentificationReport(experiment, run, peaks, found, None, table)
     others = [name for name in names if name != BEST]
     steps, before = len(names) + 2, len(names) - len(others) + 1
     report = progress or (lambda _done, _total: None)

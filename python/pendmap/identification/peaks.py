@@ -192,25 +192,13 @@ def find_peaks(
         t, x = t[drawn.places], x[drawn.places]
     finder, noise = _finder(t, x, sigma)
     if finder is None:
-        none = np.empty(0)
-        return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
+        return dataclasses.replace(Peaks.of((), ()), sigma=noise)
     ends = finder.ends
     index = _numbered(ends, finder.w0)
-    crossings = finder.crossings(index)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
-    instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
-    found = Peaks(
-        instant,
-        amplitude,
-        stderr_time,
-        stderr_amplitude,
-        index=index,
-        kind=tuple(e.kind for e in ends),
-        crossing_time=crossings[0],
-        crossing_stderr=crossings[1],
-        crossing_index=crossings[2].astype(np.int64),
-        sigma=noise,
-    )
+    instant, angle, stderr_time, stderr_angle = columns.reshape(-1, 4).T.copy()
+    kind, crossings = tuple(e.kind for e in ends), finder.crossings(index)
+    found = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
     return found.later(first)
 
 

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from pendmap.formatting import Estimate
-
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable
 
     from pendmap.signal import Floats, Indices
 
@@ -55,23 +53,6 @@ def bootstrap(
     scattered = values + stderr * rng.standard_normal((draws, values.size))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.array([function(row) for row in scattered])
-
-
-def estimates(
-    names: Sequence[str],
-    values: Floats,
-    covariance: Floats,
-    *,
-    intervals: Mapping[str, tuple[float, float]] | None = None,
-) -> dict[str, Estimate]:
-    """Return estimates with standard errors, and normal 95 % intervals unless they are given."""
-    given = intervals or {}
-    result = {}
-    for j, name in enumerate(names):
-        value, error = float(values[j]), float(np.sqrt(max(covariance[j, j], 0.0)))
-        normal = (value - Z95 * error, value + Z95 * error)
-        result[name] = Estimate(value, error, given.get(name, normal))
-    return result
 
 
 def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:

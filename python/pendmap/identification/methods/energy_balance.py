@@ -13,13 +13,14 @@ import numpy as np
 
 from pendmap.identification.methods.base import (
     MISFIT,
+    NEEDS_SAMPLES,
     Identification,
-    needs_samples,
+    identified,
+    inapplicable,
     too_few,
-    unphysical,
 )
 from pendmap.identification.period import frequency, viscous_work
-from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
+from pendmap.identification.uncertainty import chain_covariance, chain_least_squares
 from pendmap.signal.local_polynomial import smoothed_velocity
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
     an undamped pendulum. Generalized least squares account for peaks shared by half cycles.
     """
     if record is None:
-        return needs_samples()
+        return inapplicable(NEEDS_SAMPLES)
     turned = peaks.turned
     if len(turned) < _FEWEST:
         return too_few(len(turned), _FEWEST)
@@ -54,8 +55,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
     if len(small) < _FEWEST:
         return too_few(len(small), _FEWEST, len(turned), f"under {_LARGEST:g} rad")
     if pairs.size < _FEWEST - 1:
-        text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
-        return Identification(warnings=(text,), applicable=False)
+        return inapplicable(f"{pairs.size} whole half cycles, {_FEWEST - 1} are needed")
     w0 = frequency(small).w0
     work = _measured_work(record, turned, pairs, w0)
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
@@ -72,7 +72,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
     full[1:, 1:] = covariance
     lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
     full += np.outer(lever, lever) * period.stderr**2
-    warnings = unphysical(dict(zip(names, found, strict=True)))
+    warnings = []
     period_samples = 2 * math.pi / w0 / float(np.median(np.diff(record[0])))
     if period_samples < _SAMPLES:
         warnings.append(
@@ -84,14 +84,15 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "
             "are widened by it"
         )
-    return Identification(
-        estimates=estimates(names, found, full),
+    return identified(
+        names,
+        found,
+        full,
         used=(
             f"{pairs.size} half cycles between peaks {turned.index[0]} and {turned.index[-1]}; w0 "
             f"from the {len(small)} peaks under {math.degrees(_LARGEST):.3g} degrees"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, full),
+        warnings=warnings,
         misfit=misfit,
     )
 

@@ -18,7 +18,7 @@ from pendmap.identification.methods import (
     repaired,
     trajectory,
 )
-from pendmap.identification.methods.base import Identification, needs_samples
+from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
 from pendmap.identification.peaks import find_peaks, samples
 from pendmap.signal.robust import from_first, normal_scale
 
@@ -132,7 +132,7 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
         )
     found = {}
     for name in check_names(methods):
-        one = needs_samples() if name == BEST else _OF_PEAKS[name](peaks, None)
+        one = inapplicable(NEEDS_SAMPLES) if name == BEST else _OF_PEAKS[name](peaks, None)
         found[name] = one = dataclasses.replace(one, method=name)
         # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
         if not peaks.known and not any(each.stderr for each in one.estimates.values()):
