@@ -194,22 +194,18 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     if best.covariance is not None:
         names, matrix = best.covariance
         # Bias and tilt of a sensor do not belong to the pendulum.
-        kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
-        names = tuple(names[k] for k in kept)
-        matrix = np.asarray(matrix)[np.ix_(kept, kept)]
-        own = {"offset": f"{OFFSET}.d"}
+        own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+        if "offset" in own:
+            own["offset"] = f"{OFFSET}.d"
+        kept = [names.index(name) for name in own]
+        bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
         notes["covariance"] = {
-            "names": [own.get(name, name) for name in names],
-            "matrix": np.asarray(matrix).tolist(),
-            "ci95": {
-                own.get(name, name): list(e.ci95)
-                for name, e in best.estimates.items()
-                if e.ci95 is not None and name in names
-            },
+            "names": [*own.values()],
+            "matrix": matrix[np.ix_(kept, kept)].tolist(),
+            "ci95": {own[name]: list(ci95) for name, ci95 in bounds.items() if ci95 is not None},
         }
     sha256 = report.experiment.sha256
-    runs = report.joint.runs if report.joint is not None else (report.run,)
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise
