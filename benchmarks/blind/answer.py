@@ -41,7 +41,7 @@ TRIES, GREATEST = 4, 20.0
 
 def family(effect: str) -> str:
     """Return the family of an effect."""
-    return str(library()[effect]["family"])
+    return library()[effect].family
 
 
 def families(effect: str) -> set[str]:

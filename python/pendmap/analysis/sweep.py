@@ -164,8 +164,8 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     else:
         bare, unit = name, ""
         which, parameter = name.split(".", 1)
-        entries = effects[which].definition["parameters"]
-        if units.si and any(entry["power_of_w0_less"] == parameter for entry in entries):
+        entries = effects[which].definition.parameters
+        if units.si and any(entry.power_of_w0_less == parameter for entry in entries):
             raise InputError(
                 f"{name} changes the units of others: the model must be one without dimensions"
             )
@@ -174,7 +174,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         bared = [dataclasses.replace(one, parameters=own).bare(units) for own in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
-            unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
+            unit = effects[which].definition[parameter].unit
     if known.count(bare) > 1:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
     return Varied(name, values, bare, plain, unit)

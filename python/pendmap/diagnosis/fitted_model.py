@@ -13,7 +13,6 @@ from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.valley import refine_exponent
-from pendmap.model.effects import opposes
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.model.effects import EffectParameter
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
@@ -264,24 +264,24 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
     if size is None:
         return True
     error = ERRORS * math.sqrt(fitted.level) * (size.stderr or 0.0)
-    if opposes(candidate.definition) and size.value < -error:
+    if candidate.definition.opposes and size.value < -error:
         return False
     end = max(run.lab_time_s + float(run.time[-1]) for run in data.fitted)
     span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
-    entries = {e["name"]: e for e in candidate.definition["parameters"]}
+    entries = {entry.name: entry for entry in candidate.definition.parameters}
     w0 = fitted.fit.model.w0
     for name in candidate.shape:
         estimate, entry = estimates.get(f"{candidate.name}.{name}"), entries[name]
         if estimate is None:
             continue
         low, high = -math.inf, math.inf
-        if entry["role"] == "time constant":
+        if entry.role == "time constant":
             low, high = math.tau / w0, span
-        elif entry["role"] == "instant":
+        elif entry.role == "instant":
             low, high = end - span, end
-        elif entry["role"] == "width":
-            low, high = entry["typical"]
-            unit = w0 ** entry["power_of_w0"]
+        elif entry.role == "width":
+            low, high = entry.typical
+            unit = w0**entry.power_of_w0
             low, high = low / STRETCH * unit, high * STRETCH * unit
         if not low <= estimate.value <= high:
             return False
@@ -289,14 +289,14 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
 
 
 def _drains(
-    fitted: FittedModel, candidate: Candidate, entry: dict[str, Any], error: float, end: float
+    fitted: FittedModel, candidate: Candidate, entry: EffectParameter, error: float, end: float
 ) -> bool:
     """Return whether damping or friction stays positive with a drift or an asymmetry of it."""
-    if candidate.definition["group"] != "damping" or entry["typical"][0] >= 0:
+    if candidate.definition.group != "damping" or entry.typical[0] >= 0:
         return True
-    drifts = candidate.definition["mappable"] == "frozen"
+    drifts = candidate.definition.mappable == "frozen"
     # The unit of a rate has one more power of w0 than that of the drifting coefficient.
-    power = entry["power_of_w0"] - drifts
+    power = entry.power_of_w0 - drifts
     base = "Tr" if power == 2 else "c_over_m"  # noqa: PLR2004 (a torque)
     size, known = fitted.fit[candidate.free[0]], fitted.fit.estimates.get(base)
     limit = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pendmap.comparison.further import Reasons, compute_part
 from pendmap.diagnosis.refit import find_equivalents, profile_intervals
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import ScoredModel, State
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
+    from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
 
 
@@ -39,7 +40,7 @@ class NamedEffect:
     elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
-    def definition(self) -> dict[str, Any]:
+    def definition(self) -> EffectDefinition:
         """Entry in the library, or of the user's formula."""
         return self.effect.definition
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
+    from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
     from pendmap.residuals.torque import Torque
 
@@ -83,9 +84,9 @@ class Discrepancy(Readable):
     # Reasons for parts that were not computed, by field of the JSON; see ``not_computed``.
     reasons: Reasons = dataclasses.field(default_factory=dict)
 
-    def definition(self, name: str) -> dict[str, Any]:
+    def definition(self, name: str) -> EffectDefinition:
         """Return the entry of a candidate in the library, or of the user's formula."""
-        return next((f.entry for f in self.own if f.name == name), None) or definition(name)
+        return next((f.definition for f in self.own if f.name == name), None) or definition(name)
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects)
@@ -263,7 +264,7 @@ def given_out(found: ScoredModel) -> dict[str, float]:
 def confined(found: Discrepancy) -> Iterator[str]:
     """Yield a line for each effect of the model that no map over initial conditions can include."""
     for effect in found.best.fitted.fit.model.effects:
-        if effect.definition["mappable"] == "no":
+        if effect.definition.mappable == "no":
             yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
 
 

@@ -96,7 +96,7 @@ def _terms(found: Discrepancy) -> Iterator[str]:
     terms, others = [], []
     meant = ["v = theta'", "a the pivot's acceleration over gravity"]
     for effect in found.effects:
-        formula, group = str(effect.definition["formula"]), effect.definition["group"]
+        formula, group = effect.definition.formula, effect.definition.group
         if group in {"drive", "reading"}:
             others.append(f"In the {'drive' if group == 'drive' else 'sensor'}: {code(formula)}.")
             continue

@@ -125,11 +125,11 @@ def drawn(model: Pendulum | Rig, count: object, seed: int) -> Draws:
     middle = np.array([there[name] for name in known.names], dtype=float)
     root = known.root
     sizes = {
-        f"{effect.name}.{entry['name']}"
+        f"{effect.name}.{entry.name}"
         for effect in model.effects
         if effect.brakes
-        for entry in effect.definition["parameters"]
-        if entry["role"] == "size"
+        for entry in effect.definition.parameters
+        if entry.role == "size"
     }
     signs = np.where([name in sizes for name in known.names], np.sign(middle), 0.0)
     source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))

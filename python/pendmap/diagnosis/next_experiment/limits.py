@@ -81,9 +81,8 @@ def detection_limits(
         wanted = required_gain(threshold, len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
-        most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
-        largest = candidate.effect(found.fit.model.units, most).parameters[candidate.size]
-        if size > UNDETECTABLE * abs(largest):
+        most = max(map(abs, candidate.definition.parameters[0].typical))
+        if size > UNDETECTABLE * abs(candidate.effect(units, most).parameters[candidate.size]):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
@@ -172,7 +171,7 @@ def _revealed(assessment: Assessment, name: str) -> str:
         for s in assessment.identified
         for c in (s.candidate, *(r.candidate for r in s.alternatives))
     )
-    return str(next(c for c in every if c.name == name).definition["revealed_by"])
+    return next(c for c in every if c.name == name).definition.revealed_by
 
 
 def _recommendation(outlook: Outlook, best: Prospect) -> str:
