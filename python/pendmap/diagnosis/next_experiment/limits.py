@@ -82,7 +82,9 @@ def detection_limits(
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         most = max(map(abs, candidate.definition.parameters[0].typical))
-        if size > UNDETECTABLE * abs(candidate.effect(units, most).parameters[candidate.size]):
+        if size > UNDETECTABLE * abs(
+            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+        ):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
