@@ -17,7 +17,7 @@ from pendmap.formatting import counted, moment
 from pendmap.records.clock import slips_of
 from pendmap.records.noise import DEGREES
 from pendmap.signal.local_polynomial import POINTS, local_fit
-from pendmap.signal.robust import broad_scale, normal_scale
+from pendmap.signal.robust import broad_scale, normal_scale, widened
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,8 +65,7 @@ def find(work: Work) -> None:
     _bridge(work.time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[_Jump]()
     # The motion has corners next to clipped or frozen samples.
-    # (mode="same" would return the length of the window for a shorter record.)
-    corner = np.convolve(bad, np.ones(2 * SIDE + 1))[SIDE : SIDE + bad.size] > 0.5
+    corner = widened(bad, SIDE)
     seen = corner.copy()
     for _ in range(PASSES):
         at, scale = _suspects(work, theta)

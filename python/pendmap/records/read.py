@@ -44,21 +44,8 @@ MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
     """Return the files from which an experiment is read, without reading any record.
 
-    Parameters
-    ----------
-    path : str or path
-        File or folder, as in :func:`read_experiment`.
-
-    Returns
-    -------
-    list of Path
-        The file; or ``experiment.toml`` and the files that it names, which need not exist; or, in a
-        folder without one, all files that may be records.
-
-    Raises
-    ------
-    InputError
-        If the ``experiment.toml`` is not valid.
+    They are the file; ``experiment.toml`` and the files that it names, which need not exist; or all
+    files of a plain folder that may be records. Raises InputError for an invalid description.
     """
     place = Path(path)
     if not place.is_dir():

@@ -14,11 +14,11 @@ import numpy as np
 
 from pendmap.formatting import counted
 from pendmap.records import outliers
+from pendmap.records.from_acceleration import swinging
 from pendmap.records.noise import DITHERED, FARTHEST, fastest, noise_of
 from pendmap.records.outliers import find_spikes
 from pendmap.records.resolution import step_of
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.swinging import swinging
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import equal_runs, normal_scale
 
