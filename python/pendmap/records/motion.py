@@ -207,12 +207,7 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
 
 def check_zero(work: Work) -> None:
     """Report a rest angle, or middle of the swings, of a free run that is not 0."""
-    if (
-        work.plan.kind != "free"
-        or not work.releases
-        or work.angle_source is not None
-        or work.integrated
-    ):
+    if not work.releases or work.angle_source is not None or work.integrated:
         return  # an angle from a sensor on the rod has its zero at the middle
     last = work.segments[-1]
     if last.what == "rest":
