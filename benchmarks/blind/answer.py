@@ -117,7 +117,7 @@ def answer(found: Discrepancy) -> dict[str, Any]:
         "held": held.chi2 / held.degrees,
         "closed": assessment.closed,
         "ratio": [assessment.ratio, assessment.ratio_allowed],
-        "left": [assessment.left, assessment.uneven, assessment.chance],
+        "left": [assessment.left, assessment.uneven, assessment.form.chances["torque"]],
         "form": [assessment.form.chance, dict(assessment.form.chances), assessment.form.further],
         "standings": [
             {

@@ -86,11 +86,12 @@ def varied(
     found = tuple(_one(model, name, given) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
-        for value in (float(axis.bare[0]), float(axis.bare[-1])):
+        for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
             try:
-                with_values(pendulum, {axis.parameter: value})
+                with_values(pendulum, {axis.parameter: float(bare)})
             except InputError as error:
-                raise InputError(f"{axis.name} = {value:g}: {error}") from None
+                units = "" if value == bare else f" (without dimensions, w0 is {model.units.w0:g})"
+                raise InputError(f"{axis.name} = {value:g}: {error}{units}") from None
     if len({one.parameter for one in found}) < len(found):
         raise InputError(
             f"{found[0].name} and {found[1].name} must be two parameters, they are one"

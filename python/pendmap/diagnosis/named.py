@@ -7,8 +7,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.comparison.further import Reasons, compute_part
-from pendmap.diagnosis.refit import Z95, find_equivalents, profile_intervals
+from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
+from pendmap.identification.uncertainty import Z95
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted
@@ -32,6 +33,7 @@ class NamedEffect:
     # alternatives, times the probability that one of them is right.
     probability: float
     approximate: bool  # Whether its form may be right only approximately
+    closes: float  # Share of the squared gap above the noise that it closes with the others
     formula: Formula | None = None  # Of the user's own effect
     # Mirrored place, or another frequency or instant, of an equally good fit.
     elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
@@ -90,6 +92,7 @@ def name_effects(
                 ci95,
                 each.share * sure,
                 assessment.approximate or bool(doubted(data.experiment, *data.runs)),
+                each.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),
             )
