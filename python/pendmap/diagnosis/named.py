@@ -92,7 +92,7 @@ def name_effects(
                 parameters,
                 ci95,
                 each.share * sure,
-                assessment.approximate or doubted(data.experiment, *data.runs),
+                assessment.approximate or bool(doubted(data.experiment, *data.runs)),
                 each.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),
