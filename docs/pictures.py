@@ -27,7 +27,7 @@ from pendmap.diagnosis import diagnose
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
 from pendmap.render import style
-from pendmap.render.written import save
+from pendmap.render.drawing import save
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)

@@ -41,7 +41,7 @@ TRIES, GREATEST = 4, 20.0
 
 def family(effect: str) -> str:
     """Return the family of an effect."""
-    return str(library()[effect]["family"])
+    return library()[effect].family
 
 
 def families(effect: str) -> set[str]:
@@ -117,7 +117,7 @@ def answer(found: Discrepancy) -> dict[str, Any]:
         "held": held.chi2 / held.degrees,
         "closed": assessment.closed,
         "ratio": [assessment.ratio, assessment.ratio_allowed],
-        "left": [assessment.left, assessment.uneven, assessment.chance],
+        "left": [assessment.left, assessment.uneven, assessment.form.chances["torque"]],
         "form": [assessment.form.chance, dict(assessment.form.chances), assessment.form.further],
         "standings": [
             {

@@ -39,7 +39,7 @@ COUNTS = (1024, 2048, 4096, 8192)
 BASE = ("viscous_damping", "coulomb_friction")
 """Effects of the baseline, which are not hidden."""
 
-AGEING = {name for name, e in library().items() if "time in the laboratory" in e["formula"]}
+AGEING = {name for name, e in library().items() if "time in the laboratory" in e.formula}
 """Effects that change between runs."""
 
 FOREIGN = {"added_mass:late", "impulses:train"}
@@ -118,7 +118,7 @@ def _effects(what: str, kind: str, rng: np.random.Generator) -> tuple[str, ...]:
     if free == 1:
         usable = [n for n in usable if n not in AGEING]
     if forced == 0:
-        usable = [n for n in usable if library()[n]["group"] != "drive" and not known[n]["needs"]]
+        usable = [n for n in usable if library()[n].group != "drive" and not known[n]["needs"]]
     if what == "one" or (what == "nuisance" and rng.random() < 0.5):  # noqa: PLR2004
         return (str(rng.choice(usable)),)
     if what in {"mess", "layout"} and rng.random() < MAIN:

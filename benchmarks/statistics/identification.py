@@ -22,7 +22,7 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, identify
+from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
 from pendmap.identification.methods import combined, de_paula, log_decrement
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
@@ -146,7 +146,7 @@ def scan(path: Motion, seed: int) -> None:
     """Print the choices that give each column of table 1."""
     times, angles = record(path, seed, OFFSET)
     peaks = find_peaks(times, angles)
-    start = State(0.0, float(peaks.amplitude[0]), 0.0)
+    start = State(0.0, float(peaks.amplitude[0]))
     whole = mean_period(peaks.turned.time)
     rows = [(f"THE PAPER: {name}", "", *(f"{x:.2f}" for x in PAPER[name])) for name in PAPER]
     columns: dict[str, dict[str, tuple[float, ...]]] = {}
@@ -227,7 +227,7 @@ def against_truth(path: Motion, count: int) -> None:
     for seed in range(count):
         note(f"record {seed + 1} of {count}")
         times, angles = record(path, seed, OFFSET)
-        start = State(0.0, float(find_peaks(times, angles).amplitude[0]), 0.0)
+        start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
         begin = time.perf_counter()
         everything = identify(times, angles)
         seconds.append(time.perf_counter() - begin)
@@ -277,8 +277,8 @@ def spoilers(path: Motion, count: int) -> None:
             made = []
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
-                start = State(0.0, float(find_peaks(times, angles).amplitude[0]), 0.0)
-                found = METHODS[name].identify(times, angles)
+                start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
+                found = identify(times, angles, methods=[name])[name]
                 if found.applicable:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")

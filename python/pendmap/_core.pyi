@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pendmap.model import Pendulum
-from pendmap.model.effects import FormulaKey
+from pendmap.model.formula import FormulaKey
 
 __all__ = [
     "Attractor",

@@ -9,7 +9,7 @@ import operator
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
 MOST: Final = 500  # Largest length of a message, characters
 
@@ -112,6 +112,19 @@ def check_whole(name: str, value: object, least: int, most: int) -> int:
     if not least <= result <= most:
         raise InputError(f"{wanted}, got {short_repr(result)}")
     return result
+
+
+def shown_key(key: object) -> str:
+    """Return a key as it is written in messages."""
+    return key if isinstance(key, str) and key.isidentifier() else short_repr(key)
+
+
+def check_keys(where: str, given: Iterable[object], known: Collection[str]) -> None:
+    """Raise InputError if a key is not among the known ones; ``where`` begins the message."""
+    for key in given:
+        if key not in known:
+            names = ", ".join(known)
+            raise InputError(f"{where}{shown_key(key)} is not known: it must be one of {names}")
 
 
 def check_flag(name: str, value: object) -> bool:

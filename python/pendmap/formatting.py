@@ -22,7 +22,14 @@ ERROR_DIGITS: Final = 2  # Significant digits of a standard error
 
 MOST_PLACES: Final = 15  # Largest number of decimal places of an estimate
 
+MINUS: Final = "\N{MINUS SIGN}"  # Minus sign of figures
+
 LONG_AGO: Final = 1e3  # Time from which six digits are coarser than 1 ms, s
+
+
+def typographic(text: str) -> str:
+    """Return a text of a figure, with minus signs for hyphens and a plus-minus sign for ``+-``."""
+    return text.replace("+-", "\N{PLUS-MINUS SIGN}").replace("-", MINUS)
 
 
 def counted(count: int, noun: str, several: str = "") -> str:
@@ -58,11 +65,11 @@ def written(value: float, width: float) -> str:
     return text if float(text) else text.removeprefix("-")  # no minus zero
 
 
-def with_error(value: float, error: float, sign: str = "+-") -> str:
+def with_error(value: float, error: float) -> str:
     """Return ``0.2736 +- 0.0013``; the number to five digits if its error is 0 or unknown."""
     if not (math.isfinite(error) and error > 0):
         return written(value, 0.0)
-    return f"{written(value, error)} {sign} {written(error, error)}"
+    return f"{written(value, error)} +- {written(error, error)}"
 
 
 class Readable(abc.ABC):
@@ -115,11 +122,8 @@ def interval(estimate: Estimate) -> str:
     return f"[{low:.{places}f}, {high:.{places}f}]"
 
 
-def estimate_text(estimate: Estimate, *, minus: str = "-") -> str:
-    """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012.
-
-    Figures pass a typographic ``minus``.
-    """
+def estimate_text(estimate: Estimate) -> str:
+    """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012."""
     value, error = estimate.value, estimate.stderr
     text = f"{value:.{DIGITS}g}"
     if error is not None and math.isfinite(error) and error > 0:
@@ -128,7 +132,7 @@ def estimate_text(estimate: Estimate, *, minus: str = "-") -> str:
             text = f"{value:.{places}f}({round(error * 10**places)})"
         else:
             text += f" +- {error:.{ERROR_DIGITS}g}"
-    return text.replace("-", minus)
+    return text
 
 
 def _places(error: float) -> int:

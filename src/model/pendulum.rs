@@ -220,7 +220,7 @@ impl Pendulum {
     /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.
     #[must_use]
     pub fn period(&self) -> f64 {
-        if self.is_autonomous() { TAU } else { TAU / self.motion().omega }
+        self.equation().drive_period()
     }
 
     /// Whether the equation does not depend on time.

@@ -58,7 +58,7 @@ impl Load for Equation<f64> {
         (!self.ages).then(|| self.time_scale())
     }
     fn time_scale(&self) -> f64 {
-        if self.is_autonomous() { TAU } else { TAU / self.motion.omega }
+        self.drive_period()
     }
 }
 

@@ -189,7 +189,7 @@ def chart(dataset, *, layer=None, cells=0):
     """Return the curve of the period."""
     line = Line(dataset["amplitude"].values, dataset["period"].values, path="period")
     panel = Panel("swing", "", Axis("amplitude (rad)"), Axis("period"), [line])
-    return Chart("Period of free swings", dataset.attrs["title"], [panel]).only(layer)
+    return Chart("Period of free swings", dataset.attrs["title"], [[panel]]).only(layer)
 '''
 TABLE = 'ANALYSES = {\n    "swing": ("swing", ["swing"], "Compute the period of free swings."),'
 TEST = """

@@ -90,11 +90,12 @@ def varied(
     found = tuple(_one(model, name, given) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
-        for value in (float(axis.bare[0]), float(axis.bare[-1])):
+        for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
             try:
-                with_values(pendulum, {axis.parameter: value})
+                with_values(pendulum, {axis.parameter: float(bare)})
             except InputError as error:
-                raise InputError(f"{axis.name} = {value:g}: {error}") from None
+                units = "" if value == bare else f" (without dimensions, w0 is {model.units.w0:g})"
+                raise InputError(f"{axis.name} = {value:g}: {error}{units}") from None
     if len({one.parameter for one in found}) < len(found):
         raise InputError(
             f"{found[0].name} and {found[1].name} must be two parameters, they are one"
@@ -164,8 +165,8 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     else:
         bare, unit = name, ""
         which, parameter = name.split(".", 1)
-        entries = effects[which].definition["parameters"]
-        if units.si and any(entry["power_of_w0_less"] == parameter for entry in entries):
+        entries = effects[which].definition.parameters
+        if units.si and any(entry.power_of_w0_less == parameter for entry in entries):
             raise InputError(
                 f"{name} changes the units of others: the model must be one without dimensions"
             )
@@ -174,7 +175,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         bared = [dataclasses.replace(one, parameters=mine).bare(units) for mine in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
-            unit = next(entry["unit"] for entry in entries if entry["name"] == parameter)
+            unit = effects[which].definition[parameter].unit
     if known.count(bare) > 1:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
     return Varied(name, values, bare, plain, unit)

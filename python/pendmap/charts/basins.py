@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -12,9 +11,9 @@ import numpy as np
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
 from pendmap.charts.chart import Chart, Panel
-from pendmap.charts.marks import ALARM, INK, QUIET, Colours, Image, Mark, Points
+from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
-from pendmap.formatting import counted, with_error
+from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -66,6 +65,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         marks = _layer(dataset, one, cells, (theta, velocity))
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
+        if one == shown[0]:
+            marks += _names(dataset, listed, shown)
         title = what(dataset, one)
         if shown == ("labels",) and not reliable(dataset):
             title = f"{title}; {warning(dataset)}"
@@ -74,15 +75,13 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         panels.append(Panel(one, title, *sides, marks, share=share, note=alarm if small else ()))
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
-    panels[0] = _with_names(dataset, panels[0], listed, shown)
     low, high = (units.bare(bound, VELOCITY) for bound in velocity)
     ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
     rows, columns = dataset["label"].shape
     return Chart(
         _title(dataset, shown),
-        f"{names.parameters(dataset.attrs)};   {columns} \N{MULTIPLICATION SIGN} {rows} cells",
-        panels,
-        rows=[[panel.name] for panel in panels] if ratio < FLAT else (),
+        f"{names.parameters(dataset.attrs)};   {columns} × {rows} cells",
+        [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )
 
@@ -103,11 +102,8 @@ def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
     return "Fractal basins of attraction" if fractal else "Basins of attraction"
 
 
-def _with_names(
-    dataset: xr.Dataset, panel: Panel, listed: list[legend.Entry], shown: tuple[str, ...]
-) -> Panel:
-    """Return a panel with the legend: each basin's colour with the attractor's marker."""
-    none = np.empty(0)
+def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ...]) -> list[Mark]:
+    """Return the legend: each basin's colour with the attractor's marker."""
     named: list[Mark] = []
     for entry in listed:
         text = entry.text
@@ -115,11 +111,11 @@ def _with_names(
             text = f"{legend.typeset(entry.name)}, {entry.share} of the starts"
         elif entry.chaotic and "labels" in shown and len(entry.points):
             text = f"{entry.text} (dots: its points)"
-        look: dict[str, Any] = {"colour": entry.colour, "name": text}
-        named.append(Points(none, none, marker="s", size=9.0, edge=QUIET, edge_width=0.5, **look))
+        look: dict[str, Any] = {"colour": entry.colour, "name": text, "edge": QUIET}
+        named.append(Points(NONE, NONE, marker="s", size=9.0, edge_width=0.5, **look))
         if entry.id >= 1 and not entry.chaotic:
             named.append(_marker(entry, np.empty((0, 2)), text, 5.0))
-    return dataclasses.replace(panel, marks=[*panel.marks, *named])
+    return named
 
 
 def _marker(
@@ -128,18 +124,9 @@ def _marker(
     turn = palette.direction(entry.name, entry.kind)
     shapes = "^>" if turn > 0 else "v<" if turn < 0 else _SHAPES.get(entry.kind, "o")
     shape = shapes[palette.lap(entry.name, entry.kind) % len(shapes)]
-    return Points(
-        *at.T,
-        marker=shape,
-        size=size,
-        colour=entry.colour,
-        edge="#ffffff",
-        edge_width=0.17 * size,
-        halo=INK,
-        clip=False,
-        order=5.0,
-        name=name,
-    )
+    look: dict[str, Any] = {"marker": shape, "size": size, "colour": entry.colour, "name": name}
+    look |= {"edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
+    return Points(*at.T, clip=False, order=5.0, **look)
 
 
 def _layer(
@@ -171,12 +158,12 @@ def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -
     name, colours = unit(dataset, layer), _COLOUR_MAPS[layer]
     if values.size == 0 or layer == "probability":
         return Colours(name, colours, 0.0, 1.0)
+    least, most = float(values.min()), float(values.max())
     if layer == "entropy":
-        return Colours(name, colours, 0.0, max(float(values.max()), 1e-3))
+        return Colours(name, colours, 0.0, max(most, 1e-3))
     if layer == "settle":
-        low, high = float(values.min()), float(values.max())
-        high = max(high, low + 1.0)
-        return Colours(name, colours, low, high, "log", ticks=plane.log_ticks(low, high))
+        high = max(most, least + 1.0)
+        return Colours(name, colours, least, high, "log", ticks=plane.log_ticks(least, high))
     if layer == "turns":
         size = np.abs(values)
         top = max(1.0, float(np.ceil(np.quantile(size, 0.98))))
@@ -188,8 +175,7 @@ def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -
     low, high = (float(q) for q in np.quantile(values, [0.005, 0.995]))
     if high <= low:
         low, high = low - 0.5, high + 0.5
-    ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
-    beyond: Any = ends.get((bool(values.min() < low), bool(values.max() > high)), "neither")
+    beyond: Any = (("neither", "max"), ("min", "both"))[least < low][most > high]
     return Colours(name, colours, low, high, beyond=beyond)
 
 
@@ -253,34 +239,24 @@ def warning(dataset: xr.Dataset) -> str:
 
 def transients(dataset: xr.Dataset) -> str:
     """Return mean and longest settle time and the basin entropy in one line, if known."""
-    attrs = dataset.attrs
-    known = [
-        (
-            f"mean {float(attrs[key]):.3g}"
-            if key == "mean_settle"
-            else f"longest {float(attrs[key]):g}"
-        )
-        for key in ("mean_settle", "longest_settle")
-        if float(attrs.get(key, -1.0)) >= 0
-    ]
-    settle = [f"settle time: {', '.join(known)} periods"] if known else []
-    entropy = float(attrs.get("basin_entropy", math.nan))
-    return "; ".join(
-        [*settle, *([f"basin entropy {entropy:.3g}"] if math.isfinite(entropy) else [])]
-    )
+    keys = ("mean_settle", "longest_settle", "basin_entropy")
+    mean, longest, entropy = (float(dataset.attrs.get(key, math.nan)) for key in keys)
+    settle = [f"mean {mean:.3g}"] if mean >= 0 else []
+    settle += [f"longest {longest:g}"] if longest >= 0 else []
+    told = [f"settle time: {', '.join(settle)} periods"] if settle else []
+    told += [f"basin entropy {entropy:.3g}"] if math.isfinite(entropy) else []
+    return "; ".join(told)
 
 
 def exponents(dataset: xr.Dataset) -> str:
     """Return the largest exponents of the chaotic attractors in one line; empty if unknown."""
     chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
     values = dataset["exponent"].values[chaotic]
-    without = np.full(values.shape, np.nan)
-    errors = dataset["exponent_stderr"].values[chaotic] if "exponent_stderr" in dataset else without
+    errors = dataset.get("exponent_stderr", dataset["exponent"] * math.nan).values[chaotic]
     known = [x for x in values if math.isfinite(x)]
+    listed = ", ".join(f"{x:.3g}" for x in known)
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
-        listed = with_error(known[0], errors[0], "\N{PLUS-MINUS SIGN}")
-    else:
-        listed = ", ".join(f"{x:.3g}" for x in known)
+        listed = typographic(with_error(known[0], errors[0]))
     return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
 
 
@@ -338,9 +314,9 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
     """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
     driven = float(dataset.attrs.get("p", 1.0)) != 0.0
     units = Units.of(dataset.attrs)
-    own = units.own_period.replace(" pi", "\N{GREEK SMALL LETTER PI}").replace(" ", "")
+    own = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
     return {
-        "settle": "periods to settle" if driven else f"periods of {own} to settle",
+        "settle": f"periods{own} to settle",
         "turns": "net turns",
         "exponent": f"exponent {names.per_time(units)}",
         "probability": "probability",

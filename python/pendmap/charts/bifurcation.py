@@ -23,6 +23,7 @@ MOST: Final = 16  # Greatest number of families that a legend names; all others 
 _LAYERS: Final = ("theta", "velocity")
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
+_STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
 _SWEEPS: Final = (("up", 0.025), ("down", 0.055))
 """Sweeps, and their height above the angles in a recording, over the range of the angles."""
 
@@ -58,8 +59,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
     known = dataset["entry_exponent"].values
     growth = plane.padded(np.append(known[np.isfinite(known)], 0.0))
-    across, bare = Axis(name, ends), Axis("", ends, ticks=())
-    rate = Axis(f"exponent {names.per_time(units)}", growth)
+    bare, rate = Axis("", ends, ticks=()), Axis(f"exponent {names.per_time(units)}", growth)
     exponents: list[Mark] = [Level(0.0, colour=QUIET)]
     exponents += [
         _dots(one, one.exponents, 1.6, f"{k}/points") for k, one in reversed([*enumerate(every)])
@@ -69,15 +69,15 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
         Panel("velocity", "", bare, speed, _points(dataset, every, "velocity")),
         Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends)),
-        Panel("exponent", "", across, rate, exponents),
+        Panel("exponent", "", Axis(name, ends), rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
     fixed = names.parameters(dataset.attrs, [own])
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",
-        panels,
-        rows=[[shown], ["sweeps"], ["exponent"]],
+        [[panels[_LAYERS.index(shown)]], [panels[2]], [panels[3]]],
+        recorded=panels,
         heights=_HEIGHTS,
         size=_SIZE,
         letters=False,
@@ -85,13 +85,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         remark="The two lines above the angles: on which attractor the sweep up (lower) and the"
         " sweep down (upper) are.",
     )
-
-
-_STRIP: Final = Axis(
-    "",
-    (-1.0, 1.0),
-    ticks=((0.5, "up \N{RIGHTWARDS ARROW}"), (-0.5, "\N{LEFTWARDS ARROW} down")),
-)
 
 
 def _dots(one: Family, at: npt.NDArray[np.float64], size: float, path: str) -> Points:
@@ -145,9 +138,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
     every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     which = which.reshape(-1)
     owner = dataset["point_entry"].values
-    points = np.stack(
-        [dataset[f"point_{key}"].values for key in ("value", "theta", "velocity")], axis=1
-    )
+    points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
     found: list[Family] = []
     rare = np.array(["chaos" not in str(dataset["kind"].values[word]) for word in every[:, 0]])
@@ -158,16 +149,8 @@ def families(dataset: xr.Dataset) -> list[Family]:
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
         shade = palette.colour(called) if len(found) < MOST else palette.UNNAMED
-        found.append(
-            Family(
-                called,
-                shade,
-                points[mine[owner]],
-                exponents,
-                sweeps["up"] == k,
-                sweeps["down"] == k,
-            )
-        )
+        on = (sweeps["up"] == k, sweeps["down"] == k)
+        found.append(Family(called, shade, points[mine[owner]], exponents, *on))
     return found
 
 

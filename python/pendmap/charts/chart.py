@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -69,18 +69,18 @@ class Panel:
 class Chart:
     """Panels with a title.
 
-    ``rows`` are the names of the panels in a figure, from the top, by default all in one row;
-    ``heights`` are the relative heights of the rows, ``ratio`` the height of a panel over its
-    width, and ``size`` the size of the figure in inches, if fixed. Rows of fewer panels than
-    ``columns`` are not filled. A recording shows all panels, as ``tabs`` or below one another;
+    ``rows`` are the rows of panels of a figure, from the top; ``heights`` are their relative
+    heights, ``ratio`` the height of a panel over its width, and ``size`` the size of the figure in
+    inches, if fixed. Rows of fewer panels than ``columns`` are not filled. A recording shows the
+    panels ``recorded``, by default those of the figure, as ``tabs`` or below one another;
     ``remark`` ends its legend.
     """
 
     title: str
     subtitle: str
-    panels: Sequence[Panel]
+    rows: Sequence[Sequence[Panel]]
     _: dataclasses.KW_ONLY
-    rows: Sequence[Sequence[str]] = ()
+    recorded: Sequence[Panel] = ()
     heights: Sequence[float] = ()
     ratio: float = 0.8
     size: Ends | None = None
@@ -90,39 +90,21 @@ class Chart:
     remark: str = ""
     notes: Sequence[str] = ()
 
-    @classmethod
-    def of(
-        cls,
-        title: str,
-        subtitle: str,
-        rows: Sequence[Sequence[Panel]],
-        **look: Any,  # noqa: ANN401 (fields of a chart)
-    ) -> Chart:
-        """Return a chart whose figure shows these rows of panels."""
-        names = [[panel.name for panel in row] for row in rows]
-        return cls(title, subtitle, [panel for row in rows for panel in row], rows=names, **look)
-
-    def panel(self, name: str) -> Panel:
-        """Return the panel with a name."""
-        return next(panel for panel in self.panels if panel.name == name)
-
     @property
-    def shown(self) -> list[list[Panel]]:
-        """Return the rows of panels of a figure."""
-        if not self.rows:
-            return [list(self.panels)]
-        return [[self.panel(name) for name in row] for row in self.rows]
+    def panels(self) -> list[Panel]:
+        """Return the panels of a figure, row by row."""
+        return [panel for row in self.rows for panel in row]
 
     def only(self, layer: str | None, size: Ends | None = None) -> Chart:
         """Return the chart with one of its panels alone; unchanged without a name."""
         if layer is None:
             return self
-        known = [panel.name for row in self.shown for panel in row]
+        known = {panel.name: panel for panel in self.panels}
         if layer not in known:
             if len(known) == 1:
                 raise InputError(f"no layer {layer!r}: this figure has one part")
             raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
-        return dataclasses.replace(self, rows=((layer,),), heights=(), size=size)
+        return dataclasses.replace(self, rows=[[known[layer]]], heights=(), size=size)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,8 +39,6 @@ ALONE: Final = 3.4
 OVERVIEW: Final = 1.95
 """Inches: width of the sheet; heights of a run's row, of a single one, of the panel of all runs.
 The sheet fits the proportions of a screen."""
-SPREAD: Final = 10.0
-"""Ratio of the greatest to the least residual above which their axis is logarithmic."""
 HELD: Final = "#d55e00"
 NAMED: Final = 40  # Greatest number of runs named below a panel
 DOTS: Final = 6_000  # Greatest number of readings of a decay drawn
@@ -89,15 +87,12 @@ def _overview(runs: Sequence[Compared]) -> Chart:
     marks: list[Mark] = [Level(1.0, colour=MEASURED, width=0.8, dash="--")]
     for which, colour in ((~held, look(MODEL).colour), (held, HELD)):
         marks.append(Points(places[which], ratios[which], colour=colour, size=5.0))
-    low, high = min(float(ratios.min()), 1.0), max(float(ratios.max()), 1.0)
-    up = Axis("rms / noise", (0.0, 1.15 * high))
-    if high > SPREAD * low:
-        up = Axis("rms / noise", (low / 1.5, high * 1.5), "log")
     every = -(-len(runs) // NAMED)
     ticks = [(float(k), runs[k].run.name) for k in range(0, len(runs), every)]
     across = Axis("", (-0.5, len(runs) - 0.5), ticks=ticks)
     title = "all runs: the residual over the noise" + ("; orange: held out" if held.any() else "")
-    return Chart("", "", [Panel("all", title, across, up, marks)], size=(WIDTH, OVERVIEW))
+    panel = Panel("all", title, across, names.sizes("rms / noise", ratios, 1.0), marks)
+    return Chart("", "", [[panel]], size=(WIDTH, OVERVIEW))
 
 
 def _row(one: Compared, high: float) -> Chart:
@@ -107,9 +102,10 @@ def _row(one: Compared, high: float) -> Chart:
         f"{_ratio(one):.3g} times the noise of {_small(one.sigma)}"
     )
     if isinstance(one, ForcedComparison):
-        heading += f", in {counted(one.windows, 'window')}"
-    panels = _forced(one) if isinstance(one, ForcedComparison) else _free(one)
-    return Chart(heading, "", panels, size=(WIDTH, high))
+        panels, heading = _forced(one), f"{heading}, in {counted(one.windows, 'window')}"
+    else:
+        panels = _free(one)
+    return Chart(heading, "", [panels], size=(WIDTH, high))
 
 
 def _small(angle: float) -> str:
@@ -131,64 +127,61 @@ def _free(one: RunComparison) -> list[Panel]:
 
 def _over_record(one: RunComparison) -> Panel:
     run, sensor = one.run, one.run.accelerometer
-    some = slice(None, None, max(1, run.time.size // DOTS))
-    factor = 1.0 if sensor is None else sensor.gain
-    readings = run.theta if sensor is None else factor * as_angles(run)
-    shown = np.where(run.trusted, readings, np.nan)
     # The model's reading; the sensor's own errors appear in the residual alone.
-    angle = readings - factor * one.residual
-    if sensor is None and run.rod_sensor is not None:
-        angle = one.curve[0]  # a gyroscope reads no angle
-    made, model = np.where(run.trusted, angle, np.nan), look(MODEL)
+    if sensor is not None:
+        readings = sensor.gain * as_angles(run)
+        angle = readings - sensor.gain * one.residual
+    else:
+        readings = run.theta
+        # A gyroscope reads no angle.
+        angle = readings - one.residual if run.rod_sensor is None else one.curve[0]
+    shown, made = (np.where(run.trusted, values, np.nan) for values in (readings, angle))
+    some = slice(None, None, max(1, run.time.size // DOTS))
     dots: dict[str, Any] = {"colour": MEASURED, "size": 1.5, "name": PAIR[0]}
+    line: dict[str, Any] = {"colour": look(MODEL).colour, "width": 0.7, "name": PAIR[1]}
     marks: list[Mark] = [
         Points(run.time[some], shown[some], **dots),
-        Line(run.time[some], made[some], colour=model.colour, width=0.7, name=PAIR[1]),
+        Line(run.time[some], made[some], **line),
     ]
     up = names.angle(holding(shown))
     if sensor is not None:
-        unit = sensor.unit.replace("s2", "s\u00b2")
-        up = Axis(f"acceleration ({unit})", holding(shown))
+        up = Axis(f"acceleration ({sensor.unit.replace('s2', 's²')})", holding(shown))
     return Panel("record", "record and model", names.seconds(run.time), up, marks)
 
 
 def _forced(one: ForcedComparison) -> list[Panel]:
     """Return the panels of a forced run: record, phase planes, statistics."""
-    panels = [history(one), phase(one)]
     if one.steady is None or one.steady.measured.at_rest:
-        panels.append(phase(one, model=True, title="a member of the ensemble"))
+        third = phase(one, member="a member of the ensemble")
     else:
-        panels.append(cycles(one, one.steady.measured.kind))
-    return [*panels, statistics(one)]
+        third = cycles(one, one.steady.measured.kind)
+    return [history(one, PAIR), phase(one), third, statistics(one)]
 
 
-def history(
-    one: ForcedComparison, pair: Pair = PAIR, *, model: bool = False, title: str = "record"
-) -> Panel:
+def history(one: ForcedComparison, pair: Pair = OF_PAPER, *, member: str = "") -> Panel:
     """Return the angle in turns against time, of the record or a member; wells are bands."""
-    reading, colour = (one.example[0], look(MODEL).colour) if model else (one.measured, MEASURED)
+    reading, colour = (one.example[0], look(MODEL).colour) if member else (one.measured, MEASURED)
     turns, every = reading / math.tau, max(1, one.time.size // SAMPLES)
     low, high = math.floor(turns.min() + 0.5), math.ceil(turns.max() - 0.5)
-    style: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[model]}
-    marks: list[Mark] = [Line(one.time[::every], turns[::every], **style)]
+    line: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[bool(member)]}
+    marks: list[Mark] = [Line(one.time[::every], turns[::every], **line)]
     if high - low < WELLS:
         wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
         marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
-    up = "\N{GREEK SMALL LETTER THETA}/2\N{GREEK SMALL LETTER PI} (turns)"
-    ends = holding(turns, margin=0.08)
+    up = Axis("θ/2π (turns)", holding(turns, margin=0.08))
     clock = Axis(names.TIME, (float(one.time[0]), float(one.time[-1])))
-    return Panel(f"history {title}", title, clock, Axis(up, ends), marks)
+    return Panel("history", member or "record", clock, up, marks)
 
 
-def phase(one: ForcedComparison, *, model: bool = False, title: str = "record") -> Panel:
+def phase(one: ForcedComparison, *, member: str = "") -> Panel:
     """Return the path of the record or of a member in the phase plane, with a common scale."""
     path, colour = (one.measured, one.velocity), MEASURED
-    if model:
+    if member:
         path, colour = one.example, look(MODEL).colour
     reach = 1.08 * max(float(np.abs(v).max()) for v in (one.velocity, one.example[1]))
     curve = plane.broken_at_wrap(path[0][:SAMPLES], path[1][:SAMPLES])
     sides = names.phase_plane((-math.pi, math.pi), (-reach, reach), _SI)
-    return Panel(f"phase {title}", title, *sides, [Line(*curve.T, colour=colour, width=0.4)])
+    return Panel("phase", member or "record", *sides, [Line(*curve.T, colour=colour, width=0.4)])
 
 
 def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
@@ -203,13 +196,8 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
             reach = 1.08 * max(float(np.abs(cycle.theta).max()) for cycle in every)
         some = slice(None, None, EVERY)
         at = plane.wrapped(found.measured.theta)[some], found.measured.velocity[some]
-        circle: dict[str, Any] = {
-            "fill": "none",
-            "size": 4.0,
-            "edge_width": 0.8,
-            "name": pair[0],
-        }
-        marks = [Points(*at, colour=MEASURED, **circle)]
+        circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8}
+        marks = [Points(*at, colour=MEASURED, name=pair[0], **circle)]
         if found.model is not None:
             theta, velocity = found.model.theta, found.model.velocity
             theta = np.append(theta, theta[0] + math.tau * found.model.w)
@@ -251,8 +239,7 @@ def _histogram(each: Statistic, base: float) -> list[Mark]:
     made = [_column(left, right, base, unit * n) for left, right, n in columns if n]
     marks: list[Mark] = [Areas(made, colour=ENSEMBLE, name="ensemble")]
     if never:
-        last = [_column(0.95, 1.0, base, unit * never)]
-        name = "not settled by the end"
+        last, name = [_column(0.95, 1.0, base, unit * never)], "not settled by the end"
         marks.append(Areas(last, colour=ENSEMBLE, name=name))
         marks.append(Areas(last, colour="#ffffff", hatch="////", name=name))
     marks.append(Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6))
@@ -275,7 +262,7 @@ def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart
     panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
     rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
     size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
-    return Chart.of(title, subtitle, rows, columns=2, size=size)
+    return Chart(title, subtitle, rows, columns=2, size=size)
 
 
 def _reached(one: ForcedComparison) -> str:
@@ -290,7 +277,7 @@ def _reached(one: ForcedComparison) -> str:
 def _drive(one: ForcedComparison) -> str:
     given = one.run.drive or {}
     p, frequency = given.get("p") or 0.0, given.get("Omega") or 0.0
-    return f"p = {p:g}, \N{GREEK CAPITAL LETTER OMEGA} = {frequency:.4g} rad/s"
+    return f"p = {p:g}, Ω = {frequency:.4g} rad/s"
 
 
 def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:
@@ -300,10 +287,8 @@ def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> She
     """
     charts = []
     for one in runs:
-        member: dict[str, Any] = {"model": True, "title": "a member"}
-        above = [history(one, OF_PAPER), history(one, OF_PAPER, **member)]
-        below = [phase(one), phase(one, **member), statistics(one)]
+        above = [history(one), history(one, member="a member")]
+        below = [phase(one), phase(one, member="a member"), statistics(one)]
         heading = f"{_drive(one)}: {counted(one.ensemble.members, 'member')} of the ensemble"
-        style = {"heights": (0.7, 1.0), "size": (WIDTH, 4.4)}
-        charts.append(Chart.of(heading, "", [above, below], **style))
+        charts.append(Chart(heading, "", [above, below], heights=(0.7, 1.0), size=(WIDTH, 4.4)))
     return Sheet(title, subtitle, [charts], legend=True)

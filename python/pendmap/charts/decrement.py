@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points
-from pendmap.charts.methods import EVEN, MEASURED, MINUS, NOISE, NOISE_SAID, ODD, Z95, look, nothing
-from pendmap.formatting import Estimate, estimate_text
+from pendmap.charts.marks import NONE, QUIET, ZERO, Band, Level, Line, Mark, Points
+from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, Z95, look, nothing
+from pendmap.formatting import Estimate, estimate_text, typographic
 from pendmap.identification.methods.combined import CUT, triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
 
@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
     from pendmap.identification import Identification, IdentificationReport, Peaks
+    from pendmap.identification.table1 import State
+    from pendmap.model import Rig
 
-DELTA: Final = "\N{GREEK SMALL LETTER DELTA}"
-TITLE: Final = f"The decrement {DELTA} of each three peaks"
-SIZE: Final = "middle peak |\N{GREEK SMALL LETTER THETA}| (rad)"
+TITLE: Final = "The decrement δ of each three peaks"
+SIZE: Final = "middle peak |θ| (rad)"
 REACH: Final = 3.0
 """Range of a signed panel with few triplets, over the 90th percentile of their absolute values."""
 
@@ -55,8 +56,7 @@ def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
     turned = peaks.turned
     size = np.abs(turned.amplitude - zero)
     if size.size < 3:  # noqa: PLR2004
-        none = np.empty(0)
-        return Triplets(none, none, none, np.empty(0, bool))
+        return Triplets(NONE, NONE, NONE, np.empty(0, bool))
     delta, _ = triplets(size)
     row = turned.index[2:] - turned.index[:-2] == 2  # noqa: PLR2004
     stderr = _stderr(size, turned.stderr_amplitude)
@@ -82,7 +82,7 @@ def part(report: IdentificationReport) -> Chart:
     columns = [("as recorded", "", raw, 0.0 if zero is None else zero.value)]
     if zero is not None:
         error = None if zero.stderr is None else 1e3 * zero.stderr
-        removed = estimate_text(Estimate(1e3 * zero.value, error), minus=MINUS)
+        removed = typographic(estimate_text(Estimate(1e3 * zero.value, error)))
         without = triplets_of(report.peaks, zero.value)
         columns.append(("zero error removed", f", {removed} mrad removed", without, 0.0))
     known = np.concatenate([some.delta[np.isfinite(some.delta)] for _, _, some, _ in columns])
@@ -93,18 +93,16 @@ def part(report: IdentificationReport) -> Chart:
     for text, removed, some, shift in columns:
         lost = int(np.isnan(some.delta).sum())
         count = f": {lost} of {some.delta.size} have none" if lost else ""
-        for up, title in zip(
-            sides, (f"|{DELTA}|, {text}{count}", f"{DELTA}{removed}"), strict=True
-        ):
+        for up, title in zip(sides, (f"|δ|, {text}{count}", f"δ{removed}"), strict=True):
             absolute = up is sides[0]
             across = Axis("" if absolute else SIZE, ends, "log", ticks=() if absolute else None)
             marks = _points(some, up, absolute=absolute)
             if source is not None:
                 marks += _model(report.peaks, source, shift, (ends[0], up), absolute=absolute)
             if not absolute:
-                marks.append(Level(0.0, colour=QUIET, width=0.6, order=0.0))
+                marks.append(ZERO)
             panels.append(Panel(f"{title} {text}", title, across, up, marks))
-    return Chart.of(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
+    return Chart(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
 
 
 def _zero(report: IdentificationReport) -> Estimate | None:
@@ -128,6 +126,18 @@ def _source(report: IdentificationReport) -> Identification | None:
     return None
 
 
+def offset_of(found: Identification) -> float:
+    """Return the zero error of an identification, 0 if it estimates none."""
+    return found["offset"] if "offset" in found.estimates else 0.0
+
+
+def from_first_peak(rig: Rig, peaks: Peaks, zero: float) -> tuple[State, Floats, Floats]:
+    """Return the first peak less a zero error, and times and angles of the peaks from it on."""
+    start = first_state(peaks)
+    begun = dataclasses.replace(start, theta=start.theta - zero)
+    return begun, *simulated_peaks(rig, begun, float(peaks.turned.time[-1]))
+
+
 def _delta(found: Identification) -> float:
     """Return ``zeta / sqrt(1 - zeta^2)`` of an identification."""
     zeta = found["c_over_m"] / (2 * found["w0"])
@@ -141,14 +151,14 @@ def _absolute(known: Floats, level: float) -> Axis:
         everything = np.array([1e-3, 1.0])
     low = max(float(np.percentile(everything, 2)), float(everything.max()) * 1e-4)
     low = min(low, level) if level else low
-    return Axis(f"|{DELTA}|", (low / 1.6, float(everything.max()) * 1.6), "log")
+    return Axis("|δ|", (low / 1.6, float(everything.max()) * 1.6), "log")
 
 
 def _signed(known: Floats, level: float) -> Axis:
     """Return an axis that contains most of the triplets; those beyond are drawn at its ends."""
     far = float(np.percentile(np.abs(known), 90)) if known.size else 1.0
     far = max(REACH * far if known.size < 10 else 1.35 * far, 4 * level, 1e-6)  # noqa: PLR2004
-    return Axis(DELTA, (-far, far))
+    return Axis("δ", (-far, far))
 
 
 def _points(some: Triplets, up: Axis, *, absolute: bool) -> list[Mark]:
@@ -174,21 +184,15 @@ def _model(
     peaks: Peaks, source: Identification, shift: float, place: tuple[float, Axis], *, absolute: bool
 ) -> list[Mark]:
     """Return the triplets of simulated peaks with a zero error, and the band of the noise."""
-    level, none = _delta(source), np.empty(0)
-    dashed = f"its {DELTA} = {level:.3g}"
+    level, solid = _delta(source), f"{look(source.method).label}, simulated"
+    dashed: dict[str, Any] = {"dash": "--", "name": f"its δ = {level:.3g}"}
     marks: list[Mark] = [
-        Line(
-            none, none, colour=MEASURED, width=1.0, name=f"{look(source.method).label}, simulated"
-        ),
-        Level(
-            abs(level) if absolute else level, colour=MEASURED, width=1.0, dash="--", name=dashed
-        ),
-        Level(CUT, axis="x", colour=QUIET, dash=":", name="12\N{DEGREE SIGN}"),
+        Line(NONE, NONE, colour=MEASURED, width=1.0, name=solid),
+        Level(abs(level) if absolute else level, colour=MEASURED, width=1.0, **dashed),
+        Level(CUT, axis="x", colour=QUIET, dash=":", name="12°"),
     ]
-    turned, start = peaks.turned, first_state(peaks)
-    own = source["offset"] if "offset" in source.estimates else 0.0
-    begun = dataclasses.replace(start, theta=start.theta - own)
-    _, angles = simulated_peaks(source.rig, begun, float(turned.time[-1]))
+    turned = peaks.turned
+    _, _, angles = from_first_peak(source.rig, peaks, offset_of(source))
     size = np.abs(angles + shift)
     if size.size < 3:  # noqa: PLR2004
         return marks

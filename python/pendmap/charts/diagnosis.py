@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
 from pendmap.charts.identification import errors_of
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
 
-ACCELERATION: Final = "rad/s\N{SUPERSCRIPT TWO}"  # Unit of a torque per moment of inertia
+ACCELERATION: Final = "rad/s²"  # Unit of a torque per moment of inertia
+RMS: Final = "rms (mrad)"  # Root mean square of residuals, with its unit
+LACKED: Final = "Torque that the model lacks"
 OVER_SAID: Final = {
     "angle": "angle (rad)",
     "velocity": "velocity (rad/s)",
@@ -37,8 +40,6 @@ ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 RUNS: Final = 3  # Number of runs whose residuals are drawn: those with the worst baseline fit
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged; model errors are slower."""
-WIDE: Final = 8.0
-"""Ratio of the greatest residual to the least above which their axis is logarithmic."""
 CYCLES: Final = 3  # Number of free runs in figure 7: those held out first, then the longest
 RANKED: Final = 8  # Number of candidates in the ranking
 SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
@@ -63,37 +64,32 @@ def sheet(found: Discrepancy) -> Chart:
     last = coefficients(found, shown[0]) if shown else torque(found, "amplitude")
     rows.append([ranking(found), last])
     heights += [1.2, 1.2, 1.5]
-    look = {"heights": heights, "size": SIZE, "letters": False}
-    return Chart.of(_title(found), subtitle, rows, **look)
+    return Chart(_title(found), subtitle, rows, heights=heights, size=SIZE, letters=False)
 
 
 def parts(found: Discrepancy) -> dict[str, Chart]:
     """Return the non-empty charts of a report by the names that it uses."""
-    made: dict[str, Chart] = {}
-
-    def add(name: str, title: str, said: str, rows: list[list[Panel]], high: float) -> None:
-        made[name] = Chart.of(title, said, rows, size=(SIZE[0], high), letters=False)
-
-    rows = [[panel] for panel in residuals(found)]
-    add("residuals", "Residuals", "the runs with the largest residuals of the baseline", rows, 4.2)
     starts = " and ".join(f"{one.starts} {one.kind}" for one in found.forecasts)
-    said = f"forecasts from {starts} starts on what was held out" if starts else ""
-    panels = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
-    add("gap", "The gap", said, [panels], 3.7)
-    over = [name for name in OVER_SAID if _torque_rows(found, name)]
-    if over:
-        said = "per moment of inertia; bands: 95 %"
-        panels = [torque(found, name) for name in over]
-        rows = [panels[k : k + 2] for k in range(0, len(over), 2)]
-        add("torque", "Torque that the model lacks", said, rows, 1.1 + 2.3 * len(rows))
-    if found.scores.best():
-        said = "what each effect of the library would explain by itself"
-        add("ranking", "Ranking", said, [[ranking(found)]], 3.5)
-    shown = shown_coefficients(found)
-    if shown:
-        panels = [coefficients(found, name) for name in shown]
-        add("runs", "Run by run", "bars and band: 95 %", [panels], 3.5)
-    return made
+    forecasts = f"forecasts from {starts} starts on what was held out" if starts else ""
+    gap = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
+    torques = _torques(found)
+    pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
+    ranked = [ranking(found)] if found.scores.best() else []
+    by_itself = "what each effect of the library would explain by itself"
+    runs = [coefficients(found, name) for name in shown_coefficients(found)]
+    worst = "the runs with the largest residuals of the baseline"
+    made = {
+        "residuals": ("Residuals", worst, [[panel] for panel in residuals(found)], 4.2),
+        "gap": ("The gap", forecasts, [gap], 3.7),
+        "torque": (LACKED, "per moment of inertia; bands: 95 %", pairs, 1.1 + 2.3 * len(pairs)),
+        "ranking": ("Ranking", by_itself, [ranked], 3.5),
+        "runs": ("Run by run", "bars and band: 95 %", [runs], 3.5),
+    }
+    return {
+        name: Chart(title, said, rows, size=(SIZE[0], high), letters=False)
+        for name, (title, said, rows, high) in made.items()
+        if any(rows)
+    }
 
 
 def cycles(found: Discrepancy) -> Sheet | None:
@@ -112,12 +108,12 @@ def cycles(found: Discrepancy) -> Sheet | None:
 
 def _title(found: Discrepancy) -> str:
     """Return the verdict with its names; for indistinguishable effects with all of them."""
-    alike = {names[0]: names for names in found.equivalent}
-    names = [effect.name for effect in found.effects]
+    alike = {each[0]: each for each in found.equivalent}
+    said = [effect.name for effect in found.effects]
     if found.verdict == "ambiguous":
-        names = [" or ".join(alike.get(name, [name])) for name in names]
+        said = [" or ".join(alike.get(name, [name])) for name in said]
     between = "; " if found.verdict == "ambiguous" else ", "
-    return f"{found.verdict}: {between.join(names) or 'no effect claimed'}"
+    return f"{found.verdict}: {between.join(said) or 'no effect claimed'}"
 
 
 def models(found: Discrepancy) -> list[tuple[str, str]]:
@@ -138,9 +134,8 @@ def residuals(found: Discrepancy) -> list[Panel]:
         every = max(round(PART * math.tau / (found.base.fitted.fit.model.w0 * interval)), 1)
         time = run.time[::every]
         floor = 2e3 * rows[k].noise_floor / math.sqrt(every)
-        marks: list[Mark] = [
-            Span((-floor, floor), axis="y", colour=NOISE, name="noise, 2 standard errors")
-        ]
+        said = "noise, 2 standard errors"
+        marks: list[Mark] = [Span((-floor, floor), axis="y", colour=NOISE, name=said)]
         shown = [np.array([-floor, floor])]
         fits = (found.base.fitted.fit, found.best.fitted.fit)
         for (name, colour), fit in zip(models(found), fits, strict=False):
@@ -150,10 +145,7 @@ def residuals(found: Discrepancy) -> list[Panel]:
             mean = _smoothed(residual, every)[: time.size]
             marks.append(Line(time, mean, colour=colour, width=1.0, name=name))
             shown.append(mean)
-        across = Axis(
-            "time (s)" if k == max(order) else "",
-            (0.0 if time[0] >= 0 else float(time[0]), longest),
-        )
+        across = Axis("time (s)" if k == max(order) else "", (min(0.0, float(time[0])), longest))
         title = f"{run.name}: record less model, means over a tenth of a swing"
         panels.append(Panel(f"residual {k}", title, across, Axis("mrad", holding(*shown)), marks))
     return panels
@@ -161,29 +153,17 @@ def residuals(found: Discrepancy) -> list[Panel]:
 
 def _smoothed(residual: Floats, every: int) -> Floats:
     """Return means over ``every`` samples; NaN for a bin without samples."""
-    whole = -(-residual.size // every) * every
-    padded = np.full(whole, math.nan)
-    padded[: residual.size] = residual
-    rows = padded.reshape(-1, every)
+    rows = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
+    rows = rows.reshape(-1, every)
     known = np.isfinite(rows)
     count = known.sum(axis=1)
     total = np.where(known, rows, 0.0).sum(axis=1)
     return np.where(count > 0, total / np.maximum(count, 1), math.nan)
 
 
-def _rms(*values: npt.ArrayLike) -> Axis:
-    """Return the axis of residuals in mrad, logarithmic if they differ much."""
-    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
-    every = every[np.isfinite(every)]
-    low, high = float(every.min()), float(every.max())
-    if high > WIDE * low > 0:
-        return Axis("rms (mrad)", (low / 1.4, 1.5 * high), "log")
-    return Axis("rms (mrad)", (0.0, 1.15 * high))
-
-
-def _runs(names: Sequence[str]) -> Axis:
-    ticks = [(float(k), name.removesuffix(".csv")) for k, name in enumerate(names)]
-    return Axis("", (-0.6, len(names) - 0.4), ticks=ticks)
+def _runs(files: Sequence[str]) -> Axis:
+    ticks = [(float(k), name.removesuffix(".csv")) for k, name in enumerate(files)]
+    return Axis("", (-0.6, len(files) - 0.4), ticks=ticks)
 
 
 def by_run(found: Discrepancy) -> Panel:
@@ -198,8 +178,7 @@ def by_run(found: Discrepancy) -> Panel:
     marks: list[Mark] = []
     if back:
         marks.append(Span((back[0] - 0.5, back[-1] + 0.5), colour="#f1f1f1", name="held out"))
-    level, _ = bars(noise, at - 0.32, at + 0.32)
-    ends = bars(noise, at - 0.32, at + 0.32)[1]
+    level, ends = bars(noise, at - 0.32, at + 0.32)
     marks += [
         Line(*bars(at, after, before), colour="#bbbbbb", width=1.0, order=1.0),
         Points(at, before, colour=BEFORE, fill="#ffffff", edge_width=1.0, size=5.0),
@@ -207,13 +186,8 @@ def by_run(found: Discrepancy) -> Panel:
     ]
     if found.adds:
         marks.append(Points(at, after, marker="s", colour=AFTER, size=4.0))
-    return Panel(
-        "by run",
-        "Residual by run",
-        _runs([r.name for r in rows]),
-        _rms(noise, before, after),
-        marks,
-    )
+    across, up = _runs([row.name for row in rows]), names.sizes(RMS, noise, before, after)
+    return Panel("by run", "Residual by run", across, up, marks)
 
 
 def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel:
@@ -229,7 +203,7 @@ def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel
     across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
     title = f"Error of forecasts, {one.kind} runs"
     root = f"forecast/{one.kind}"
-    up = Axis("rms (mrad)", holding(0.0, *shown)) if plain else _rms(*shown)
+    up = Axis(RMS, holding(0.0, *shown)) if plain else names.sizes(RMS, *shown)
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
@@ -264,15 +238,19 @@ def torque(found: Discrepancy, over: str) -> Panel:
     ends = (min(r["from"] for r in every), max(r["to"] for r in every)) if every else (0.0, 1.0)
     along = bool(every) and every[0]["along_motion"]
     said = "torque along\nthe motion" if along else "torque"
-    title = f"Torque that the model lacks, over {over.replace('_', ' ')}"
+    title = f"{LACKED}, over {over.replace('_', ' ')}"
     up = Axis(f"{said} ({ACCELERATION})", holding(*shown))
     return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
 
 
+def _torques(found: Discrepancy) -> list[Panel]:
+    """Return the missing torque over each quantity that has bins."""
+    return [torque(found, over) for over in OVER_SAID if _torque_rows(found, over)]
+
+
 def recorded(found: Discrepancy) -> list[Panel]:
     """Return the panels of a recording: torques and forecasts."""
-    torques = [torque(found, over) for over in OVER_SAID if _torque_rows(found, over)]
-    return [*torques, *(forecast(found, one, plain=True) for one in found.forecasts)]
+    return [*_torques(found), *(forecast(found, one, plain=True) for one in found.forecasts)]
 
 
 def ranking(found: Discrepancy) -> Panel:
@@ -287,7 +265,7 @@ def ranking(found: Discrepancy) -> Panel:
         y = float(len(best) - 1 - place)
         name = score.candidate.name
         ticks.append((y, name))
-        colour = ALIKE if any(name in names for names in found.equivalent) else OTHER
+        colour = ALIKE if any(name in each for each in found.equivalent) else OTHER
         colour = AFTER if name in {effect.name for effect in found.effects} else colour
         corners = [(1.0, y - 0.35), (value, y - 0.35), (value, y + 0.35), (1.0, y + 0.35)]
         boxes.setdefault(colour, []).append(np.array(corners))
@@ -370,13 +348,12 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
         x = at[which]
         if x.size:
             spots = np.full(x.size, place)
-            marks.append(
-                Points(x, spots, marker=mark, size=4.5, colour=QUIET, edge_width=1.0, name=said)
-            )
+            cross: dict[str, Any] = {"marker": mark, "size": 4.5, "edge_width": 1.0}
+            marks.append(Points(x, spots, colour=QUIET, name=said, **cross))
     times = f"10$^{{{power}}}$ " if power else ""
     unit = f"{times}{unit_of(shown, found.definition)}".strip()
     own = shown.rpartition(".")[2]
     claimed = "" if found.effects else " (not claimed)"
     up = Axis(f"{own} ({unit})" if unit else own, (low, high))
-    names = _runs([run.name for run in found.data.fitted])
-    return Panel(f"run by run {shown}", f"{shown}{claimed}", names, up, marks)
+    across = _runs([run.name for run in found.data.fitted])
+    return Panel(f"run by run {shown}", f"{shown}{claimed}", across, up, marks)

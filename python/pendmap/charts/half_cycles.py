@@ -10,9 +10,10 @@ import numpy as np
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, bars
+from pendmap.charts.marks import NONE, QUIET, ZERO, Areas, Level, Line, Mark, Points, bars
 from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
 from pendmap.charts.record import UNUSED
+from pendmap.formatting import typographic
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.records import Run
 
+TITLE: Final = "The record and its half cycles"
 NEAR: Final = 6  # Number of half cycles of a close view
 POINTS: Final = 500  # Number of points of a close view at which the velocity is computed
 SPAN: Final = 0.2  # Half width of the stretch of a cubic fit, over the length of a half cycle
@@ -46,16 +48,12 @@ def course_of(run: Run, peaks: Peaks) -> Course:
     good = run.trusted
     time, theta = run.time[good], run.theta[good]
     away = 0.0
-    half = np.full(time.size, -1, np.int64)
     if len(peaks):
         at = np.interp(peaks.time, time, theta) - peaks.amplitude
         away = math.tau * round(float(np.median(at)) / math.tau)
-        place = np.searchsorted(peaks.time, time, side="right") - 1
-        inside = (place >= 0) & (place < len(peaks) - 1)
-        place = np.clip(place, 0, max(len(peaks) - 2, 0))
-        if len(peaks) > 1:
-            whole = np.diff(peaks.index)[place] == 1
-            half = np.where(inside & whole, peaks.index[place], -1)
+    # Before the first peak and from the last one on there is no half cycle.
+    of_peak = np.where(np.diff(peaks.index) == 1, peaks.index[:-1], -1)
+    half = np.array([-1, *of_peak, -1])[np.searchsorted(peaks.time, time, side="right")]
     return Course(time, theta - away, half, run.time[~good], run.theta[~good] - away)
 
 
@@ -73,33 +71,29 @@ def part(report: IdentificationReport) -> Chart:
     course = course_of(run, peaks)
     few = len(peaks) < 3  # noqa: PLR2004 (a half cycle on either side)
     whole = _whole(course, peaks, thin=few or not run.peaks_only)
-    columns = [] if few else [_near(report, course, *near) for near in _spans(peaks)]
-    rows = [[whole], *zip(*columns, strict=True)]
-    shares = [1.0, 0.35] if run.peaks_only else [1.0, 0.8, 0.28]
-    size = (8.6, 2.4 if few else 4.6 if run.peaks_only else 5.6)
-    heights = [1.1, *([] if few else shares)]
-    return Chart.of("The record and its half cycles", "", rows, heights=heights, size=size)
-
-
-def _spans(peaks: Peaks) -> list[tuple[str, tuple[float, float]]]:
+    if few:
+        return Chart(TITLE, "", [[whole]], size=(8.6, 2.4))
     spans = first_and_last(peaks)
     said = ["the first half cycles", "the last half cycles"] if len(spans) > 1 else ["all of them"]
-    return list(zip(said, spans, strict=True))
+    columns = [_near(report, course, *one) for one in zip(said, spans, strict=True)]
+    rows = [[whole], *zip(*columns, strict=True)]
+    if run.peaks_only:
+        return Chart(TITLE, "", rows, heights=(1.1, 1.0, 0.35), size=(8.6, 4.6))
+    return Chart(TITLE, "", rows, heights=(1.1, 1.0, 0.8, 0.28), size=(8.6, 5.6))
 
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     """Return the whole record, as a line if ``thin``, else as its peaks alone."""
-    none = np.empty(0)
     cross: dict[str, Any] = {"marker": "|", "edge_width": 1.2, "name": "crossings of zero"}
     circle: dict[str, Any] = {"fill": "white", "edge_width": 0.9, "name": "peaks"}
     marks: list[Mark] = [
-        Line(none, none, colour=EVEN, width=2.0, name="even half cycles"),
-        Line(none, none, colour=ODD, width=2.0, name="odd half cycles"),
-        Points(none, none, colour=MEASURED, size=4.5, **circle),
+        Line(NONE, NONE, colour=EVEN, width=2.0, name="even half cycles"),
+        Line(NONE, NONE, colour=ODD, width=2.0, name="odd half cycles"),
+        Points(NONE, NONE, colour=MEASURED, size=4.5, **circle),
         Points(course.other_time, course.other_theta, colour=UNUSED, size=1.2),
     ]
     if peaks.crossing_time.size:
-        marks.append(Points(none, none, colour=MEASURED, size=7.0, **cross))
+        marks.append(Points(NONE, NONE, colour=MEASURED, size=7.0, **cross))
     if thin:
         marks += _coloured(course.time, course.theta, course.half, 0.6)
     marks += _peaks(peaks, 1.6 if thin else 3.0, by_parity=not thin)
@@ -118,13 +112,13 @@ def _near(
     ends = holding(span, margin=0.02)
     clock, bare = Axis(names.TIME, ends), Axis("", ends, ticks=())
     angle, values = _angle(course, peaks, ends, only=run.peaks_only)
-    panels = [Panel(f"angle {title}", title, bare, names.angle(holding(values)), angle)]
+    panels = [Panel("angle", title, bare, names.angle(holding(values)), angle)]
     if not run.peaks_only:
         velocity, values = _velocity(run, course, peaks, ends)
         up = names.angle(holding(values), names.speed(Units(si=True)))
-        panels.append(Panel(f"velocity {title}", "", bare, up, velocity))
-    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, "\N{MINUS SIGN}1"), (0, "0"), (1, "1")])
-    return [*panels, Panel(f"sign {title}", "", clock, signs, _sign(peaks))]
+        panels.append(Panel("velocity", "", bare, up, velocity))
+    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, typographic("-1")), (0, "0"), (1, "1")])
+    return [*panels, Panel("sign", "", clock, signs, _sign(peaks))]
 
 
 def _coloured(time: Floats, values: Floats, half: NDArray[np.int64], width: float) -> list[Mark]:
@@ -171,7 +165,7 @@ def _angle(
     marks += [
         Line(*lines, colour=MEASURED, width=0.8, order=3.0),
         *_peaks(some, 4.5, by_parity=only),
-        Level(0.0, colour=QUIET, width=0.6, order=0.0),
+        ZERO,
         Points(cross, 0 * cross, colour=MEASURED, marker="|", size=8.0, edge_width=1.2),
     ]
     return marks, np.concatenate([course.theta[near], some.amplitude])
@@ -190,8 +184,7 @@ def _velocity(
         time, half = time[::every], half[::every]
         within = (peaks.time >= ends[0]) & (peaks.time <= ends[1])
         speed = _slopes(course, time, SPAN * float(np.median(np.diff(peaks.time[within]))))
-    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
-    return [*_coloured(time, speed, half, 1.1), zero], speed
+    return [*_coloured(time, speed, half, 1.1), ZERO], speed
 
 
 def _slopes(course: Course, at: Floats, reach: float) -> Floats:

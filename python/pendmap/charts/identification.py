@@ -13,20 +13,18 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.charts import decrement, half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
-from pendmap.charts.methods import MEASURED, MINUS, NOISE, NOISE_SAID, Z95, drawn, look, nothing
+from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, Z95, drawn, look, nothing
 from pendmap.errors import InputError
-from pendmap.formatting import estimate_text
+from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
-from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from pendmap.charts.half_cycles import Course
-    from pendmap.charts.marks import Floats
+    from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
-    from pendmap.identification.methods.trajectory import JointFit
     from pendmap.model import Rig
     from pendmap.records import Run
 
@@ -39,7 +37,7 @@ LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
 RESTS: Final = "at rest"  # Entry for an error if the simulation has already come to rest
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
-QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s\u00b2)"}
+QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s²)"}
 """Estimates in the table, with the heads of their columns."""
 
 
@@ -99,13 +97,10 @@ class Decay:
     @classmethod
     def of(cls, rig: Rig, peaks: Peaks, zero: float) -> Decay:
         """Return the simulation of a model whose sensor has a zero error, rad."""
-        turned, start = peaks.turned, first_state(peaks)
-        begun = dataclasses.replace(start, theta=start.theta - zero)
-        last = float(turned.time[-1])
-        peak_time, peak = simulated_peaks(rig, begun, last)
-        until = max(last - start.time, 1e-3) * 1.01
+        begun, peak_time, peak = decrement.from_first_peak(rig, peaks, zero)
+        until = max(float(peaks.turned.time[-1]) - begun.time, 1e-3) * 1.01
         run = simulate(rig, begun.theta, 0.0, until, samples=SAMPLES)
-        time, theta = run["time"].values + start.time, run["theta"].values + zero
+        time, theta = run["time"].values + begun.time, run["theta"].values + zero
         return cls(peak_time, peak + zero, time, theta)
 
 
@@ -119,8 +114,7 @@ def _decays(report: IdentificationReport) -> dict[str, Decay]:
         if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
             continue
         rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
-        zero = found["offset"] if "offset" in found.estimates else 0.0
-        made[name] = Decay.of(rig, report.peaks, zero)
+        made[name] = Decay.of(rig, report.peaks, decrement.offset_of(found))
     return made
 
 
@@ -133,36 +127,38 @@ def decays(report: IdentificationReport) -> Chart:
     """Return peaks, their differences, close views and residuals of every model."""
     title = "The decay by each model"
     made, run, turned = _decays(report), report.run, report.peaks.turned
-    last = [] if report.joint is None else [_left(report, report.joint)]
+    last = []
+    if (joint := report.joint) is not None:
+        said, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma
+        last = [residuals(run, joint.fit.residuals[0], sigma, BEST, said)]
     if not made:
         chart = nothing(title, report.table.left_out or NOTHING)
         if not (report.table.left_out and last):
             return chart
-        rows = [["nothing"], ["residual"]]
-        both = [*chart.panels, *last]
-        return dataclasses.replace(chart, panels=both, rows=rows, size=(WIDTH, 2.6))
+        return dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
     ends = holding(turned.time, margin=0.01)
     course = half_cycles.course_of(run, report.peaks)
     spans = half_cycles.first_and_last(turned, NEAR)
-    said = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
-    near = [_near(course, made, *one, only=run.peaks_only) for one in zip(said, spans, strict=True)]
+    titles = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
+    pairs = zip(titles, spans, strict=True)
+    near = [_near(course, made, *one, only=run.peaks_only) for one in pairs]
     shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
     shown += [last] if last else []
-    heights, size = (1.7, 1.35, 1.5, 0.75)[: len(shown)], (WIDTH, 6.3 + 1.3 * len(last))
-    return Chart.of(title, "", shown, heights=heights, size=size)
+    heights = (1.7, 1.35, 1.5, 0.75)[: len(shown)]
+    return Chart(title, "", shown, heights=heights, size=(WIDTH, 6.3 + 1.3 * len(last)))
 
 
-def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
+def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: Ends) -> Panel:
     size = np.abs(turned.amplitude)
-    spots: dict[str, Any] = {"colour": MEASURED, "size": 2.4, "order": 5.0, "name": "measured"}
-    marks: list[Mark] = [Points(turned.time, size, **spots)]
+    spots: dict[str, Any] = {"size": 2.4, "order": 5.0, "name": "measured"}
+    marks: list[Mark] = [Points(turned.time, size, colour=MEASURED, **spots)]
     marks += [_line(one.peak_time, np.abs(one.peak), name, 1.3) for name, one in made.items()]
-    up = Axis("peak |\N{GREEK SMALL LETTER THETA}| (rad)", (0.0, 1.06 * float(size.max())))
+    up = Axis("peak |θ| (rad)", (0.0, 1.06 * float(size.max())))
     title = "peaks, simulated from the first one on"
     return Panel("peaks", title, Axis("", ends, ticks=()), up, marks)
 
 
-def _differences(turned: Peaks, made: Mapping[str, Decay], ends: tuple[float, float]) -> Panel:
+def _differences(turned: Peaks, made: Mapping[str, Decay], ends: Ends) -> Panel:
     """Return the difference of each simulated peak from the measured one of equal number."""
     number = turned.index - turned.index[0]
     curves, marks = [], _noise(turned.time, 1e3 * Z95 * turned.stderr_amplitude)
@@ -187,12 +183,7 @@ def _noise(x: Floats, error: Floats) -> list[Mark]:
 
 
 def _near(
-    course: Course,
-    made: Mapping[str, Decay],
-    title: str,
-    ends: tuple[float, float],
-    *,
-    only: bool,
+    course: Course, made: Mapping[str, Decay], title: str, ends: Ends, *, only: bool
 ) -> Panel:
     inside = np.flatnonzero((course.time >= ends[0]) & (course.time <= ends[1]))
     inside = inside[:: 1 if only else max(1, inside.size // DOTS)]
@@ -210,12 +201,6 @@ def _near(
     return Panel(title, title, Axis(names.TIME, ends), up, marks)
 
 
-def _left(report: IdentificationReport, joint: JointFit) -> Panel:
-    residual, sigma = joint.fit.residuals[0], joint.readings[0].sigma
-    title = "the record less the trajectory fitted to it"
-    return residuals(report.run, residual, sigma, BEST, title)
-
-
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
     """Return the residuals of a model over a record, with lines at the standard deviation.
 
@@ -230,8 +215,8 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
     dots: dict[str, Any] = {"colour": look(method).colour, "size": 1.2}
     marks: list[Mark] = [Points(run.time[::every], away[::every], **dots)]
     lines: dict[str, Any] = {"colour": MEASURED, "width": 0.8, "dash": "--"}
-    name = "standard deviation of its noise"
-    marks += [Level(end, name=name, **lines) for end in (-noise, noise)]
+    lines["name"] = "standard deviation of its noise"
+    marks += [Level(end, **lines) for end in (-noise, noise)]
     return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
 
 
@@ -250,8 +235,8 @@ def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Char
     """Return the errors of periods and peaks by model."""
     if not known:
         return nothing(title, NOTHING)
-    said = ("of each period", "of each peak; time runs to the left")
-    return Chart(title, "", error_panels(known, peaks, said), size=(WIDTH, 3.6))
+    titles = ("of each period", "of each peak; time runs to the left")
+    return Chart(title, "", [error_panels(known, peaks, titles)], size=(WIDTH, 3.6))
 
 
 def error_panels(
@@ -265,27 +250,18 @@ def error_panels(
     order = np.argsort(some.peak)
     wide = Z95 * 100 * (turned.stderr_amplitude / some.peak)[order]
     ends = (max(float(np.min(some.peak[1:])), 1e-9) / 1.15, float(np.max(some.peak[1:])) * 1.15)
-    size = Axis("measured peak |\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
-    time = holding(some.period_time, margin=0.02)
+    size = Axis("measured peak |θ| (rad)", ends, "log")
+    time = Axis(names.TIME, holding(some.period_time, margin=0.02))
+    periods = [(each.period_time, each.period_error) for each in known.values()]
+    sizes = [(each.peak[1:], each.peak_error[1:]) for each in known.values()]
     panels: list[Panel] = []
-    for name, across, noise, curves in (
-        (
-            "periods",
-            Axis(names.TIME, time),
-            _noise(some.period_time, error),
-            {name: (each.period_time, each.period_error) for name, each in known.items()},
-        ),
-        (
-            "peaks",
-            size,
-            _noise(some.peak[order], wide),
-            {name: (each.peak[1:], each.peak_error[1:]) for name, each in known.items()},
-        ),
+    for title, across, noise, curves in (
+        (titles[0], time, _noise(some.period_time, error), periods),
+        (titles[1], size, _noise(some.peak[order], wide), sizes),
     ):
-        up, lines = names.signed([y for _, y in curves.values()], "error (%)")
-        own = [_line(*curve, method, 1.1) for method, curve in curves.items()]
-        title = titles[len(panels)]
-        panels.append(Panel(f"{name} {title}", title, across, up, [*noise, *own, *lines]))
+        up, lines = names.signed([y for _, y in curves], "error (%)")
+        own = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
+        panels.append(Panel("errors", title, across, up, [*noise, *own, *lines]))
     return panels
 
 
@@ -307,7 +283,7 @@ def rows(report: IdentificationReport) -> list[list[str]]:
         if not found.applicable:
             continue
         known = [found.estimates.get(key) for key in QUANTITIES]
-        cells = [dash if one is None else estimate_text(one, minus=MINUS) for one in known]
+        cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
         cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
         if not report.table.left_out:
             errors = report.table.errors.get(name)
@@ -343,7 +319,7 @@ def table(report: IdentificationReport) -> Chart:
     high = down + len(notes) - 0.9
     panel = bare("table", Table(head, body), *words, high=high)
     title = "Damping by each method, and errors of its simulation (%)"
-    return Chart(title, "", [panel], size=(WIDTH, 0.55 + LINE * high))
+    return Chart(title, "", [[panel]], size=(WIDTH, 0.55 + LINE * high))
 
 
 PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import palette
-from pendmap.formatting import with_error
+from pendmap.charts import palette, plane
+from pendmap.formatting import MINUS, typographic, with_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
         for i, name in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
     }
     owner = dataset["point_attractor"].values
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    points = plane.points(dataset)
     found = []
     for k, (i, name) in enumerate(names.items()):
         row = dataset.isel(attractor=k)
@@ -89,9 +89,9 @@ def percent(share: float, stderr: float = math.nan) -> str:
     """Return a share in percent, with as many digits as its standard error supports."""
     if not math.isfinite(stderr) or stderr <= 0:
         return f"{100 * share:.3g} %"
-    return with_error(100 * share, 100 * stderr, "\N{PLUS-MINUS SIGN}") + " %"
+    return typographic(with_error(100 * share, 100 * stderr)) + " %"
 
 
 def typeset(name: str) -> str:
     """Return a name with minus signs for the hyphens before numbers, brackets and the end."""
-    return re.sub(r"-(?=\d|\)|$)", "\N{MINUS SIGN}", name)
+    return re.sub(r"-(?=\d|\)|$)", MINUS, name)

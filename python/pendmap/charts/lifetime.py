@@ -13,7 +13,7 @@ from pendmap.charts import names, palette
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
-from pendmap.formatting import counted, written
+from pendmap.formatting import counted, typographic, with_error, written
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     starts = counted(int(dataset.attrs["starts"]), "start")
     subtitle = f"{names.parameters(dataset.attrs)};   {starts}"
     size = (9.6 if len(panels) > 1 else 6.0, 4.6)
-    return Chart(_title(dataset), subtitle, panels, size=size).only(layer, (6.0, 4.6))
+    return Chart(_title(dataset), subtitle, [panels], size=size).only(layer, (6.0, 4.6))
 
 
 def curves(dataset: xr.Dataset) -> list[Curve]:
@@ -68,12 +68,9 @@ def curves(dataset: xr.Dataset) -> list[Curve]:
     total = np.rint(dataset["fraction"].values * starts).astype(np.int64)
     made = [Curve("", "", periods, _shares(everything, starts))]
     whole = int(a["censored"]) <= FEW * starts
-    for k in range(dataset.sizes["attractor"] if whole else 0):
-        own = captured[k]
-        if own.any():
-            row = dataset.isel(attractor=k)
-            name, kind = str(row["attractor"].values), str(row["kind"].values)
-            made.append(Curve(name, kind, periods, _shares(total[k] - own, starts)))
+    for k in np.flatnonzero(captured.any(axis=1)) if whole else ():
+        name, kind = (str(dataset[key].values[k]) for key in ("attractor", "kind"))
+        made.append(Curve(name, kind, periods, _shares(total[k] - captured[k], starts)))
     return made
 
 
@@ -98,8 +95,8 @@ def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
         first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
         for way in (-1, 0, 1)
     )
-    said = f"{written(mean, error)} \N{PLUS-MINUS SIGN} {written(error, error)} periods"
-    text = f"tail from period {a['from_period']}: mean lifetime {said}"
+    said = typographic(with_error(mean, error))
+    text = f"tail from period {a['from_period']}: mean lifetime {said} periods"
     return [
         Band(periods, low, high, colour=_BAND, name=text, path="band", order=1.0),
         Line(periods, share, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),
@@ -123,13 +120,9 @@ def _survival(dataset: xr.Dataset) -> Panel:
     for k, one in enumerate(every):
         colour = palette.colour(one.name, one.kind) if one.name else INK
         said = f"those that {typeset(one.name)} captures" if one.name else "all starts"
-        look: dict[str, Any] = {
-            "colour": colour,
-            "width": 1.3 if one.name else 1.8,
-            "dash": _DASHES[k % 4],
-        }
-        line = Line(one.periods, one.share, step=True, name=said, path=str(k), **look)
-        marks.append(line)
+        look: dict[str, Any] = {"name": said, "path": str(k), "colour": colour}
+        look |= {"width": 1.3 if one.name else 1.8, "dash": _DASHES[k % 4]}
+        marks.append(Line(one.periods, one.share, step=True, **look))
     marks += _fit(dataset, every[0])
     lowest = min(np.min(one.share[one.share > 0], initial=1.0) for one in every)
     bottom = max(0.5 / float(dataset.attrs["starts"]), 0.5 * lowest)
@@ -147,19 +140,18 @@ def _tail(dataset: xr.Dataset) -> Panel:
     marks: list[Mark] = []
     if a["transient_chaos"]:
         middle, wide = float(a["mean_periods"]), SIGMAS * float(a["stderr"])
-        start = float(a["from_period"])
         marks = [
             Span((middle - wide, middle + wide), axis="y", colour=_BAND),
             Level(middle, colour=_FIT, width=1.4, path="fitted", order=1.0),
-            Level(start, axis="x", colour=QUIET, dash=_MARK),
+            Level(float(a["from_period"]), axis="x", colour=QUIET, dash=_MARK),
         ]
     rough = chance <= _LEAST_SIGNIFICANT
     spots: dict[str, Any] = {"size": 4.0, "edge": INK, "edge_width": 0.8, "order": 3.0}
-    exponential = "from here on exponential, with standard error"
+    said = "from here on exponential, with standard error"
     not_so = "not exponential at the 5 % level"
     marks += [
         Line(*bars(begin, mean - error, mean + error), colour=QUIET, width=0.8, path="error"),
-        Points(begin, mean, name=exponential, path="mean", **spots),
+        Points(begin, mean, name=said, path="mean", **spots),
         Points(begin[rough], mean[rough], fill="white", name=not_so, **spots),
     ]
     precise = error < np.maximum(0.25 * mean, 1e-9)

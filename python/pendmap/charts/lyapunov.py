@@ -10,8 +10,21 @@ import numpy as np
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import DASHED, INK, QUIET, Band, Level, Line, Mark, Points, Span, Steps
-from pendmap.formatting import counted, with_error
+from pendmap.charts.marks import (
+    DASHED,
+    INK,
+    NONE,
+    QUIET,
+    ZERO,
+    Band,
+    Level,
+    Line,
+    Mark,
+    Points,
+    Span,
+    Steps,
+)
+from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -27,25 +40,15 @@ _WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Width of a figure by its number of
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return growth and exponent; for chaos the distribution, and in recordings the attractor."""
     del cells
-    a = dataset.attrs
     panels = [_growth(dataset)]
     if dataset.sizes["window"]:
         panels += [_average(dataset), _distribution(dataset)]
     else:
         panels.append(_sliding(dataset))
-    units = Units.of(a)
-    start = f"from \N{GREEK SMALL LETTER THETA} = {float(a['theta0']):.6g}, "
-    start += f"{names.velocity(units)} = {units.spoken(format(float(a['velocity0']), '.6g'))}"
-    rows = [[panel.name for panel in panels]]
-    if dataset.sizes["point"]:
-        panels.append(_attractor(dataset))
-    return Chart(
-        _title(dataset),
-        f"{names.parameters(a)};   {start}".replace("-", "\N{MINUS SIGN}"),
-        panels,
-        rows=rows,
-        size=(_WIDTHS[len(rows[0])], 4.3),
-    ).only(layer, (_WIDTHS[1], 4.3))
+    attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
+    title, subtitle = _title(dataset), names.with_start(dataset.attrs)
+    look: dict[str, Any] = {"recorded": [*panels, *attractor], "size": (_WIDTHS[len(panels)], 4.3)}
+    return Chart(title, subtitle, [panels], **look).only(layer, (_WIDTHS[1], 4.3))
 
 
 def _title(dataset: xr.Dataset) -> str:
@@ -66,8 +69,8 @@ def _value(dataset: xr.Dataset) -> str:
     exponent, error = float(a["exponent"]), float(a["stderr"])
     if not math.isfinite(exponent):
         return ""
-    said = with_error(exponent, error, "\N{PLUS-MINUS SIGN}").replace("-", "\N{MINUS SIGN}")
-    return f"\N{GREEK SMALL LETTER LAMDA} = {said} {names.per_time(Units.of(a))}"
+    said = typographic(with_error(exponent, error))
+    return f"λ = {said} {names.per_time(Units.of(a))}"
 
 
 def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
@@ -77,36 +80,32 @@ def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
 
 
 def _rate(dataset: xr.Dataset) -> str:
-    return f"\N{GREEK SMALL LETTER LAMDA} ({names.per_time(Units.of(dataset.attrs))})"
+    return f"λ ({names.per_time(Units.of(dataset.attrs))})"
 
 
 def _transient(dataset: xr.Dataset) -> list[Mark]:
     periods = max(int(dataset.attrs["transient_periods"]), 0)
     said = f"transient, {counted(periods, 'period')}"
-    marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
-    return [Span((0, periods), colour=_TRANSIENT, name=said), *marks] if periods else marks
+    return [Span((0, periods), colour=_TRANSIENT, name=said), ZERO] if periods else [ZERO]
+
+
+def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the look and the name of lines that show the exponent."""
+    return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
 
 
 def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
     value = float(dataset.attrs["exponent"])
-    if not math.isfinite(value):
-        return []
-    said = _value(dataset)
-    look: dict[str, Any] = {
-        "colour": _MEAN,
-        "width": 1.6,
-        "dash": DASHED,
-        "name": said,
-        "path": "value",
-    }
-    return [Level(value, axis=axis, order=2.0, **look)]
+    known = math.isfinite(value)
+    look = _mean_look(dataset)
+    return [Level(value, axis=axis, order=2.0, path="value", **look)] if known else []
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
     a, periods, growth = dataset.attrs, dataset["elapsed"].values, dataset["growth"].values
     marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
-    look: dict[str, Any] = {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
+    look = _mean_look(dataset)
     if math.isfinite(rate) and math.isfinite(a["stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.
@@ -114,9 +113,9 @@ def _growth(dataset: xr.Dataset) -> Panel:
         line = last + rate * (periods[begin:] - periods[-1])
         marks.append(Line(periods[begin:], line, **look))
     elif math.isfinite(float(a["exponent"])):
-        marks.append(Line(periods[:0], growth[:0], **look))
+        marks.append(Line(NONE, NONE, **look))
     across = Axis("periods since the start", _elapsed(dataset))
-    up = Axis("ln |\N{GREEK SMALL LETTER DELTA}x|", holding(growth, 0.0))
+    up = Axis("ln |δx|", holding(growth, 0.0))
     return Panel("growth", "growth along the start's own trajectory", across, up, marks)
 
 
@@ -128,12 +127,12 @@ def _average(dataset: xr.Dataset) -> Panel:
     shown = [mean]
     if math.isfinite(a["stderr"]):
         low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
-        said = f"\N{PLUS-MINUS SIGN}{_SIGMAS} standard errors of the mean"
+        said = f"±{_SIGMAS} standard errors of the mean"
         marks.append(Band(periods, low, high, colour=_BAND, name=said, path="band"))
         shown += [low, high]
     if a["end"] == "undamped":
         regular = np.log1p(periods / a["dropped_periods"]) / (periods * a["forcing_period"])
-        said = "regular motion: deviations grow as \N{GREEK SMALL LETTER TAU}"
+        said = "regular motion: deviations grow as τ"
         marks.append(Line(periods, regular, width=1.0, dash=":", name=said, colour=INK, order=4.0))
         shown.append(regular)
     marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
@@ -180,7 +179,7 @@ def _distribution(dataset: xr.Dataset) -> Panel:
 def _attractor(dataset: xr.Dataset) -> Panel:
     name, kind = (str(dataset[key].values[0]) for key in ("attractor", "kind"))
     theta = plane.angles(dataset, dataset["point_theta"].values)
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    points = plane.points(dataset)
     at = plane.copies(dataset, points, *theta)
     size = 2.0 if kind.endswith("chaos") else 7.0
     spots = Points(*at.T, colour=palette.colour(name, kind), size=size, path="points")

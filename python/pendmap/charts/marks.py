@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.float64]
 Dash = str | tuple[float, ...]
 Ends = tuple[float, float]
 
+NONE: Final = np.empty(0)  # Coordinates of a mark that the legend alone shows
 INK, QUIET, ALARM = "#222222", "#666666", "#a61c00"
 """Colours of text and axes, of secondary elements, and of warnings."""
 DASHED, DOTTED = (4.0, 2.0), (1.2, 1.2)  # Dashes: lengths of lines and gaps, in line widths
@@ -139,6 +140,9 @@ class Level(Mark):
     axis: Literal["x", "y"] = "y"
     width: float = 0.7
     dash: Dash = "-"
+
+
+ZERO: Final = Level(0.0, colour=QUIET, width=0.6, order=0.0)  # Line at 0, below other marks
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,21 +33,19 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
     apart = np.abs(at["forward"] - at["backward"]) if {"forward", "backward"} <= set(at) else p[:0]
     alike = bool(np.isfinite(apart).any()) and bool(np.nanmax(apart) < 1e-9 * top)
-    looped = "loop" in at
+    said = {"forward": "threshold, forward", "backward": "threshold, backward"}
+    if "loop" in at:
+        said = {name: f"heteroclinic, {name}" for name in said}
+    elif alike:
+        said = {"forward": "threshold, both branches", "backward": ""}
+    said["loop"] = "homoclinic, loop of upright rest"
     marks: list[Mark] = []
     for name, (colour, dash) in _LOOKS.items():
         if name not in at or not (at[name] <= top).any():
             continue
-        said = {
-            "loop": "homoclinic, loop of upright rest",
-            "forward": "threshold, both branches" if alike else "threshold, forward",
-        }.get(name, "" if alike else f"threshold, {name}")
-        if looped and name != "loop":
-            said = f"heteroclinic, {name}"
-        marks.append(
-            Line(omega, at[name], colour=colour, dash=dash, width=1.6, name=said, path=name)
-        )
-        if said:
+        look: dict[str, Any] = {"colour": colour, "dash": dash, "name": said[name], "path": name}
+        marks.append(Line(omega, at[name], width=1.6, **look))
+        if said[name]:
             high = np.full_like(omega, top)
             marks.append(Band(omega, at[name], high, colour=colour, alpha=0.10))
     damped = np.nanmax(at.get("loop", p), initial=0.0) > 0
@@ -58,11 +56,11 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Text(0.5, 0.93, f"manifolds cross: {follows}", inside=True, boxed=True, colour=QUIET),
     ]
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
-    across = Axis("\N{GREEK SMALL LETTER OMEGA} = \N{GREEK CAPITAL LETTER OMEGA}/w0", x)
-    up = Axis("p = Y\N{GREEK CAPITAL LETTER OMEGA}\N{SUPERSCRIPT TWO}/g", (0.0, top))
+    across = Axis("ω = Ω/w0", x)
+    up = Axis("p = YΩ²/g", (0.0, top))
     panel = Panel("melnikov", "", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
-    return Chart(title, names.parameters(a), [panel], ratio=0.68).only(layer)
+    return Chart(title, names.parameters(a), [[panel]], ratio=0.68).only(layer)
 
 
 def _highest(p: np.ndarray, own: float) -> float:

@@ -20,7 +20,6 @@ MEASURED: Final = "#222222"
 NOISE: Final = "#d9d9d9"
 NOISE_SAID: Final = "95 % of the readings' noise"
 """Colour and name of the band of the readings' noise."""
-MINUS: Final = "\N{MINUS SIGN}"  # Minus sign in charts
 Z95: Final = 1.959963984540054  # Half width of a 95 % interval, standard errors
 
 
@@ -69,4 +68,4 @@ def nothing(title: str, why: str, letters: int = 90) -> Chart:
     """Return a chart with the reason for an empty figure, in lines of at most ``letters``."""
     why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
     words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
-    return Chart(title, "", [bare("nothing", words)], size=(8.6, 0.9))
+    return Chart(title, "", [[bare("nothing", words)]], size=(8.6, 0.9))

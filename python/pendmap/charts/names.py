@@ -9,7 +9,8 @@ import numpy as np
 
 from pendmap.charts import plane
 from pendmap.charts.chart import Axis, holding
-from pendmap.charts.marks import DOTTED, QUIET, Level, Mark
+from pendmap.charts.marks import DOTTED, QUIET, ZERO, Level, Mark
+from pendmap.formatting import typographic
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.quantities import COUNTERPARTS
@@ -18,18 +19,18 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
+    import numpy.typing as npt
+
     from pendmap.charts.marks import Ends, Floats
 
-_TAU: Final = "\N{GREEK SMALL LETTER TAU}"
-_THETA: Final = "\N{GREEK SMALL LETTER THETA}"
-
-ANGLE: Final = f"{_THETA} (rad)"  # The angle, with its unit
+ANGLE: Final = "θ (rad)"  # The angle, with its unit
 TIME: Final = "t (s)"  # Time in SI, with its unit
 _TURN: Final = 2.0  # Range of angles above which labels are multiples of pi, rad
 _LONG: Final = 5  # Characters of a label above which an axis is in thousandths of its unit
 _MOSTLY: Final = 95
 """Percentile of absolute values that the linear part of a signed logarithmic axis contains."""
 _NEAR: Final = 12.0  # Range of an axis over its linear part up to which it is linear
+_WIDE: Final = 8.0  # Ratio of positive values above which their axis is logarithmic
 _BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
 _SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
 """Parameters of a nondimensional model and of one in SI, in the order of a subtitle."""
@@ -41,7 +42,7 @@ _LABORATORY: Final = {"stroke_mm": "p", "frequency_hz": "Omega"}
 
 def velocity(units: Units) -> str:
     """Return the symbol of the velocity."""
-    return f"d{_THETA}/dt" if units.si else f"d{_THETA}/d{_TAU}"
+    return "dθ/dt" if units.si else "dθ/dτ"
 
 
 def speed(units: Units) -> str:
@@ -51,12 +52,12 @@ def speed(units: Units) -> str:
 
 def clock(units: Units) -> str:
     """Return the symbol of time with its unit, separated by a blank."""
-    return TIME if units.si else _TAU
+    return TIME if units.si else "τ"
 
 
 def per_time(units: Units) -> str:
     """Return the unit of an exponent in words."""
-    return "per second" if units.si else f"per unit {_TAU}"
+    return "per second" if units.si else "per unit τ"
 
 
 def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
@@ -88,7 +89,15 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
     ]
     acting = [effect.title(units, without).replace("_", " ") for effect in effects_of(attrs)]
     listed = (",  ".join(part.rstrip() for part in each) for each in (parts, acting) if each)
-    return ";   ".join(listed).replace("-", "\N{MINUS SIGN}")
+    return typographic(";   ".join(listed))
+
+
+def with_start(attrs: Mapping[Any, Any]) -> str:
+    """Return the model's parameters and the start of a trajectory in one line."""
+    units = Units.of(attrs)
+    speed = units.spoken(f"{float(attrs['velocity0']):.6g}")
+    start = f"from θ = {float(attrs['theta0']):.6g}, {velocity(units)} = {speed}"
+    return f"{parameters(attrs)};   {typographic(start)}"
 
 
 def seconds(time: Floats) -> Axis:
@@ -106,6 +115,16 @@ def angle(ends: Ends, name: str = ANGLE) -> Axis:
     return Axis(name, ends)
 
 
+def sizes(name: str, *values: npt.ArrayLike) -> Axis:
+    """Return an axis of positive values from 0, or a logarithmic one if they differ much."""
+    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    every = every[np.isfinite(every)]
+    low, high = float(every.min()), float(every.max())
+    if high > _WIDE * low > 0:
+        return Axis(name, (low / 1.4, 1.5 * high), "log")
+    return Axis(name, (0.0, 1.15 * high))
+
+
 def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:
     """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale.
 
@@ -119,10 +138,9 @@ def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tupl
     inner = min(float(np.percentile(np.abs(each), _MOSTLY)) for each in known)
     inner = 10.0 ** math.ceil(math.log10(max(inner, least)) - 0.3)
     low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
-    zero = Level(0.0, colour=QUIET, width=0.6, order=0.0)
     if max(-low, high) <= _NEAR * inner:
-        return Axis(name, holding([low, high, 0.0])), [zero]
+        return Axis(name, holding([low, high, 0.0])), [ZERO]
     ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
     bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
-    said = f"{name}\nlog beyond \N{PLUS-MINUS SIGN}{plane.power(inner)}"
-    return Axis(said, ends, "signed", straight=inner), [zero, *bends]
+    said = f"{name}\nlog beyond ±{plane.power(inner)}"
+    return Axis(said, ends, "signed", straight=inner), [ZERO, *bends]

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import INK, QUIET, Line, Mark, Points
-from pendmap.formatting import counted
+from pendmap.charts.marks import DASHED, INK, NONE, QUIET, Line, Mark, Points, together
+from pendmap.formatting import counted, typographic
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     """Return the orbits: full lines and points if stable, broken lines and open points if not."""
     del cells
     units = Units.of(dataset.attrs)
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    points = plane.points(dataset)
     paths = [_path(dataset, dataset["path_orbit"].values == i) for i in dataset["id"].values]
     every = np.concatenate([points, *paths])
     every = every[np.isfinite(every).all(axis=1)]
@@ -43,15 +43,14 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
         marks += _orbit(dataset, int(k), paths[k], plane.copies(dataset, own, *theta))
     if dataset.sizes["orbit"] > MOST:
-        none = np.empty(0)
         more = f"and {dataset.sizes['orbit'] - MOST} more"
-        marks.append(Points(none, none, marker="none", name=more))
+        marks.append(Points(NONE, NONE, marker="none", name=more))
     across, up = names.phase_plane(theta, velocity, units)
     low, high = (units.bare(end, VELOCITY) for end in velocity)
     return Chart(
         _title(dataset),
         names.parameters(dataset.attrs) + over,
-        [Panel("phase", "", across, up, marks)],
+        [[Panel("phase", "", across, up, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         remark="" if dataset.sizes["orbit"] else "No orbit was found.",
     ).only(layer)
@@ -73,55 +72,34 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     moduli = np.hypot(*np.moveaxis(row["multipliers"].values, -1, 0))
     largest = float(np.nanmax(moduli)) if np.isfinite(moduli).any() else math.nan
     says = "stable" if stable else "unstable"
-    said = f"{typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
-    named = sorted(dataset["id"].values)[:MOST]
+    said = f"{number}: {typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
+    named = number in sorted(dataset["id"].values)[:MOST]
     colour = palette.colour(name, str(row["kind"].values))
+    look: dict[str, Any] = {"colour": colour, "name": said if named else ""}
     # Pale colours on white, and all colours in grey, need an edge.
-    look: dict[str, Any] = {
-        "colour": colour,
-        "name": f"{number}: {said}" if number in named else "",
-    }
-    return [
-        Line(
-            *path.T,
-            width=1.6 if stable else 1.0,
-            dash="-" if stable else (4.0, 2.0),
-            halo=QUIET,
-            path=f"{number}/path",
-            **look,
-        ),
-        Points(
-            *at.T,
-            size=5.0,
-            edge=INK,
-            edge_width=1.0,
-            fill="" if stable else "white",
-            order=4.0,
-            clip=False,
-            path=f"{number}/points",
-            **look,
-        ),
-    ]
+    line: dict[str, Any] = {"halo": QUIET, "path": f"{number}/path"}
+    line |= {"width": 1.6} if stable else {"width": 1.0, "dash": DASHED}
+    spots: dict[str, Any] = {"edge": INK, "edge_width": 1.0, "fill": "" if stable else "white"}
+    spots |= {"size": 5.0, "order": 4.0, "clip": False, "path": f"{number}/points"}
+    return [Line(*path.T, **(line | look)), Points(*at.T, **(spots | look))]
 
 
 def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
     """Return the motion in the phase plane, broken by rows of nan where the angle wraps."""
-    theta, velocity = dataset["path_theta"].values[mine], dataset["path_velocity"].values[mine]
-    piece = dataset["path_piece"].values[mine]
-    gap = np.full((1, 2), np.nan)
-    parts = [np.empty((0, 2))]
-    for k in np.unique(piece):
-        own = piece == k
-        whole = np.stack([theta[own], velocity[own]], axis=1)
-        broken = plane.broken_at_wrap(theta[own], velocity[own])
-        parts += [whole if plane.on_line(dataset) else broken, gap]
-    return np.concatenate(parts)
+    piece = dataset["path_piece"].values
+    lines = []
+    for k in np.unique(piece[mine]):
+        own = mine & (piece == k)
+        motion = dataset["path_theta"].values[own], dataset["path_velocity"].values[own]
+        whole = np.stack(motion, axis=1)
+        lines.append(whole if plane.on_line(dataset) else plane.broken_at_wrap(*motion))
+    return np.stack(together(lines), axis=1)
 
 
 def _title(dataset: xr.Dataset) -> str:
     n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
     count = dataset.sizes["orbit"]
-    signed = "0" if w == 0 else f"{w:+d}".replace("-", "\N{MINUS SIGN}")
+    signed = "0" if w == 0 else typographic(f"{w:+d}")
     if count == 0:
         return f"No orbit {n}:{signed}"
     return f"{'The orbit' if count == 1 else f'All {count} orbits'} {n}:{signed}"

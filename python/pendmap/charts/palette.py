@@ -28,6 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.formatting import MINUS
+
 UNDECIDED = "#e4e4e4"
 """Cells not decided within the bound (label 0)."""
 
@@ -143,7 +145,8 @@ def colour(name: str, kind: str | None = None) -> str:
 
     ``kind`` is only needed if the name does not begin with it.
     """
-    return _shade(name, kind)[0]
+    shade, round_ = _place(_read(name, kind))
+    return _mixed(shade[0], round_) if round_ else shade[0]
 
 
 def rgb(name: str, kind: str | None = None) -> tuple[int, int, int]:
@@ -158,7 +161,7 @@ def parts(code: str) -> tuple[int, int, int]:
 
 def describe(name: str, kind: str | None = None) -> str:
     """Return the colour's name in words, for a legend that cannot show it: ``"sky blue"``."""
-    return _shade(name, kind)[1]
+    return in_words(colour(name, kind))
 
 
 def direction(name: str, kind: str | None = None) -> int:
@@ -173,7 +176,11 @@ def _words() -> dict[str, str]:
         shade for family in _DIRECTED.values() for side in family.values() for shade in side
     ]
     shades = [*_SINGLE.values(), *directed, *(s for some in _OSCILLATION.values() for s in some)]
-    mixed = [_mixed(shade, k) for k in range(1, len(_LAPS) + 1) for shade in shades]
+    mixed = [
+        (_mixed(code, k), f"{word} {name}")
+        for k, (_, _, word) in enumerate(_LAPS, 1)
+        for code, name in shades
+    ]
     grey = [(UNNAMED, "grey"), ("#222222", "grey"), ("#666666", "grey")]
     return dict(reversed([*grey, *shades, *mixed]))
 
@@ -204,16 +211,11 @@ def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     return np.round(np.stack(mixed, axis=-1)).astype(np.uint8)
 
 
-def _shade(name: str, kind: str | None) -> _Shade:
-    shade, round_ = _place(_read(name, kind))
-    return _mixed(shade, round_) if round_ else shade
-
-
-def _mixed(shade: _Shade, round_: int) -> _Shade:
-    """Return a shade mixed for a repetition of its family's colours."""
-    ground, part, word = _LAPS[(round_ - 1) % len(_LAPS)]
-    mixed = [round((1 - part) * int(shade[0][k : k + 2], 16) + part * ground) for k in (1, 3, 5)]
-    return "#" + "".join(f"{value:02x}" for value in mixed), f"{word} {shade[1]}"
+def _mixed(code: str, round_: int) -> str:
+    """Return a colour mixed for a repetition of its family's colours."""
+    ground, part, _ = _LAPS[(round_ - 1) % len(_LAPS)]
+    mixed = (round((1 - part) * value + part * ground) for value in parts(code))
+    return "#{:02x}{:02x}{:02x}".format(*mixed)
 
 
 def _place(read: _Read) -> tuple[_Shade, int]:
@@ -234,7 +236,7 @@ def _place(read: _Read) -> tuple[_Shade, int]:
 
 
 def _read(name: str, kind: str | None) -> _Read:
-    words = name.replace("\N{MINUS SIGN}", "-").replace("_", " ").lower().strip()
+    words = name.replace(MINUS, "-").replace("_", " ").lower().strip()
     found = next((k for k in _KINDS if words.startswith(k.replace("_", " "))), None)
     found = found or (kind or "").lower().replace(" ", "_")
     numbers = _NUMBERS.search(words)

@@ -13,6 +13,7 @@ from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -38,7 +39,11 @@ _MOST_COUNT: Final = 8  # Largest count that has its own colour
 _MOST, _LEAST = 13, 0.002
 """Greatest number of named kinds, and the least share of the cells with one."""
 
-_OTHERS = {"oscillation": "oscillation, other periods", "rotation": "rotation, others"}
+_OTHERS = {
+    "oscillation": ("oscillation, other periods", "oscillation 12:0"),
+    "rotation": ("rotation, others", "rotation 9:+9"),
+}
+"""Names of the rare kinds of a family together, and the attractors whose colour they have."""
 
 
 @dataclass(frozen=True)
@@ -82,20 +87,16 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
     for name, here in presence.items():
         family = name.split()[0]
         if name in frequent or family not in _OTHERS:
-            found.append(_kind(name, _named(name), (name,), here))
+            found.append(Kind(name, palette.colour(_named(name)), (name,), here))
         else:
             rare.setdefault(family, []).append(name)
     for family, members in rare.items():
         own = [set(members) & set(one) for one in sets(dataset)]
         total = float(sum(s for s, has in zip(share, own, strict=True) if has))
-        name = _OTHERS[family] if len(members) > 1 else members[0]
-        like = "oscillation 12:0" if family == "oscillation" else "rotation 9:+9"
-        found.append(_kind(name, like, tuple(members), total))
+        several, like = _OTHERS[family]
+        name = several if len(members) > 1 else members[0]
+        found.append(Kind(name, palette.colour(like), tuple(members), total))
     return sorted(found, key=lambda kind: _place(kind.name))
-
-
-def _kind(name: str, like: str, members: tuple[str, ...], presence: float) -> Kind:
-    return Kind(name, palette.colour(like), members, presence)
 
 
 def _named(name: str) -> str:
@@ -167,12 +168,12 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     fixed = names.parameters(dataset.attrs, varied)
     shape: tuple[Any, ...] = dataset["regime"].shape
     starts = int(dataset.attrs["starts"])
-    size = f"{shape[1]} \N{MULTIPLICATION SIGN} {shape[0]} cells, {starts} starts each"
+    size = f"{shape[1]} × {shape[0]} cells, {starts} starts each"
     return Chart(
         f"Attractors over {' and '.join(name.split(' (')[0] for name in symbols)}",
         f"{fixed};   {size}",
-        panels,
-        rows=[shown if layer else leading],
+        [panels[: len(leading)]],
+        recorded=panels,
         ratio=0.85,
         tabs=True,
     )
@@ -246,17 +247,12 @@ def _curves(dataset: xr.Dataset) -> list[Mark]:
     for k, (name, dash, lines) in enumerate(
         (
             ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
-            ("rest: multiplier \N{MINUS SIGN}1", "--", tongues.joined(omega, rows, -1)),
+            (typographic("rest: multiplier -1"), "--", tongues.joined(omega, rows, -1)),
             ("fold of the oscillation born there", ":", [fold]),
         )
     ):
         x, y = together(line[:, ::-1] if turned else line for line in lines)
         if np.isfinite(x + y).sum() > 1:
-            look: dict[str, Any] = {
-                "width": 1.1,
-                "halo": "#ffffff",
-                "name": name,
-                "path": f"curves/{k}",
-            }
-            found.append(Line(x, y, dash=dash, order=2.0, **look))
+            look: dict[str, Any] = {"name": name, "dash": dash, "path": f"curves/{k}"}
+            found.append(Line(x, y, width=1.1, halo="#ffffff", order=2.0, **look))
     return found

@@ -1,4 +1,4 @@
-"""Phase-plane geometry: cell edges, ticks, thinned maps, copies of points, wrapped curves."""
+"""Geometry of panels: cell edges, ticks, thinned maps and curves, copies of points, wrapping."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,6 +98,11 @@ def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
     return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
 
 
+def points(dataset: xr.Dataset) -> Floats:
+    """Return the stroboscopic points of a result, shape (m, 2): angle in rad, velocity."""
+    return np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+
+
 def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
     """Return the points, shape (m, 2), in [low, high], with their copies shifted by 2 pi k.
 
@@ -121,8 +128,7 @@ def angle_ticks(low: float, high: float) -> Ticks:
     for quarters in (2**k for k in range(12)):
         step = quarters * math.pi / 4
         if FEWEST <= (high - low) / step <= MOST:
-            first, last = _between(low, high, step)
-            return [(k * step, _multiple_of_pi(k * quarters)) for k in range(first, last + 1)]
+            return [(k * step, _multiple_of_pi(k * quarters)) for k in _between(low, high, step)]
     return plain_ticks(low, high)
 
 
@@ -134,9 +140,8 @@ def plain_ticks(low: float, high: float) -> Ticks:
         return [(low, _written(low, 17))]  # narrower than the resolution of floating-point numbers
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(m * power for m in (1, 2, 2.5, 5, 10) if m * power >= raw * 0.999)
-    first, last = _between(low, high, step)
     digits = min(17, max(6, 3 + math.floor(math.log10(size / step))))
-    return [(k * step, _written(k * step, digits)) for k in range(first, last + 1)]
+    return [(k * step, _written(k * step, digits)) for k in _between(low, high, step)]
 
 
 def log_ticks(low: float, high: float) -> list[float]:
@@ -164,7 +169,7 @@ def power(value: float) -> str:
     size = math.log10(abs(value))
     if abs(size - round(size)) < 1e-9 and not -3 <= size <= 3:  # noqa: PLR2004
         return f"${'-' * (value < 0)}10^{{{round(size)}}}$"
-    return f"{value:g}".replace("-", "\N{MINUS SIGN}", value < 0)
+    return typographic(f"{value:g}")
 
 
 def shifted(name: str, shift: float) -> str:
@@ -172,8 +177,8 @@ def shifted(name: str, shift: float) -> str:
     if not shift:
         return name
     symbol, _, unit = name.partition(" ")
-    sign = "\N{MINUS SIGN}" if shift > 0 else "+"
-    return f"{symbol} {sign} {abs(shift):.15g} {unit}".strip()
+    sign = "-" if shift > 0 else "+"
+    return typographic(f"{symbol} {sign} {abs(shift):.15g} {unit}".strip())
 
 
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
@@ -193,6 +198,24 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
     gap = np.full_like(edge, np.nan)
     extra = np.stack([edge, crossing, gap, gap, -edge, crossing], axis=1).reshape(-1, 2)
     return np.insert(curve, np.repeat(at + 1, 3), extra, axis=0)
+
+
+def envelope(time: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest sample of a curve in each of ``bins`` bins.
+
+    The samples are in order of time, with the first and the last one. A curve of at most two
+    samples per bin is returned unchanged.
+    """
+    count = values.size
+    if count <= 2 * bins:
+        return time, values
+    edges = np.linspace(0, count, bins + 1).astype(np.int64)
+    # Bins differ by at most one sample: padded to the longest, each bin is a row.
+    rows = np.minimum(edges[:-1, None] + np.arange(np.diff(edges).max()), edges[1:, None] - 1)
+    of_rows, each = values[rows], np.arange(bins)
+    lowest, highest = (rows[each, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
+    at = np.unique(np.concatenate([[0, count - 1], lowest, highest]))
+    return time[at], values[at]
 
 
 def wrapped(theta: Floats) -> Floats:
@@ -221,11 +244,11 @@ def _offset(low: float, high: float) -> float:
 
 
 def _written(value: float, digits: int) -> str:
-    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+    return typographic(f"{value:.{digits}g}")
 
 
-def _between(low: float, high: float, step: float) -> tuple[int, int]:
-    return math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+def _between(low: float, high: float, step: float) -> range:
+    return range(math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6) + 1)
 
 
 def _multiple_of_pi(quarters: int) -> str:
@@ -234,6 +257,5 @@ def _multiple_of_pi(quarters: int) -> str:
         return "0"
     divisor = math.gcd(quarters, 4)
     top, bottom = abs(quarters) // divisor, 4 // divisor
-    sign = "\N{MINUS SIGN}" if quarters < 0 else ""
-    below = f"/{bottom}" if bottom > 1 else ""
-    return f"{sign}{top if top > 1 else ''}\N{GREEK SMALL LETTER PI}{below}"
+    sign, below = "-" if quarters < 0 else "", f"/{bottom}" if bottom > 1 else ""
+    return typographic(f"{sign}{top if top > 1 else ''}π{below}")

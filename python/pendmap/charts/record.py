@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
-from pendmap.formatting import moment
+from pendmap.formatting import listed, moment, typographic
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
 from pendmap.signal.local_polynomial import local_fit
@@ -43,12 +43,10 @@ def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
 def _one(run: Run, width: float) -> Chart:
     noted = _listed(run, max(int((width - 1.0) / 0.073), 20))
     last = _decay(run) if run.peaks_only else _residuals(run)
-    panels = [_flags(run, width), _history(run), _intervals(run), last]
     return Chart(
         f"Record {run.name}",
         _subtitle(run),
-        panels,
-        rows=[["flags"], ["history"], ["clock", "last"]],
+        [[_flags(run, width)], [_history(run)], [_intervals(run), last]],
         heights=(0.15, 1.25, 1.0),
         size=(width, 6.3 + 0.19 * len(noted)),
         notes=noted,
@@ -59,9 +57,8 @@ def _subtitle(run: Run) -> str:
     if run.peaks_only:
         return f"{run.time.size} turning points, {moment(run.time[0])} to {moment(run.time[-1])} s"
     said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
-    said = said.replace("+-", "\N{PLUS-MINUS SIGN}")
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {said}"
+    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(said)}"
 
 
 def _listed(run: Run, letters: int) -> list[str]:
@@ -79,7 +76,6 @@ def _listed(run: Run, letters: int) -> list[str]:
 
 def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
     """Return marks of the samples: those for fitting, others, and isolated outliers."""
-    few: dict[str, Any] = {"size": 2.2}
     alone = _lone(~run.trusted)
     steps = np.diff(run.time)
     # A line from the previous sample would cross a gap.
@@ -95,7 +91,7 @@ def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
             line = np.insert(time, breaks, time[breaks]), np.insert(shown, breaks, np.nan)
             marks.append(Line(*line, width=width, **look))
         if run.peaks_only or time.size < FEW:
-            marks.append(Points(time[which], run.theta[which], **few, **look))
+            marks.append(Points(time[which], run.theta[which], size=2.2, **look))
     if alone.any():
         cross: dict[str, Any] = {"colour": FALSE, "marker": "x", "size": 4.5, "edge_width": 1.0}
         marks.append(Points(time[alone], run.theta[alone], name="outliers", **cross))
@@ -122,8 +118,8 @@ def _history(run: Run) -> Panel:
 def _flags(run: Run, width: float) -> Panel:
     """Return the numbers of findings at their times, in two rows without overlap."""
     low, high = float(run.time[0]), float(run.time[-1])
-    ends = holding(run.time, margin=0.01)
-    inches = (width - 1.0) / (ends[1] - ends[0])
+    begin, end = holding(run.time, margin=0.01)
+    inches = (width - 1.0) / (end - begin)
     taken: list[list[float]] = [[], []]
     marks: list[Mark] = []
     for number, found in enumerate(run.findings, 1):
@@ -132,23 +128,20 @@ def _flags(run: Run, width: float) -> Panel:
         left, right = max(found.from_s, low), min(found.to_s, high)
         if right < low or left > high:
             continue
-        at = (left - ends[0]) * inches
+        at = (left - begin) * inches
         row = next((r for r in (0, 1) if all(abs(at - x) > APART for x in taken[r])), None)
         if row is None:
             continue
         taken[row].append(at)
         colour = QUIET if found.mended else ALARM
-        wide = right - left > SHORT * (high - low) and not found.where.startswith("row")
-        place = np.array([left, right]) if wide else np.array([left])
-        height = np.full(place.size, row + 0.12)
-        marks.append(
-            Line(place, height, colour=colour, width=1.6)
-            if wide
-            else Points(place, height, colour=colour, marker="v", size=3.5)
-        )
+        ends, height = np.array([left, right]), np.full(2, row + 0.12)
+        if right - left > SHORT * (high - low) and not found.where.startswith("row"):
+            marks.append(Line(ends, height, colour=colour, width=1.6))
+        else:
+            marks.append(Points(ends[:1], height[:1], colour=colour, marker="v", size=3.5))
         side = ("center", "bottom")
         marks.append(Text(left, row + 0.28, str(number), colour=colour, align=side, size=8.0))
-    return Panel("flags", "", Axis("", ends), Axis("", (0.0, 2.0)), marks, bare=True)
+    return Panel("flags", "", Axis("", (begin, end)), Axis("", (0.0, 2.0)), marks, bare=True)
 
 
 def _intervals(run: Run) -> Panel:
@@ -157,12 +150,11 @@ def _intervals(run: Run) -> Panel:
     usual = float(np.median(steps))
     low, high = float(steps.min()), float(steps.max())
     wide = high > 20 * max(low, 1e-9 * usual)
-    pad = max(0.05 * (high - low), 0.02 * usual)
-    edges = (
-        np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
-        if wide
-        else np.linspace(low - pad, high + pad, 61)
-    )
+    if wide:
+        edges = np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
+    else:
+        pad = max(0.05 * (high - low), 0.02 * usual)
+        edges = np.linspace(low - pad, high + pad, 61)
     counts = np.maximum(np.histogram(steps, edges)[0], 1e-3)
     ends = float(edges[0]), float(edges[-1])
     across = Axis("interval (ms)", ends, "log" if wide else "plain")
@@ -175,7 +167,7 @@ def _decay(run: Run) -> Panel:
     size = np.maximum(np.abs(run.theta), 1e-9)
     clock = Axis("t (s)", (float(run.time[0]), float(run.time[-1])))
     ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
-    up = Axis("|\N{GREEK SMALL LETTER THETA}| (rad)", ends, "log")
+    up = Axis("|θ| (rad)", ends, "log")
     return Panel("last", "the decay", clock, up, [Points(run.time, size, colour=USED, size=2.5)])
 
 
@@ -198,10 +190,10 @@ def _residuals(run: Run) -> Panel:
         marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
     top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
     # An angle changes with the velocity, a rate with the acceleration.
-    speeds = "|d\N{GREEK SMALL LETTER THETA}/dt| (rad/s)"
+    speeds = "|dθ/dt| (rad/s)"
     if run.gyroscope is not None:
-        two = "\N{SUPERSCRIPT TWO}"
-        speeds = f"|d{two}\N{GREEK SMALL LETTER THETA}/dt{two}| (rad/s{two})"
+        two = "²"
+        speeds = f"|d{two}θ/dt{two}| (rad/s{two})"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
     up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))
@@ -224,8 +216,7 @@ def _many(experiment: Experiment, width: float) -> Chart:
     return Chart(
         f"Experiment {experiment.path.resolve().name}",
         f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; "),
-        panels,
-        rows=[[panel.name] for panel in panels],
+        [[panel] for panel in panels],
         size=(width, 1.4 + 1.25 * len(runs)),
         letters=False,
     )
@@ -234,12 +225,8 @@ def _many(experiment: Experiment, width: float) -> Chart:
 def _said(run: Run) -> str:
     said: list[str] = [run.kind]
     if run.drive is not None:
-        said.append(
-            f"p = {run.drive['p']:g}, \N{GREEK CAPITAL LETTER OMEGA} = {run.drive['Omega']:g} rad/s"
-        )
+        said.append(f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s")
     if run.hold_out:
         said.append("held out")
-    keys = [found.what for found in run.findings][:3]
-    more = ", ..." if len(run.findings) > len(keys) else ""
-    said.append(", ".join(keys) + more)
+    said.append(listed([found.what for found in run.findings], 3))
     return f"{run.name}: " + ", ".join(filter(None, said))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import pkgutil
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -35,13 +34,9 @@ def kinds() -> list[str]:
 
 
 def _builder(kind: str) -> Builder | None:
-    if kind in BUILDERS:
-        return BUILDERS[kind]
-    name = f"pendmap.charts.{kind}"
-    if not kind.isidentifier() or importlib.util.find_spec(name) is None:
-        return None
-    found: Builder | None = getattr(importlib.import_module(name), "chart", None)
-    return found if callable(found) else None
+    if kind not in {module.name for module in pkgutil.iter_modules(charts.__path__)}:
+        return BUILDERS.get(kind)
+    return getattr(importlib.import_module(f"pendmap.charts.{kind}"), "chart", None)
 
 
 def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
@@ -58,7 +53,7 @@ def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
 
 def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
     """Return the chart of a dataset returned by :func:`ready`."""
-    builder = _builder(str(dataset.attrs["kind"]))
+    builder = _builder(dataset.attrs["kind"])
     if builder is None:
         raise InputError(f"no chart of kind {dataset.attrs['kind']!r}")
     return builder(dataset, layer=layer, cells=cells)

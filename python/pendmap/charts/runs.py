@@ -10,7 +10,6 @@ import numpy as np
 
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.curves import envelope
 from pendmap.charts.marks import Line
 from pendmap.units import Units
 
@@ -47,25 +46,23 @@ class RunPanel:
 def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
     """Return one panel per run, measured angle against time."""
     columns = min(len(runs), 2 if len(runs) <= COLUMNS else 3)
-    rows = -(-len(runs) // columns)
     panels = []
-    for k, run in enumerate(runs):
+    for run in runs:
         begin, end = float(run.time[0]), float(run.time[-1])
         clock = Axis(names.clock(Units(si=True)), (begin, max(end, begin + 1e-3)))
         up = Axis(names.ANGLE, plane.padded(run.angle), "angle")
         line = Line(*_curve(run), colour=_COLOUR, width=0.7)
-        panels.append(Panel(str(k), run.title, clock, up, [line]))
-    wide, high = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * rows)
+        panels.append(Panel("run", run.title, clock, up, [line]))
     grid = [panels[k : k + columns] for k in range(0, len(runs), columns)]
-    look = {"columns": columns, "size": (wide, high), "letters": False}
-    return Chart.of(title, subtitle, grid, **look)
+    size = (8.6, 3.4) if columns == 1 else (0.3 + 4.65 * columns, 0.9 + 1.85 * len(grid))
+    return Chart(title, subtitle, grid, columns=columns, size=size, letters=False)
 
 
 def _curve(run: RunPanel) -> tuple[Floats, Floats]:
     """Return the line of a record: broken at lost samples, thinned if it has many."""
     time, theta = run.time, run.angle
     if time.size > 2 * BINS:
-        return envelope(time, theta, BINS)
+        return plane.envelope(time, theta, BINS)
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else math.inf
     lost = np.flatnonzero(steps > LOST * usual) + 1

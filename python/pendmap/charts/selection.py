@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 _TABLES, _COLUMNS = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "part", "trajectory")
 """Dimensions before the axes of an image, and after them."""
 
-_KEYS = {"lyapunov": ("averaged",), "trajectory": ("event_time",)}
-"""Rising variables along dimensions without a coordinate."""
+_RISING = ("averaged", "event_time")  # Rising variables along dimensions without a coordinate
 
 _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "basins": {"fraction": ("attractor",)},
@@ -79,7 +78,7 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
                 f"{name} must be over {_listed(dimensions)} here, as isel and sel of ranges leave"
                 f" it, but {there}"
             )
-    dataset = _rising(dataset, _KEYS.get(kind, ()))
+    dataset = _rising(dataset)
     dataset = dataset.transpose(*_TABLES, *axes, *_COLUMNS, ..., missing_dims="ignore")
     count = _COUNTED.get(kind)
     return dataset if count is None else count(dataset)
@@ -105,12 +104,12 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
     return axes.get(str(a["kind"]), ())
 
 
-def _rising(dataset: xr.Dataset, keys: tuple[str, ...]) -> xr.Dataset:
+def _rising(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset in which numeric and kind coordinates rise."""
     numbers = [
         name for name in dataset.indexes if name == "kind" or dataset[name].dtype.kind in "iuf"
     ]
-    for name in [*numbers, *(key for key in keys if key in dataset)]:
+    for name in [*numbers, *(key for key in _RISING if key in dataset)]:
         values = dataset[name].values
         if not (values[:-1] <= values[1:]).all():
             dataset = dataset.sortby(name)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.curves import envelope
 from pendmap.charts.marks import QUIET, Level, Line, Mark, Points, Span
 from pendmap.units import Units
 
@@ -36,24 +35,16 @@ _EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the four parts; late parts of curves are dark."""
     del cells
-    attrs, units = dataset.attrs, Units.of(dataset.attrs)
-    start = f"from \N{GREEK SMALL LETTER THETA} = {float(attrs['theta0']):.6g}, "
-    start += f"{names.velocity(units)} = {units.spoken(format(float(attrs['velocity0']), '.6g'))}"
-    time = dataset["time"].values
+    clock, time = names.clock(Units.of(dataset.attrs)), dataset["time"].values
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
-    return Chart(
-        "Trajectory",
-        f"{names.parameters(attrs)};   {start}".replace("-", "\N{MINUS SIGN}"),
-        [
-            _history(dataset, Axis(names.clock(units) if layer else "", ends)),
-            _energy(dataset, Axis(names.clock(units), ends)),
-            _phase(dataset),
-            _section(dataset),
-        ],
-        rows=[["history"], ["energy"], ["phase", "section"]],
-        heights=(0.32, 0.2, 0.48),
-        size=(8.6, 8.2),
-    ).only(layer, _SIZES.get(layer or "", (5.6, 5.3)))
+    rows = [
+        [_history(dataset, Axis(clock if layer else "", ends))],
+        [_energy(dataset, Axis(clock, ends))],
+        [_phase(dataset), _section(dataset)],
+    ]
+    look: dict[str, Any] = {"heights": (0.32, 0.2, 0.48), "size": (8.6, 8.2)}
+    chart = Chart("Trajectory", names.with_start(dataset.attrs), rows, **look)
+    return chart.only(layer, _SIZES.get(layer or "", (5.6, 5.3)))
 
 
 def _history(dataset: xr.Dataset, clock: Axis) -> Panel:
@@ -86,7 +77,7 @@ def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
     late = _late(time)
     parts = ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE))
     return [
-        Line(*envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
+        Line(*plane.envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
         for part, colour in parts
     ]
 
@@ -111,11 +102,9 @@ def _phase(dataset: xr.Dataset) -> Panel:
         beginning = dataset["section_time"].values[-1 - MOST_PERIODS // 2]
         late = first = int(np.searchsorted(dataset["time"].values, beginning))
         which = f", the last {MOST_PERIODS // 2} periods"
+    parts = ((slice(first, late + 1), _EARLY, 0.5), (slice(late, None), _LATE, 0.7))
     marks: list[Mark] = []
-    for part, colour, width in (
-        (slice(first, late + 1), _EARLY, 0.5),
-        (slice(late, None), _LATE, 0.7),
-    ):
+    for part, colour, width in parts:
         curve = plane.broken_at_wrap(theta[part], velocity[part])
         marks.append(Line(*curve.T, colour=colour, width=width))
     if (dataset.attrs.get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
@@ -137,7 +126,7 @@ def _section(dataset: xr.Dataset) -> Panel:
         Points(theta[which], velocity[which], colour=colour, size=size)
         for which, colour in ((~late, _EARLY), (late, _LATE))
     ]
-    title = "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section, once a period"
+    title = "Poincaré section, once a period"
     return Panel("section", title, *_sides(dataset), marks)
 
 

@@ -38,12 +38,12 @@ def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None
     """
     from pendmap.cli.show import write_json
     from pendmap.model import load_formulas
-    from pendmap.model.effects import definition, described, effects
+    from pendmap.model.effects import definition, effects
 
     own = [] if path is None else load_formulas(path)
     known = {formula.name: formula for formula in own}
-    wanted = {name if name in known else definition(name)["name"] for name in names}
-    listed = effects() if path is None else [described(formula.entry) for formula in own]
+    wanted = {name if name in known else definition(name).name for name in names}
+    listed = effects() if path is None else [formula.definition for formula in own]
     shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
         write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
 from pendmap.identification.report import DRAG
-from pendmap.model.effects import Effect, definition, is_shape, library, middle
+from pendmap.model.effects import Effect, definition, library
 from pendmap.model.formula import Formula
 from pendmap.model.rig import own_name
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.model import Rig
+    from pendmap.model.effects import EffectDefinition, EffectParameter
     from pendmap.units import Units
 
 ZERO: Final = "encoder_offset"
@@ -58,22 +59,22 @@ class Candidate:
     formula: Formula | None = None  # Of the user's own effect
 
     @property
-    def definition(self) -> dict[str, Any]:
+    def definition(self) -> EffectDefinition:
         """Entry of the library, or of the formula."""
-        return definition(self.name) if self.formula is None else self.formula.entry
+        return definition(self.name) if self.formula is None else self.formula.definition
 
-    def _of_role(self, *roles: str) -> list[dict[str, Any]]:
-        return [entry for entry in self.definition["parameters"] if entry["role"] in roles]
+    def _of_role(self, *roles: str) -> list[EffectParameter]:
+        return [entry for entry in self.definition.parameters if entry.role in roles]
 
     @property
     def size(self) -> str:
         """Name of the parameter that is the size."""
-        return str(self._of_role("size")[0]["name"])
+        return self._of_role("size")[0].name
 
     @property
     def phase(self) -> str | None:
         """Name of the parameter that is a phase, if any."""
-        return next((entry["name"] for entry in self._of_role("phase")), None)
+        return next((entry.name for entry in self._of_role("phase")), None)
 
     @property
     def free(self) -> list[str]:
@@ -85,23 +86,23 @@ class Candidate:
     @property
     def adapted(self) -> list[str]:
         """Names in a fit of the shape parameters fitted with its size, without integers."""
-        orders = [entry["name"] for entry in self._of_role("order")]
+        orders = [entry.name for entry in self._of_role("order")]
         return [f"{self.name}.{name}" for name in self.shape if name not in orders]
 
     @property
     def exponents(self) -> dict[str, str]:
         """Exponents of its shape, by the sizes whose units depend on them."""
-        less = {e["name"]: e["power_of_w0_less"] for e in self.definition["parameters"]}
+        less = {e.name: e.power_of_w0_less for e in self.definition.parameters}
         pairs = {f"{self.name}.{size}": f"{self.name}.{power}" for size, power in less.items()}
         return {size: power for size, power in pairs.items() if power in self.adapted}
 
     @property
     def places(self) -> list[str]:
         """Shape parameters that are places, on either side of the rest position."""
-        return [entry["name"] for entry in self._of_role("place")]
+        return [entry.name for entry in self._of_role("place")]
 
     @property
-    def sought(self) -> dict[str, Any] | None:
+    def sought(self) -> EffectParameter | None:
         """Entry of the frequency or instant that residuals show before any fit."""
         return next(iter(self._of_role("frequency", "instant")), None)
 
@@ -118,7 +119,7 @@ class Candidate:
     @property
     def once(self) -> bool:
         """Whether it acts once, in one part of the records."""
-        return self.sought is not None and self.sought["role"] == "instant"
+        return self.sought is not None and self.sought.role == "instant"
 
     @property
     def count(self) -> int:
@@ -180,7 +181,7 @@ def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
                 f"{short_repr(effect)}"
             )
         if not effect.proportional:
-            size = effect.entry["parameters"][0]["name"]
+            size = effect.definition.parameters[0].name
             raise InputError(
                 f"formula '{effect.name}' is not proportional to its first parameter {size}: "
                 "the first parameter of a candidate must be the size of its term"
@@ -207,38 +208,38 @@ def list_candidates(
     """
     formulas = {formula.name: formula for formula in own}
     found = []
-    entries = library() | {name: formula.entry for name, formula in formulas.items()}
+    entries = library() | {name: formula.definition for name, formula in formulas.items()}
     for name, entry in entries.items():
         if name in taken or name in without or own_name(name) in taken:
             continue
-        if entry["group"] == "drive" and not driven:
+        if entry.group == "drive" and not driven:
             continue
         found.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
     return found
 
 
-def _shapes(entry: Mapping[str, Any]) -> Iterator[dict[str, float]]:
+def _shapes(entry: EffectDefinition) -> Iterator[dict[str, float]]:
     """Yield the shapes of an effect, with at most one scanned parameter."""
-    shapes = [e for e in entry["parameters"] if is_shape(e)]
+    shapes = [e for e in entry.parameters if e.is_shape]
     if not shapes:
         yield {}
         return
     first, *others = shapes
-    fixed = {e["name"]: middle(e) for e in others}
+    fixed = {e.name: e.middle for e in others}
     for value in _scan(first):
-        yield {first["name"]: float(value)} | fixed
+        yield {first.name: float(value)} | fixed
 
 
-def _scan(entry: Mapping[str, Any]) -> NDArray[np.float64]:
+def _scan(entry: EffectParameter) -> NDArray[np.float64]:
     """Return the scored values of a shape parameter, nondimensional."""
-    low, high = entry["typical"]
-    if entry["role"] == "order":
+    low, high = entry.typical
+    if entry.role == "order":
         return np.arange(round(low), round(high) + 1.0)
-    if entry["role"] == "place":
+    if entry.role == "place":
         return np.linspace(low, high, PLACES)
-    if entry["role"] in {"frequency", "instant"}:
+    if entry.role in {"frequency", "instant"}:
         return np.array([high])  # a placeholder: residuals show the value
     if low > 0:
-        return np.geomspace(low, high, MODES if entry["role"] == "mode" else SCANNED)
+        return np.geomspace(low, high, MODES if entry.role == "mode" else SCANNED)
     width = (high - low) / SCANNED
     return np.linspace(low + 0.5 * width, high - 0.5 * width, SCANNED)

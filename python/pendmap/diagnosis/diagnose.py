@@ -98,10 +98,9 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     with _refuse_divergence(experiment):
         nearest = state.scored(search(state, core, lambda done: report(1 + done, steps)))
         begin = state.scored(impose_physics(state.data, state.base) or state.base)
-    if not unit_wrong(experiment, *data.runs):
-        refuse_astray(experiment.path, data.fitted, nearest.fitted.fit)
-    report(steps - 1, steps)
-    with _refuse_divergence(experiment):
+        if not unit_wrong(experiment, *data.runs):
+            refuse_astray(experiment.path, data.fitted, nearest.fitted.fit)
+        report(steps - 1, steps)
         last, fitted = nearest.fitted, state.data.fitted
         runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
         after = residual_torque(fitted, last.fit, last.noise)

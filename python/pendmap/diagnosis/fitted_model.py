@@ -13,7 +13,6 @@ from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.valley import refine_exponent
-from pendmap.model.effects import opposes
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:
@@ -23,15 +22,12 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.model.effects import EffectParameter
 
 Windows = tuple[tuple[int, int, int, float, float], ...]
 
 Given = ParamSpec("Given")
 Found = TypeVar("Found")
-
-MOST_STEPS: Final = 40  # Most steps of a fit
-
-QUICK: Final = 4.0  # Growth factor of windows between stages of a fit
 
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one independent reading's, below which a fit ends."""
@@ -133,32 +129,17 @@ class FittedModel:
         return len(self.fit.names) + len(self.zeroed) + scanned
 
 
-def fit_model(  # noqa: PLR0913 (the records, the model, where to begin)
+def fit_model(
     data: DataSplit,
     model: Rig,
     free: Sequence[str],
     chosen: Sequence[Candidate] = (),
     *,
-    start: Mapping[str, float] | None = None,
-    windows: Windows | None = None,
-    steps: int = MOST_STEPS,
-    least_gain: float = 1e-3,
     zeroed: Sequence[str] = (),
-    target: float = math.inf,
+    **search: Any,  # noqa: ANN401 (arguments of fit_runs)
 ) -> FittedModel:
-    """Fit a model to records; ``zeroed`` are coefficients fixed at 0, the others as in fit_runs."""
-    fit = fit_runs(
-        data.fitted,
-        model,
-        free,
-        start=start,
-        windows=windows,
-        profiled=(),
-        steps=steps,
-        least_gain=least_gain,
-        growth=QUICK,
-        target=target,
-    )
+    """Fit a model to records, without profiles; ``zeroed`` are coefficients fixed at 0."""
+    fit = fit_runs(data.fitted, model, free, profiled=(), **search)
     return FittedModel(fit, tuple(free), tuple(chosen), data.fitted, data.floors, tuple(zeroed))
 
 
@@ -176,32 +157,20 @@ def none_if_diverged(fit: Callable[Given, Found]) -> Callable[Given, Found | Non
 
 
 @none_if_diverged
-def fit_again(  # noqa: PLR0913 (what changes, and when the fit ends)
+def fit_again(
     data: DataSplit,
     fitted: FittedModel,
-    *,
-    model: Rig | None = None,
-    free: Sequence[str] | None = None,
-    chosen: Sequence[Candidate] | None = None,
-    start: Mapping[str, float] | None = None,
-    zeroed: Sequence[str] = (),
-    steps: int = MOST_STEPS,
-    least_gain: float = 1e-3,
-    target: float = math.inf,
+    **changed: Any,  # noqa: ANN401 (arguments of fit_model)
 ) -> FittedModel:
     """Fit a model again, with the given arguments changed, from its parameters and windows."""
-    return fit_model(
-        data,
-        fitted.fit.model if model is None else model,
-        fitted.free if free is None else free,
-        fitted.chosen if chosen is None else chosen,
-        start=fitted.start if start is None else start,
-        windows=fitted.fit.windows,
-        steps=steps,
-        least_gain=least_gain,
-        zeroed=zeroed,
-        target=target,
-    )
+    usual: dict[str, Any] = {
+        "model": fitted.fit.model,
+        "free": fitted.free,
+        "chosen": fitted.chosen,
+        "start": fitted.start,
+        "windows": fitted.fit.windows,
+    }
+    return fit_model(data, **(usual | changed))
 
 
 def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel | None:
@@ -232,42 +201,26 @@ def fit_with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     begin = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start | dict(start)
     windows = None if short else fitted.fit.windows
     least = LITTLE * level
+    fit = functools.partial(fit_model, data, least_gain=least)
     if shapes and not short:
         # A shape is determined only once its effect has a size.
         steps = FEW_STEPS if any(c.exponents for c in added) else SIZED_STEPS
-        sized = fit_model(
-            data, model, free, start=begin, windows=windows, steps=steps, least_gain=least
-        )
+        sized = fit(model, free, start=begin, windows=windows, steps=steps)
         sized = _adjust_exponents(data, sized, added, least)
         # The exponent of the model sets the unit of its size.
         model, begin, windows = sized.fit.model, sized.start, sized.fit.windows
-    return fit_model(
-        data,
-        model,
-        [*free, *shapes],
-        (*fitted.chosen, *added),
-        start=begin,
-        windows=windows,
-        steps=FEW_STEPS,
-        least_gain=least,
-    )
+    chosen = (*fitted.chosen, *added)
+    return fit(model, [*free, *shapes], chosen, start=begin, windows=windows, steps=FEW_STEPS)
 
 
 def _adjust_exponents(
     data: DataSplit, sized: FittedModel, added: Sequence[Candidate], least: float
 ) -> FittedModel:
     """Return a fit of candidates' sizes with exponents near their best values."""
+    near = functools.partial(fit_model, data, steps=NEAR_STEPS, least_gain=least)
 
     def again(model: Rig, start: Mapping[str, float], before: TrajectoryFit) -> TrajectoryFit:
-        return fit_model(
-            data,
-            model,
-            sized.free,
-            start=start,
-            windows=before.windows,
-            steps=NEAR_STEPS,
-            least_gain=least,
-        ).fit
+        return near(model, sized.free, start=start, windows=before.windows).fit
 
     fit = sized.fit
     for candidate in added:
@@ -311,24 +264,24 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
     if size is None:
         return True
     error = ERRORS * math.sqrt(fitted.level) * (size.stderr or 0.0)
-    if opposes(candidate.definition) and size.value < -error:
+    if candidate.definition.opposes and size.value < -error:
         return False
     end = max(run.lab_time_s + float(run.time[-1]) for run in data.fitted)
     span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
-    entries = {e["name"]: e for e in candidate.definition["parameters"]}
+    entries = {entry.name: entry for entry in candidate.definition.parameters}
     w0 = fitted.fit.model.w0
     for name in candidate.shape:
         estimate, entry = estimates.get(f"{candidate.name}.{name}"), entries[name]
         if estimate is None:
             continue
         low, high = -math.inf, math.inf
-        if entry["role"] == "time constant":
+        if entry.role == "time constant":
             low, high = math.tau / w0, span
-        elif entry["role"] == "instant":
+        elif entry.role == "instant":
             low, high = end - span, end
-        elif entry["role"] == "width":
-            low, high = entry["typical"]
-            unit = w0 ** entry["power_of_w0"]
+        elif entry.role == "width":
+            low, high = entry.typical
+            unit = w0**entry.power_of_w0
             low, high = low / STRETCH * unit, high * STRETCH * unit
         if not low <= estimate.value <= high:
             return False
@@ -336,14 +289,14 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
 
 
 def _drains(
-    fitted: FittedModel, candidate: Candidate, entry: dict[str, Any], error: float, end: float
+    fitted: FittedModel, candidate: Candidate, entry: EffectParameter, error: float, end: float
 ) -> bool:
     """Return whether damping or friction stays positive with a drift or an asymmetry of it."""
-    if candidate.definition["group"] != "damping" or entry["typical"][0] >= 0:
+    if candidate.definition.group != "damping" or entry.typical[0] >= 0:
         return True
-    drifts = candidate.definition["mappable"] == "frozen"
+    drifts = candidate.definition.mappable == "frozen"
     # The unit of a rate has one more power of w0 than that of the drifting coefficient.
-    power = entry["power_of_w0"] - drifts
+    power = entry.power_of_w0 - drifts
     base = "Tr" if power == 2 else "c_over_m"  # noqa: PLR2004 (a torque)
     size, known = fitted.fit[candidate.free[0]], fitted.fit.estimates.get(base)
     limit = 0.0
@@ -385,15 +338,11 @@ def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:
     pairs = list(zip(data.fitted, errors, strict=True))
     excess = float(np.mean([max(error**2 - _variance(run), 0.0) for run, error in pairs]))
     held = (
-        _with_error(run, of[k] if k in of else _whole_run_error(run, excess))
+        _with_error(run, of.get(k, math.sqrt(_variance(run) + excess) if excess > 0 else 0.0))
         for run, k in zip(data.held, data.held_of, strict=True)
     )
     fitted = (_with_error(run, error) for run, error in pairs)
     return dataclasses.replace(data, fitted=tuple(fitted), held=tuple(held))
-
-
-def _whole_run_error(run: FitRun, excess: float) -> float:
-    return math.sqrt(_variance(run) + excess) if excess > 0 else 0.0
 
 
 def _variance(run: FitRun) -> float:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.diagnosis.scores import UNSEEN
 from pendmap.errors import InputError, check_number, short_repr
 from pendmap.residuals.torque import project_out, responses, window_derivatives
 
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
     Floats = NDArray[np.float64]
-
-UNSEEN: Final = 1e-4
-"""Norm of a response orthogonal to the fitted parameters, over its whole norm, below which a torque
-is undetectable."""
 
 VISITED: Final = (0.05, 0.95)
 """Quantiles to which angles and velocities are clipped in a check: noise exceeds them."""

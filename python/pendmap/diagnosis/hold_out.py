@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -36,32 +36,22 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     Whole runs have new initial states; stretches within fitted runs are compared with the fitted
     motion, without any step of a fit.
     """
-    model = fitted.fit.model
+    model, free = fitted.fit.model, fitted.free
     known = {name: value for name, value in fitted.start.items() if "[" not in name}
+    search: dict[str, Any] = {"steps": FEW_STEPS, "least_gain": LITTLE}
     if data.inside:
-        own = tuple(name for name in fitted.free if name in known)
+        free = tuple(name for name in free if name in known)
         places = {of: k for k, of in enumerate(data.held_of)}
         windows = tuple((places[w[0]], *w[1:]) for w in fitted.fit.windows if w[0] in places)
-        fit = fit_runs(
-            data.held, model, own, start=known, windows=windows, profiled=(), hold=True, steps=0
-        )
-        return HoldOut(fit.chi2, max(fit.samples, 1), fit)
-    free = fitted.free
-    if not any(run.forced for run in data.held):
+        search = {"steps": 0, "windows": windows}
+    elif not any(run.forced for run in data.held):
         # Effects of the drive do not act in free decays.
         drives = {e.name for e in model.effects if e.drives}
         free = tuple(name for name in free if name.partition(".")[0] not in drives)
-    fit = fit_runs(
-        data.held,
-        model,
-        free,
-        start=known,
-        profiled=(),
-        hold=True,
-        steps=FEW_STEPS,
-        least_gain=LITTLE,
-    )
-    adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
+    fit = fit_runs(data.held, model, free, start=known, profiled=(), hold=True, **search)
+    adapted = 0
+    if not data.inside:
+        adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
     return HoldOut(fit.chi2, max(fit.samples - adapted, 1), fit)
 
 

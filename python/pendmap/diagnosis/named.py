@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pendmap.comparison.further import Reasons, compute_part
-from pendmap.diagnosis.refit import Z95, find_equivalents, profile_intervals
+from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
+from pendmap.identification.uncertainty import Z95
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import ScoredModel, State
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
+    from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
 
 
@@ -32,12 +34,13 @@ class NamedEffect:
     # alternatives, times the probability that one of them is right.
     probability: float
     approximate: bool  # Whether its form may be right only approximately
+    closes: float  # Share of the squared gap above the noise that it closes with the others
     formula: Formula | None = None  # Of the user's own effect
     # Mirrored place, or another frequency or instant, of an equally good fit.
     elsewhere: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
-    def definition(self) -> dict[str, Any]:
+    def definition(self) -> EffectDefinition:
         """Entry in the library, or of the user's formula."""
         return self.effect.definition
 
@@ -89,7 +92,8 @@ def name_effects(
                 parameters,
                 ci95,
                 each.share * sure,
-                assessment.approximate or doubted(data.experiment, *data.runs),
+                assessment.approximate or bool(doubted(data.experiment, *data.runs)),
+                each.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),
             )

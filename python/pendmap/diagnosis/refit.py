@@ -14,6 +14,7 @@ from pendmap.diagnosis.fitted_model import (
     impose_physics,
 )
 from pendmap.identification.fit import fit_runs
+from pendmap.identification.uncertainty import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,8 +34,6 @@ FAINT: Final = 5.0
 MIRROR_STEPS: Final = 6  # Most steps of a fit from a mirrored place
 
 EQUIVALENT_STEPS: Final = 25  # Most steps of a fit from another shape, tested for equivalence
-
-Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
 
 Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
 

@@ -7,15 +7,12 @@ import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
-from pendmap.comparison.further import Reasons
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.next_experiment.limits import Advice, advise
-from pendmap.diagnosis.scores import Scores
 from pendmap.formatting import Readable
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.records.summary import doubt_lines, finding_lines
-from pendmap.residuals.torque import Torque
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,17 +24,21 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.model import Formula
+    from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
     from pendmap.residuals.torque import Torque
 
 
 SAID: Final = {
-    "none": "none: the baseline describes the records to within their noise",
-    "named": "named: the effects below explain what the baseline lacks",
-    "partial": "partial: the effects below close part of the gap; significant residuals remain",
-    "ambiguous": "ambiguous: these records do not distinguish the effects of a class",
-    "unknown": "unknown: something is missing that no candidate explains",
+    "none": "the baseline describes the records to within their noise",
+    "named": "the effects found explain the whole gap",
+    "partial": "the effects found close part of the gap, and significant residuals remain: their "
+    "form is only approximate, or a further effect is missing",
+    "ambiguous": "several effects explain the gap equally well; these records do not distinguish "
+    "them",
+    "unknown": "something is missing that no candidate explains; no name is claimed",
 }
+"""Meaning of each verdict, in the summary and in the report."""
 
 PLACES: Final[dict[str, str]] = {
     "angle": "at an angle of",
@@ -83,9 +84,9 @@ class Discrepancy(Readable):
     # Reasons for parts that were not computed, by field of the JSON; see ``not_computed``.
     reasons: Reasons = dataclasses.field(default_factory=dict)
 
-    def definition(self, name: str) -> dict[str, Any]:
+    def definition(self, name: str) -> EffectDefinition:
         """Return the entry of a candidate in the library, or of the user's formula."""
-        return next((f.entry for f in self.own if f.name == name), None) or definition(name)
+        return next((f.definition for f in self.own if f.name == name), None) or definition(name)
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects)
@@ -145,7 +146,6 @@ class Discrepancy(Readable):
             self.nearest,
             self.assessment,
             self.beside,
-            self.level,
             self.reasons,
         )
 
@@ -160,22 +160,14 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     refitted = {a.effects[0]: a for a in reversed(found.attempts) if a.stage == 0}
     rows = []
     for row in ranking(found)[:RANKED]:
-        tried = refitted.get(row["name"])
+        name, tried = row["name"], refitted.get(row["name"])
         shape = ", ".join(
-            f"{name} = {value:.3g} {_unit(found, row['name'], name)}".rstrip()
-            for name, value in row["shape"].items()
+            f"{own} = {value:.3g} {unit_of(f'{name}.{own}', found.definition)}".rstrip()
+            for own, value in row["shape"].items()
         )
-        rows.append(
-            [
-                row["name"],
-                shape,
-                f"{row['score']:.1f}",
-                "" if tried is None else f"{tried.bic_gain:.1f}",
-                ""
-                if tried is None or tried.held_out_gain is None
-                else f"{tried.held_out_gain:.1f}",
-            ]
-        )
+        gains = () if tried is None else (tried.bic_gain, tried.held_out_gain)
+        said = ["" if gain is None else f"{gain:.1f}" for gain in gains] or ["", ""]
+        rows.append([name, shape, f"{row['score']:.1f}", *said])
     return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
 
 
@@ -184,9 +176,9 @@ def as_text(found: Discrepancy) -> Iterator[str]:
     runs = found.data.runs
     yield from doubt_lines(found.data.experiment, *runs)
     gap, assessment = found.gap, found.assessment
-    yield f"Verdict: {SAID[found.verdict]}"
+    yield f"Verdict: {found.verdict}: {SAID[found.verdict]}"
     for effect in found.effects:
-        units = {name: _unit(found, effect.name, name) for name in effect.parameters}
+        units = {n: unit_of(f"{effect.name}.{n}", found.definition) for n in effect.parameters}
         values = ", ".join(
             f"{name} = {value:.4g} {units[name]}".rstrip()
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
@@ -195,13 +187,10 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         nearly = (
             ", with reserve: the missing effect may only resemble it" if effect.approximate else ""
         )
-        share = next(
-            100 * s.closed for s in assessment.identified if s.candidate.name == effect.name
-        )
         yield (
-            f"  {effect.name}: {values}; closes {share:.0f} % of the squared gap that the others "
-            f"leave; probability {effect.probability:.3f}, given that the effect is in the "
-            f"library{nearly}"
+            f"  {effect.name}: {values}; closes {100 * effect.closes:.0f} % of the squared gap "
+            f"that the others leave; probability {effect.probability:.3f}, given that the effect "
+            f"is in the library{nearly}"
         )
         for name, value in effect.elsewhere.items():
             said = f"{name} = {value:.4g} {units[name]}".rstrip()
@@ -260,11 +249,6 @@ def _further(found: Discrepancy) -> Iterator[str]:
         yield f"Not computed: {field}: {reason}"
 
 
-def _unit(found: Discrepancy, effect: str, parameter: str) -> str:
-    """Return the unit of an effect's parameter, or an empty string."""
-    return unit_of(f"{effect}.{parameter}", found.definition)
-
-
 def given_out(found: ScoredModel) -> dict[str, float]:
     """Return the parameters of the model file, SI, without those of single runs."""
     fitted = found.fitted
@@ -280,7 +264,7 @@ def given_out(found: ScoredModel) -> dict[str, float]:
 def confined(found: Discrepancy) -> Iterator[str]:
     """Yield a line for each effect of the model that no map over initial conditions can include."""
     for effect in found.best.fitted.fit.model.effects:
-        if effect.definition["mappable"] == "no":
+        if effect.definition.mappable == "no":
             yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
 
 

@@ -198,13 +198,15 @@ def _located(
     found: list[list[Candidate]] = []
     responses = calm_responses(data.fitted, windows, model.c_over_m) if pool else []
     for one, *_ in pool if responses else ():
-        scanned = one.sought or {}
-        unit = model.w0 ** scanned["power_of_w0"]
-        if scanned["role"] == "frequency":
-            values = frequencies(responses, scanned["typical"][1] * unit)
+        scanned = one.sought
+        if scanned is None:
+            continue
+        unit = model.w0**scanned.power_of_w0
+        if scanned.role == "frequency":
+            values = frequencies(responses, scanned.typical[1] * unit)
         else:
             values = instants(responses)
-        shapes = [{**one.shape, scanned["name"]: value / unit} for value in values]
+        shapes = [{**one.shape, scanned.name: value / unit} for value in values]
         found.append([dataclasses.replace(one, shape=shape) for shape in shapes])
     return found
 

@@ -98,12 +98,9 @@ def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> Fit
     found.sort(key=lambda each: state.cost(each[0], level))
     for fit, reduced, places in found[:most]:
         full = state.converge(fit)
-        gains = state.remaining(full) >= 0 and state.is_significant(best, full)
-        accepted = gains and state.keeps_hold_out(best, full)
-        state.attempts.append(
-            _attempt(state, reduced, full, places, evaluated=gains, accepted=accepted)
-        )
-        if accepted:
+        attempt = _attempt(state, best, reduced, full, places)
+        state.attempts.append(attempt)
+        if attempt.accepted:
             return full
     return None
 
@@ -132,20 +129,15 @@ def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list
     return chosen[: 2 * limits.singles], joint
 
 
-def _attempt(  # noqa: PLR0913 (two models and their comparison)
-    state: State,
-    reduced: FittedModel,
-    full: FittedModel,
-    places: Sequence[int],
-    *,
-    evaluated: bool,
-    accepted: bool,
+def _attempt(
+    state: State, best: FittedModel, reduced: FittedModel, full: FittedModel, places: Sequence[int]
 ) -> Attempt:
-    """Return the attempt to add the candidates at some places of a model's scores."""
-    scores = state.scores(reduced)
+    """Compare a model that has the candidates at some places of another's scores with the best."""
+    gains = state.remaining(full) >= 0 and state.is_significant(best, full)
+    accepted = gains and state.keeps_hold_out(best, full)
+    scores, losses = state.scores(reduced), state.hold_out_losses
     added = [scores.scores[k].candidate for k in places]
-    losses = state.hold_out_losses
-    pairs = zip(losses(reduced), losses(full), strict=False) if evaluated else ()
+    pairs = zip(losses(reduced), losses(full), strict=False) if gains else ()
     return Attempt(
         tuple(candidate.name for candidate in added),
         full.shape_of(full.chosen[-len(added)]),

@@ -204,11 +204,12 @@ class State:
             return fitted.adapted, common, fitted.chi2
 
         alike = [t for t in self._fits.values() if t.chi2 <= reach and self.remaining(t) >= 0]
-        for fitted in sorted((best, *alike), key=order):
-            # Held-out sets must not distinguish it from the best one either.
-            if fitted is best or self._loses_at_most(most, best, fitted):
-                return fitted
-        return best
+        # Held-out sets must not distinguish it from the best one either.
+        return next(
+            fitted
+            for fitted in sorted((best, *alike), key=order)
+            if fitted is best or self._loses_at_most(most, best, fitted)
+        )
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None if it diverges."""

@@ -35,9 +35,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "ci95": {name: list(bounds) for name, bounds in effect.ci95.items()},
                 "probability": effect.probability,
                 "approximate": effect.approximate,
-                "closes": next(
-                    s.closed for s in assessment.identified if s.candidate.name == effect.name
-                ),
+                "closes": effect.closes,
                 "elsewhere": effect.elsewhere,
             }
             for effect in found.effects
@@ -84,7 +82,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "left": {
             "z": assessment.left,
             "uneven": assessment.uneven,
-            "torque_by_chance": assessment.chance,
+            "torque_by_chance": assessment.form.chances["torque"],
             "chance": assessment.form.chance,
             "chances": dict(assessment.form.chances),
             "further": assessment.form.further,

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel, State
+    from pendmap.diagnosis.thresholds import Thresholds
     from pendmap.residuals.by_run import RunByRun
 
 Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
@@ -47,7 +48,6 @@ class Alternative:
     # the difference of log-likelihoods.
     behind: float
     separation: float  # ``s = 1 - gain / gain of the accepted effect``
-    likeness: float  # Cosine of the angle between the responses of the readings to both
     refitted: bool  # Whether the gain is that of a fit, not of a score
     # Whether the accepted effect is a special case of it, and it gains no more than by chance.
     contains: bool
@@ -104,11 +104,10 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
         elif fit is not None:
             fit = state.converge(fit)
             reached = (reduced.chi2 - fit.chi2) / level
-        likeness = scores.likeness(own, k)
         more = score.candidate.count > candidate.count
         chosen = score.candidate.choice_gain - candidate.choice_gain
         behind = gain - reached + chosen
-        contains = more and likeness > CONTAINS and behind > -state.thresholds.alike
+        contains = more and scores.likeness(own, k) > CONTAINS and behind > -state.thresholds.alike
         alike = behind < state.thresholds.alike
         if fit is not None and not alike and not candidate.once:
             # The accepted effect must be better without any one run, or any third of a single run.
@@ -120,7 +119,6 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
                 reached,
                 behind,
                 1.0 - reached / gain if gain > 0 else 0.0,
-                likeness,
                 fit is not None,
                 contains,
                 alike,
@@ -192,10 +190,10 @@ class Assessment:
     ratio_held: float  # Sum of squares over degrees of freedom on the records held back
     closed: float  # Share of the squared gap above the noise that the effects close
     uneven: float  # Difference of parameters between runs, over its standard error (Cochran's Q)
-    chance: float  # Probability that noise alone shows the residual torque
     form: GoodnessOfFit
     probabilities: tuple[float, ...]  # That each name, or one of its class, is right
     approximate: bool  # Whether names are given with reserve: the fit is poor, or one is uncertain
+    thresholds: Thresholds  # Thresholds of all decisions
 
 
 def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: float) -> Assessment:
@@ -248,10 +246,10 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         held.chi2 / max(held.degrees, 1),
         closed,
         runs.uneven,
-        chance,
         form,
         sure,
         verdict == "partial" or min(sure, default=1.0) < limits.sure,
+        limits,
     )
 
 

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.identification.swing_fit import SwingFit
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 COARSE: Final = 20.0

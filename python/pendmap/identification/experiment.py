@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_callable, check_type, instruction_set
-from pendmap.formatting import counted
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
+from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
     OFFSET,
     JointFit,
-    TooShortError,
     fit_together,
     identification_of,
 )
@@ -24,12 +23,11 @@ from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
-from pendmap.identification.table1 import table_of, table_of_run
+from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import Experiment
 from pendmap.records.summary import unit_wrong
-from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -93,7 +91,7 @@ def identify_experiment(
     names = check_names(methods)
     for effect in effects:
         name = effect if isinstance(effect, str) else effect.name
-        if definition(name)["group"] == "drive":
+        if definition(name).group == "drive":
             raise InputError(
                 f"effect {name} acts on the drive: it must be one that acts on free decays, of "
                 "damping, torque or reading"
@@ -102,7 +100,8 @@ def identify_experiment(
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
         found = identify_peaks(peaks, names)
-        return IdentificationReport(experiment, run, peaks, found, None, table_of(peaks, found))
+        table = table_of_run(run, peaks, found)
+        return IdentificationReport(experiment, run, peaks, found, None, table)
     others = [name for name in names if name != BEST]
     steps, before = len(names) + 2, len(names) - len(others) + 1
     report = progress or (lambda _done, _total: None)
@@ -167,9 +166,7 @@ def _best(
             [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
             joint.fit,
         )
-    part = span(run.time) if len(runs) == 1 else counted(len(runs), "free run")
-    found = identification_of(joint.fit, joint.readings, part)
-    return joint, dataclasses.replace(found, method=BEST)
+    return joint, dataclasses.replace(identification_of(joint), method=BEST)
 
 
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:
@@ -197,22 +194,18 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     if best.covariance is not None:
         names, matrix = best.covariance
         # Bias and tilt of a sensor do not belong to the pendulum.
-        kept = [k for k, name in enumerate(names) if name.partition("[")[0] not in SENSOR]
-        names = tuple(names[k] for k in kept)
-        matrix = np.asarray(matrix)[np.ix_(kept, kept)]
-        own = {"offset": f"{OFFSET}.d"}
+        own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+        if "offset" in own:
+            own["offset"] = f"{OFFSET}.d"
+        kept = [names.index(name) for name in own]
+        bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
         notes["covariance"] = {
-            "names": [own.get(name, name) for name in names],
-            "matrix": np.asarray(matrix).tolist(),
-            "ci95": {
-                own.get(name, name): list(e.ci95)
-                for name, e in best.estimates.items()
-                if e.ci95 is not None and name in names
-            },
+            "names": [*own.values()],
+            "matrix": matrix[np.ix_(kept, kept)].tolist(),
+            "ci95": {own[name]: list(ci95) for name, ci95 in bounds.items() if ci95 is not None},
         }
     sha256 = report.experiment.sha256
-    runs = report.joint.runs if report.joint is not None else (report.run,)
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
+    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise

@@ -24,11 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from pendmap import _core
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.signal import Floats
 
 
 LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of freedom
@@ -41,15 +40,15 @@ class TrajectoryFit:
     estimates: Mapping[str, Estimate]  # with profile intervals; name[k] belongs to run k
     ends: Mapping[str, tuple[float, float]]  # ends of the intervals; NaN if not found
     names: tuple[str, ...]  # free parameters, in the order of the covariance
-    covariance: NDArray[np.float64]  # shape (k, k)
+    covariance: Floats  # shape (k, k)
     chi2: float  # sum of squares; for interval readings -2 log P
     samples: int  # number of included samples
     degrees: int  # degrees of freedom: samples less fitted parameters
     rms: float  # root mean square residual of the included samples, rad
     model: Rig  # fitted model; negative damping is set to 0
-    curves: tuple[NDArray[np.float64], ...]  # theta, velocity by run, (2, n); NaN outside windows
-    residuals: tuple[NDArray[np.float64], ...]  # reading less model, rad; 0 if excluded
-    white: tuple[NDArray[np.float64], ...]  # residuals of unit variance
+    curves: tuple[Floats, ...]  # theta, velocity by run, (2, n); NaN outside windows
+    residuals: tuple[Floats, ...]  # reading less model, rad; 0 if excluded
+    white: tuple[Floats, ...]  # residuals of unit variance
     windows: tuple[tuple[int, int, int, float, float], ...]  # run, first, last + 1, state
     steps: int  # number of iterations
     converged: bool  # whether the search converged

@@ -9,27 +9,21 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
+from pendmap.model.quantities import COUNTERPARTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
-    Floats = NDArray[np.float64]
 
-
-PLACES: Final[Mapping[str, tuple[str, float]]] = {
-    "w0": ("gravity", 1),
-    "c_over_m": ("gamma", 1),
-    "Tr": ("theta_r", 2),
-    "torque": ("torque", 2),
-    "p": ("p", 0),
-    "Omega": ("omega", 1),
-    "phi": ("phase", 0),
+PLACES: Final[Mapping[str, tuple[str, float]]] = {"w0": ("gravity", 1)} | {
+    si: (bare, power) for bare, (si, power) in COUNTERPARTS.items() if bare != "lab_time"
 }
 """Name in the core of each parameter of a rig, and the power of ``w0`` in its SI value."""
 
@@ -106,8 +100,8 @@ def _found_in(
     effect = next(effects, None)
     if effect is None:
         return None
-    entry = next(e for e in effect.definition["parameters"] if e["name"] == parameter)
-    power, less = float(entry["power_of_w0"]), entry["power_of_w0_less"]
+    entry = effect.definition[parameter]
+    power, less = float(entry.power_of_w0), entry.power_of_w0_less
     exponent = None if less is None else f"{own}.{less}"
     if less is not None and exponent not in free:
         power, exponent = power - effect.parameters[less], None

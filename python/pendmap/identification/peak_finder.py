@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
     from pendmap.identification.readings import Reading
     from pendmap.identification.turning import Outline
+    from pendmap.signal import Floats
     from pendmap.signal.local_polynomial import WindowFit
-
-    Floats = NDArray[np.float64]
 
 
 _BIAS: Final = 0.25  # Greatest bias of a peak's amplitude, standard errors

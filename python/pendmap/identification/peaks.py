@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification.coarse_finder import CoarseFinder
     from pendmap.identification.turning import End
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +96,7 @@ class Peaks:
         return bool(np.any(self.stderr_time > 0) or np.any(self.stderr_amplitude > 0))
 
     @property
-    def odd(self) -> NDArray[np.bool_]:
+    def odd(self) -> Mask:
         """Mask of peaks that begin an odd half cycle, shape (P,)."""
         return np.asarray(self.index % 2 == 1)
 
@@ -112,7 +111,7 @@ class Peaks:
             self, time=self.time + seconds, crossing_time=self.crossing_time + seconds
         )
 
-    def select(self, which: NDArray[np.bool_]) -> Peaks:
+    def select(self, which: Mask) -> Peaks:
         """Return the selected peaks, with all crossings."""
         names = ("time", "amplitude", "stderr_time", "stderr_amplitude", "index")
         some = {name: getattr(self, name)[which] for name in names}
@@ -193,25 +192,13 @@ def find_peaks(
         t, x = t[drawn.places], x[drawn.places]
     finder, noise = _finder(t, x, sigma)
     if finder is None:
-        none = np.empty(0)
-        return Peaks(none, none, none, none, np.empty(0, np.int64), (), sigma=noise)
+        return dataclasses.replace(Peaks.of((), ()), sigma=noise)
     ends = finder.ends
     index = _numbered(ends, finder.w0)
-    crossings = finder.crossings(index)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
-    instant, amplitude, stderr_time, stderr_amplitude = columns.reshape(-1, 4).T.copy()
-    found = Peaks(
-        instant,
-        amplitude,
-        stderr_time,
-        stderr_amplitude,
-        index=index,
-        kind=tuple(e.kind for e in ends),
-        crossing_time=crossings[0],
-        crossing_stderr=crossings[1],
-        crossing_index=crossings[2].astype(np.int64),
-        sigma=noise,
-    )
+    instant, angle, stderr_time, stderr_angle = columns.reshape(-1, 4).T.copy()
+    kind, crossings = tuple(e.kind for e in ends), finder.crossings(index)
+    found = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
     return found.later(first)
 
 

@@ -12,11 +12,8 @@ from scipy.special import ellipe, ellipkm1
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,10 +15,9 @@ from pendmap.records.resolution import step_of
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.records import Run
     from pendmap.records.jitter import SpeedLaw
+    from pendmap.signal import Floats, Mask
 
 
 DITHERED: Final = 0.45
@@ -35,14 +34,18 @@ class Reading:
 
     sigma: float  # standard error of one reading, rad
     count: float  # step of the sensor, rad; 0 for none
-    each: NDArray[np.float64]  # standard error of each reading, rad, from the law if any
+    each: Floats  # standard error of each reading, rad, from the law if any
     doubt: float  # relative standard error of sigma
     coarse: bool  # whether the count is coarser than the noise
-    alike: NDArray[np.float64]  # uniform standard errors, for a model that lacks an effect
     law: SpeedLaw | None = None  # growth of the noise with speed, if significant
-    shift: NDArray[np.float64] | float = 0.0  # bias by timing jitter, rad; subtracted
+    shift: Floats | float = 0.0  # bias by timing jitter, rad; subtracted
     gain: float = 1.0  # sensor's reading over the equivalent angle
     unit: str = "rad"  # unit of the sensor's readings
+
+    @property
+    def alike(self) -> Floats:
+        """Uniform standard errors, rad, for a model that lacks an effect."""
+        return np.full(self.each.shape, self.sigma)
 
     @property
     def interval(self) -> float | None:
@@ -51,11 +54,11 @@ class Reading:
 
 
 def reading_of(
-    time: NDArray[np.float64],
-    theta: NDArray[np.float64],
+    time: Floats,
+    theta: Floats,
     sigma: float | None = None,
     *,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: Mask | None = None,
     count: float | None = None,
 ) -> Reading:
     """Return the standard errors of readings (rad, at times in s), from the trusted ones.
@@ -82,11 +85,10 @@ def reading_of(
     least = max(count / math.sqrt(12), 1e-15)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
-    each = alike = np.full(theta.shape, sigma)
     if law is None:
-        return Reading(sigma, count, each, doubt, coarse, alike)
+        return Reading(sigma, count, np.full(theta.shape, sigma), doubt, coarse)
     each = np.maximum(law.sigma(time, theta), least)
-    return Reading(sigma, count, each, doubt, coarse, alike, law, law.shift(time, theta))
+    return Reading(sigma, count, each, doubt, coarse, law, law.shift(time, theta))
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
@@ -115,7 +117,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
     )
 
 
-def as_angles(run: Run) -> NDArray[np.float64]:
+def as_angles(run: Run) -> Floats:
     """Return a run's angles; for a sensor on the rod, readings over the gain of small swings."""
     return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
@@ -33,12 +34,6 @@ COLUMNS: Final = {
     "offset": "offset (rad)",
 }
 """Columns of the table of methods and their headers; effects' parameters follow."""
-
-STILL: Final = "in which nothing moves"  # Description of a run without motion
-
-PEAKS: Final = "of peaks alone"  # Description of a run of turning points
-
-COPY: Final = "that copies another"  # Description of a run that duplicates another one
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -95,8 +90,8 @@ class IdentificationReport(Readable):
         lost = [name for name, found in self.methods.items() if not found.converged]
         if lost:
             raise InputError(
-                f"{self.run.name}: no model: {lost[0]} did not converge, and no other method can "
-                "be applied"
+                f"{self.run.name}: must be the record of a free decay, got one to which "
+                f"{lost[0]} did not converge and no other method can be applied"
             )
         reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
@@ -126,33 +121,26 @@ class IdentificationReport(Readable):
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return the text on the runs that were used and not used; empty if all were used."""
-    reasons: dict[str, int] = {}
+    reasons: Counter[tuple[str, str]] = Counter()  # words before and after "run"
+    # If held-out runs are used too, being held out is no reason.
     held_too = any(each.hold_out for each in read)
     for run in experiment.runs:
         if any(run is each for each in read):
             continue
         if run.copied:
-            why = COPY
+            why = "", " that copies another"
         elif run.kind == "forced":
-            # If held-out runs are used too, being held out is no reason.
-            why = "held out" if run.hold_out and not held_too else "forced"
-        elif run.peaks_only and not run.hold_out:
-            why = PEAKS
+            why = ("", " held out") if run.hold_out and not held_too else ("forced ", "")
+        elif run.peaks_only and (held_too or not run.hold_out):
+            why = "", " of peaks alone"
         elif not run.moves:
-            why = STILL
-        elif not run.hold_out:
-            why = "shorter"
+            why = "", " in which nothing moves"
         else:
-            why = PEAKS if run.peaks_only and held_too else "held out"
-        reasons[why] = reasons.get(why, 0) + 1
+            why = ("", " held out") if run.hold_out else ("shorter ", "")
+        reasons[why] += 1
     if not reasons:
         return ""
-    parts = [
-        f"{counted(n, 'run')} {why}"
-        if why in {"held out", PEAKS, STILL, COPY}
-        else counted(n, f"{why} run")
-        for why, n in reasons.items()
-    ]
+    parts = [counted(n, f"{before}run") + after for (before, after), n in reasons.items()]
     words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
     verb = "is" if sum(reasons.values()) == 1 else "are"
     return f"{counted(len(read), 'run')} read; {words} {verb} not used"

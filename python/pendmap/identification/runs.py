@@ -13,9 +13,8 @@ from pendmap.errors import InputError, short_repr
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.model import Rig
+    from pendmap.signal import Floats, Mask
     from pendmap.units import Units
 
 FORCED_WINDOW_SWINGS: Final = 3.0
@@ -35,9 +34,9 @@ TOLERANCES: Final = (1e-13, 1e-8)
 class Pivot:
     """Recorded motion of the pivot."""
 
-    time: NDArray[np.float64]  # s, on the clock of the run, increasing
-    vertical: NDArray[np.float64] | None = None  # shape (n,), upward: m/s^2, m/s or m
-    horizontal: NDArray[np.float64] | None = None  # shape (n,), toward positive theta
+    time: Floats  # s, on the clock of the run, increasing
+    vertical: Floats | None = None  # shape (n,), upward: m/s^2, m/s or m
+    horizontal: Floats | None = None  # shape (n,), toward positive theta
     quantity: str = "acceleration"  # or velocity, position
 
 
@@ -52,7 +51,7 @@ class RodSensor:
     friction holds the pendulum, ``th''`` is 0.
     """
 
-    angle: NDArray[np.float64]  # initial guess of the angle, rad, shape (n,)
+    angle: Floats  # initial guess of the angle, rad, shape (n,)
     rate: float = 0.0  # reading per rad/s; 0 for an accelerometer
     place: float = 0.0  # reading per rad/s^2; 0 for a gyroscope
     gravity: float = 0.0  # reading of full gravity; 0 if the sensor does not measure it
@@ -64,10 +63,10 @@ class RodSensor:
 class FitRun:
     """Record to be fitted; arrays have the shape (n,)."""
 
-    time: NDArray[np.float64]  # s, increasing; the drive's phase is that at time 0
-    theta: NDArray[np.float64]  # reading, rad unwrapped; of a rod sensor over its gain
-    sigma: float | NDArray[np.float64]  # standard error with rounding, rad, above 0
-    trusted: NDArray[np.bool_] | None = None  # included samples; None: all
+    time: Floats  # s, increasing; the drive's phase is that at time 0
+    theta: Floats  # reading, rad unwrapped; of a rod sensor over its gain
+    sigma: float | Floats  # standard error with rounding, rad, above 0
+    trusted: Mask | None = None  # included samples; None: all
     drive: Mapping[str, float | None] | None = None  # p, Omega (rad/s), phi (rad; may be unknown)
     pivot: Pivot | None = None  # recorded motion instead of a drive
     lab_time_s: float = 0.0  # laboratory time at time 0, for drifts
@@ -77,17 +76,17 @@ class FitRun:
     count: float | None = None  # sensor's step, rad, if readings are intervals
 
     @property
-    def angle(self) -> NDArray[np.float64]:
+    def angle(self) -> Floats:
         """Angle, rad; for a sensor on the rod the one computed from its readings."""
         return self.theta if self.rod_sensor is None else self.rod_sensor.angle
 
     @property
-    def counted(self) -> NDArray[np.bool_]:
+    def counted(self) -> Mask:
         """Mask of the included samples."""
         return np.ones(self.time.shape, bool) if self.trusted is None else self.trusted
 
     @property
-    def sigmas(self) -> NDArray[np.float64]:
+    def sigmas(self) -> Floats:
         """Standard error of each reading, rad."""
         return np.broadcast_to(np.asarray(self.sigma, np.float64), self.time.shape)
 
@@ -158,7 +157,7 @@ def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
         )
     factor = units.w0 ** powers[pivot.quantity] / rig.gravity
 
-    def bare(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    def bare(values: Floats | None) -> Floats | None:
         return None if values is None else factor * _floats("pivot", values)
 
     return {
@@ -169,7 +168,7 @@ def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
     }
 
 
-def _floats(what: str, values: object) -> NDArray[np.float64]:
+def _floats(what: str, values: object) -> Floats:
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim != 1:
         raise InputError(f"{what} must have 1 dimension, got {array.ndim}")

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 STATE: Final = 2  # Number of columns of an initial state
 

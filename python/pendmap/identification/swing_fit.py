@@ -11,9 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 BLOCK: Final = 12
@@ -184,7 +182,7 @@ def _step(
     return move, (inverse, follows, form_inverse)
 
 
-def _scales(residual: Floats, used: NDArray[np.bool_], blocks: list[slice]) -> Floats:
+def _scales(residual: Floats, used: Mask, blocks: list[slice]) -> Floats:
     """Return a robust estimate of each block's noise, rad, shape (W,)."""
     scale = np.ones(residual.shape[0])
     for block in blocks:
@@ -199,7 +197,7 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     rows: tuple[Floats, Floats, Floats],
     blocks: list[slice],
     found: tuple[Floats, Floats, Floats],
-    used: NDArray[np.bool_],
+    used: Mask,
     prior: tuple[Floats, Floats] | None,
     sigma: float | None,
     known: SwingFit | None,
@@ -249,9 +247,9 @@ class Windows:
 
     time: Floats  # s, shape (W, M)
     theta: Floats  # rad
-    used: NDArray[np.bool_]  # False for padding of shorter rows and excluded samples
-    crossing: NDArray[np.bool_]  # True for a zero crossing, False for a turn, shape (W,)
-    held: NDArray[np.bool_]  # whether the pendulum is held before the turn
+    used: Mask  # False for padding of shorter rows and excluded samples
+    crossing: Mask  # True for a zero crossing, False for a turn, shape (W,)
+    held: Mask  # whether the pendulum is held before the turn
     side: Floats  # sign of the turn, or of the velocity at the crossing
 
     @classmethod

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from pendmap.identification.methods.base import Identification
     from pendmap.model import Rig
     from pendmap.records import Run
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s; on a slower rig the first is that of small swings."""
@@ -38,11 +37,10 @@ _SAME: Final = 1e-9  # Interval below which events are identical, s
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """Initial state of a simulation: time (s), recorded angle (rad) and velocity (rad/s)."""
+    """Initial state of a simulation, at rest: time (s) and recorded angle (rad)."""
 
     time: float
     theta: float
-    velocity: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,19 +109,19 @@ def _rms(errors: Floats) -> float:
 def first_state(peaks: Peaks) -> State:
     """Return the initial state of simulations, the first peak, at which the velocity is zero."""
     turned = peaks.turned
-    return State(float(turned.time[0]), float(turned.amplitude[0]), 0.0)
+    return State(float(turned.time[0]), float(turned.amplitude[0]))
 
 
 def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Floats]:
     """Return times (s) and angles (rad) of a model's peaks after an initial state."""
-    run = simulate(rig, start.theta, start.velocity, max(until - start.time, 1e-3), samples=1)
+    run = simulate(rig, start.theta, 0.0, max(until - start.time, 1e-3), samples=1)
     kinds = run["event_kind"].values
     turned = np.isin(kinds, ("turn", "stick", "stuck for ever"))
     times, angles = run["event_time"].values[turned], run["event_theta"].values[turned]
     # A permanent stop has two events: its start and its confirmation.
-    new = np.concatenate(([True], np.diff(times) > _SAME)) if times.size else np.empty(0, bool)
+    new = np.diff(times, prepend=-math.inf) > _SAME
     times, angles = times[new], angles[new]
-    if start.velocity == 0 and (times.size == 0 or times[0] > _SAME):
+    if times.size == 0 or times[0] > _SAME:
         times, angles = np.append(0.0, times), np.append(start.theta, angles)
     return times + start.time, angles
 
@@ -222,13 +220,11 @@ def table_of(
             errors[name] = peak_errors(each, found, start)
         except InputError as error:
             lost[name] = str(error)
-    rows = [_row("period", asked, errors) for asked in periods]
-    rows += [_row("peak", asked, errors) for asked in peaks]
     # One measured value may be nearest to several values of the paper.
     told: dict[tuple[str, float], Row] = {}
-    for row in rows:
-        if row is not None:
-            told.setdefault((row.what, row.measured), row)
+    for what, asked in [*(("period", t) for t in periods), *(("peak", a) for a in peaks)]:
+        if row := _row(what, asked, errors):
+            told.setdefault((what, row.measured), row)
     return Table1(tuple(told.values()), errors, lost=lost)
 
 

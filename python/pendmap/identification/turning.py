@@ -16,10 +16,7 @@ from pendmap.signal.half_cycles import swings
 from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-
+    from pendmap.signal import Floats, Indices
 
 _SMOOTHING: Final = 0.1  # Half-width of the running mean, periods
 _SURE: Final = 6.0  # Least return of the angle after a turn, standard errors
@@ -31,7 +28,7 @@ _GAP: Final = 10.0  # Shortest gap, sampling intervals, before the period is kno
 class Outline:
     """Outline of a record of N samples: approximate turns, period and rest."""
 
-    turns: NDArray[np.intp]  # samples at turns of the smoothed angle, alternately maxima and minima
+    turns: Indices  # samples at turns of the smoothed angle, alternately maxima and minima
     period: float  # period of the late swings, s
     smooth: Floats  # running mean of the angle, rad, shape (N,)
     noise: float  # standard error of smooth, rad
@@ -91,7 +88,7 @@ def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
     return (total[last] - total[first]) / count, float(np.median(count))
 
 
-def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
+def _zigzag(x: Floats, threshold: float) -> Indices:
     """Return the indices of extremes after which the signal returns by more than a threshold."""
     found: list[int] = []
     values = x.tolist()
@@ -114,14 +111,14 @@ def _zigzag(x: Floats, threshold: float) -> NDArray[np.intp]:
     return np.array(found, dtype=np.intp)
 
 
-def zigzags(x: Floats, threshold: float, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
+def zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
     """Return the extremes of each part between gaps, without samples next to gaps."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
     return np.concatenate([part + at for part, at in zip(parts, begins, strict=True)])
 
 
-def _far_apart(turns: NDArray[np.intp], time: Floats, period: float) -> NDArray[np.intp]:
+def _far_apart(turns: Indices, time: Floats, period: float) -> Indices:
     """Return the turns without pairs that are closer than 0.3 periods."""
     kept: list[int] = []
     for k in turns.tolist():

@@ -7,14 +7,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from pendmap.formatting import Estimate
-
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices
 
 
 Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
@@ -59,23 +55,6 @@ def bootstrap(
         return np.array([function(row) for row in scattered])
 
 
-def estimates(
-    names: Sequence[str],
-    values: Floats,
-    covariance: Floats,
-    *,
-    intervals: Mapping[str, tuple[float, float]] | None = None,
-) -> dict[str, Estimate]:
-    """Return estimates with standard errors, and normal 95 % intervals unless they are given."""
-    given = intervals or {}
-    result = {}
-    for j, name in enumerate(names):
-        value, error = float(values[j]), float(np.sqrt(max(covariance[j, j], 0.0)))
-        normal = (value - Z95 * error, value + Z95 * error)
-        result[name] = Estimate(value, error, given.get(name, normal))
-    return result
-
-
 def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:
     """Return coefficients, covariance and misfit of a weighted fit ``y = c_0 + c_1 x``.
 
@@ -89,9 +68,7 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
     return coefficients, inverse * max(misfit, 1.0), misfit
 
 
-def chain_covariance(
-    pairs: NDArray[np.intp], left: Floats, right: Floats, variance: Floats
-) -> Floats:
+def chain_covariance(pairs: Indices, left: Floats, right: Floats, variance: Floats) -> Floats:
     """Return the covariance of ``left_j e_k + right_j e_{k+1}``, ``k = pairs_j``, shape (2, Q).
 
     Differences of successive peaks share a peak and its error; ``variance``, shape (P,), is that of

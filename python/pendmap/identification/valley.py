@@ -98,8 +98,7 @@ def _with(model: Rig, exponent: str, step: float) -> Rig:
     """Return a model whose exponent is changed by a step, within its range."""
     name, _, parameter = exponent.rpartition(".")
     effect = next(e for e in model.effects if e.name == name)
-    (entry,) = (e for e in effect.definition["parameters"] if e["name"] == parameter)
-    low, high = entry["range"]
+    low, high = effect.definition[parameter].range
     value = min(max(effect.parameters[parameter] + step, low), high)
     other = dataclasses.replace(effect, parameters={**effect.parameters, parameter: value})
     effects = tuple(other if e is effect else e for e in model.effects)

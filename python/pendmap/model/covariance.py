@@ -104,9 +104,3 @@ def misses(notes: Mapping[str, Any]) -> float:
         return math.nan
     ratio = float(rms) / float(noise)
     return ratio if ratio > MISSES else math.nan
-
-
-def misses_attribute(notes: Mapping[str, Any]) -> dict[str, float | str]:
-    """Return the attribute ``misses_record`` of a dataset, if a model misses its record."""
-    ratio = misses(notes)
-    return {"misses_record": ratio} if math.isfinite(ratio) else {}

@@ -7,38 +7,14 @@ import difflib
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from pendmap.errors import InputError, check_flag, check_number, short_repr
+from pendmap.errors import InputError, check_flag, check_keys, check_number, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from pendmap.units import Units
-
-_NO_SHAPE: Final = ("size", "phase")
-
-
-class ParameterKey(NamedTuple):
-    """A formula's parameter as passed to the core; ``less`` is an index into the parameters."""
-
-    name: str
-    power: float
-    less: int | None
-    unit: str
-    range: tuple[float, float]
-    typical: tuple[float, float]
-    meaning: str
-    role: str | None
-
-
-class FormulaKey(NamedTuple):
-    """A formula as passed to the core."""
-
-    name: str
-    term: str
-    revealed_by: str
-    parameters: tuple[ParameterKey, ...]
 
 
 class Described(Protocol):
@@ -49,24 +25,12 @@ class Described(Protocol):
         """Name of the formula."""
 
     @property
-    def key(self) -> FormulaKey:
-        """The formula as passed to the core."""
-
-    @property
-    def entry(self) -> dict[str, Any]:
+    def definition(self) -> EffectDefinition:
         """Definition, like that of an effect of the library."""
 
     @property
     def table(self) -> dict[str, Any]:
         """Table of the formula in a model file."""
-
-
-@functools.cache
-def library() -> dict[str, dict[str, Any]]:
-    """Return the definitions of the library's effects by name, as the Rust core lists them."""
-    from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
-
-    return {entry["name"]: entry for entry in _core.effects()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,6 +67,18 @@ class EffectParameter:
     typical: tuple[float, float]
     meaning: str
 
+    @property
+    def is_shape(self) -> bool:
+        """Whether it is neither the strength of an effect nor its phase."""
+        return self.role not in {"size", "phase"}
+
+    @property
+    def middle(self) -> float:
+        """The mean of a shape's typical range, geometric if the range is positive."""
+        low, high = self.typical
+        value = math.sqrt(low * high) if low > 0 else 0.5 * (low + high)
+        return float(round(value)) if self.role == "order" else value
+
 
 @dataclasses.dataclass(frozen=True)
 class EffectDefinition:
@@ -137,6 +113,33 @@ class EffectDefinition:
     mappable: str
     revealed_by: str
 
+    @classmethod
+    def of(cls, entry: dict[str, Any]) -> EffectDefinition:
+        """Return the definition of an entry of the Rust core."""
+        parameters = [
+            EffectParameter(**each | {key: tuple(each[key]) for key in ("range", "typical")})
+            for each in entry["parameters"]
+        ]
+        return cls(**entry | {"parameters": tuple(parameters)})
+
+    def __getitem__(self, name: str) -> EffectParameter:
+        """Return a parameter."""
+        return next(parameter for parameter in self.parameters if parameter.name == name)
+
+    @property
+    def opposes(self) -> bool:
+        """Whether it is damping whose size is 0 or more."""
+        sizes = (parameter for parameter in self.parameters if parameter.role == "size")
+        return self.group == "damping" and all(size.typical[0] >= 0 for size in sizes)
+
+
+@functools.cache
+def library() -> dict[str, EffectDefinition]:
+    """Return the definitions of the library's effects by name, which are written in Rust."""
+    from pendmap import _core  # noqa: PLC0415 (only models with effects need it)
+
+    return {entry["name"]: EffectDefinition.of(entry) for entry in _core.effects()}
+
 
 def effects() -> list[EffectDefinition]:
     """Return the definitions of the library's effects, which are written in Rust.
@@ -147,37 +150,10 @@ def effects() -> list[EffectDefinition]:
     >>> [effect.formula for effect in pendmap.effects() if effect.name == "quadratic_drag"]
     ['-q v |v|']
     """
-    return [described(entry) for entry in library().values()]
+    return [*library().values()]
 
 
-def described(entry: Mapping[str, Any]) -> EffectDefinition:
-    """Return the definition of an entry of :func:`library`, or of ``Formula.entry``."""
-    parameters = [
-        EffectParameter(**each | {key: tuple(each[key]) for key in ("range", "typical")})
-        for each in entry["parameters"]
-    ]
-    return EffectDefinition(**{**entry, "parameters": tuple(parameters)})
-
-
-def is_shape(entry: Mapping[str, Any]) -> bool:
-    """Return whether a parameter is neither the strength of an effect nor its phase."""
-    return entry["role"] not in _NO_SHAPE
-
-
-def opposes(definition: Mapping[str, Any]) -> bool:
-    """Return whether an effect of this definition is damping whose size is 0 or more."""
-    entries = (entry for entry in definition["parameters"] if entry["role"] == "size")
-    return definition["group"] == "damping" and all(e["typical"][0] >= 0 for e in entries)
-
-
-def middle(entry: Mapping[str, Any]) -> float:
-    """Return the mean of a shape's typical range, geometric if the range is positive."""
-    low, high = entry["typical"]
-    value: float = math.sqrt(low * high) if low > 0 else 0.5 * (low + high)
-    return float(round(value)) if entry["role"] == "order" else value
-
-
-def definition(name: object) -> dict[str, Any]:
+def definition(name: object) -> EffectDefinition:
     """Return the library's definition of an effect; raise InputError if there is none."""
     known = library()
     if not isinstance(name, str) or name not in known:
@@ -235,12 +211,11 @@ class Effect:
     def __post_init__(self) -> None:
         if self.formula is not None and self.formula.name != self.name:
             raise InputError(f"name must be {self.formula.name}, got {short_repr(self.name)}")
-        names = [entry["name"] for entry in self.definition["parameters"]]
+        names = [parameter.name for parameter in self.definition.parameters]
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
         if missing:
-            entries = self.definition["parameters"]
-            needed = ", ".join(f"{entry['name']} ({entry['unit']})" for entry in entries)
+            needed = ", ".join(f"{each.name} ({each.unit})" for each in self.definition.parameters)
             raise InputError(f"{self.name}: {missing[0]} is missing: it needs {needed}")
         values = {name: check_number(f"{self.name}: {name}", given[name]) for name in names}
         object.__setattr__(self, "parameters", values)
@@ -261,23 +236,23 @@ class Effect:
         return hash((self.name, *self.parameters.values()))
 
     @property
-    def definition(self) -> dict[str, Any]:
+    def definition(self) -> EffectDefinition:
         """The definition by the library, or by the formula."""
-        return definition(self.name) if self.formula is None else self.formula.entry
+        return definition(self.name) if self.formula is None else self.formula.definition
 
     @classmethod
     def blank(cls, name: str, units: Units) -> Effect:
         """Return an effect as the start of a search: smallest typical size, middle shape."""
         values = {
-            entry["name"]: float(f"{middle(entry):.1g}") if is_shape(entry) else entry["typical"][0]
-            for entry in definition(name)["parameters"]
+            each.name: float(f"{each.middle:.1g}") if each.is_shape else each.typical[0]
+            for each in definition(name).parameters
         }
         return cls(name, values).given(units)
 
     @property
     def sizes(self) -> list[str]:
         """Names of the parameters that are its strength or the phase at which it acts."""
-        return [entry["name"] for entry in self.definition["parameters"] if not is_shape(entry)]
+        return [each.name for each in self.definition.parameters if not each.is_shape]
 
     @property
     def values(self) -> list[float]:
@@ -287,32 +262,32 @@ class Effect:
     @property
     def drives(self) -> bool:
         """Whether it moves the pivot, or is a torque with the phase of the drive."""
-        return bool(self.definition["group"] == "drive")
+        return self.definition.group == "drive"
 
     @property
     def brakes(self) -> bool:
         """Whether it is damping or friction."""
-        return bool(self.definition["group"] == "damping")
+        return self.definition.group == "damping"
 
     @property
     def reads(self) -> bool:
         """Whether it changes the sensor's reading alone."""
-        return bool(self.definition["group"] == "reading")
+        return self.definition.group == "reading"
 
     @property
     def drifts(self) -> bool:
         """Whether it changes with the time in the laboratory, which is fixed in maps."""
-        return bool(self.definition["mappable"] == "frozen")
+        return self.definition.mappable == "frozen"
 
     def title(self, units: Units, without: Collection[str] = ()) -> str:
         """Return name and parameters, those of ``without`` (``EFFECT.PARAMETER``) left out."""
         shown = []
-        for entry in self.definition["parameters"]:
-            if f"{self.name}.{entry['name']}" in without:
+        for each in self.definition.parameters:
+            if f"{self.name}.{each.name}" in without:
                 continue
-            said = units.si or (entry["power_of_w0"] == 0 and entry["power_of_w0_less"] is None)
-            unit = entry["unit"] if said and entry["unit"] != "1" else ""
-            shown.append(f"{entry['name']} = {self.parameters[entry['name']]:.4g} {unit}".rstrip())
+            said = units.si or (each.power_of_w0 == 0 and each.power_of_w0_less is None)
+            unit = each.unit if said and each.unit != "1" else ""
+            shown.append(f"{each.name} = {self.parameters[each.name]:.4g} {unit}".rstrip())
         return f"{self.name} ({', '.join(shown)})" if shown else self.name
 
     def given(self, units: Units) -> Effect:
@@ -324,13 +299,11 @@ class Effect:
         return self._scaled(units.bare)
 
     def _scaled(self, scale: Any) -> Effect:  # noqa: ANN401 (a method of Units)
-        def power(entry: dict[str, Any]) -> float:
-            less = entry["power_of_w0_less"]
-            own: float = entry["power_of_w0"]
-            # Exponents have the power 0: they are the same in all units.
-            return own if less is None else own - self.parameters[less]
-
-        powers = {entry["name"]: power(entry) for entry in self.definition["parameters"]}
+        # Exponents have the power 0: they are the same in all units.
+        powers = {
+            each.name: each.power_of_w0 - self.parameters.get(each.power_of_w0_less or "", 0)
+            for each in self.definition.parameters
+        }
         return dataclasses.replace(
             self,
             parameters={n: scale(value, powers[n]) for n, value in self.parameters.items()},
@@ -341,11 +314,7 @@ class Effect:
 def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise InputError(f"{what} must be a mapping of {', '.join(names)}, got {short_repr(value)}")
-    unknown = [name for name in value if name not in names]
-    if unknown:
-        raise InputError(
-            f"{what}: {short_repr(unknown[0])} is not known: it must be one of {', '.join(names)}"
-        )
+    check_keys(f"{what}: ", value, names)
     return value
 
 

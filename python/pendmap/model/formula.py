@@ -8,11 +8,11 @@ import math
 import os
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendmap.errors import InputError, check_number, core_errors, short_repr
+from pendmap.errors import InputError, check_keys, check_number, core_errors, short_repr
 from pendmap.files import read_toml
-from pendmap.model.effects import Effect, FormulaKey, ParameterKey
+from pendmap.model.effects import Effect, EffectDefinition
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,6 +29,28 @@ _EXAMPLES: Final = {"name": '"cubic"', "term": '"-k*v^3"', "parameters": "{ k = 
 """Keys that a formula needs, with examples for messages."""
 _TYPICAL: Final = (1e-4, 0.3)  # Default range of interest: that of the library's sizes
 _LESS: Final = re.compile(r"\s*2\s*-\s*([A-Za-z]\w*)\s*")
+
+
+class ParameterKey(NamedTuple):
+    """A formula's parameter as passed to the core; ``less`` is an index into the parameters."""
+
+    name: str
+    power: float
+    less: int | None
+    unit: str
+    range: tuple[float, float]
+    typical: tuple[float, float]
+    meaning: str
+    role: str | None
+
+
+class FormulaKey(NamedTuple):
+    """A formula as passed to the core."""
+
+    name: str
+    term: str
+    revealed_by: str
+    parameters: tuple[ParameterKey, ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +114,7 @@ class Formula:
     parameters: Mapping[str, Any]
     revealed_by: str = ""
     key: FormulaKey = dataclasses.field(init=False, repr=False, compare=True)
-    entry: dict[str, Any] = dataclasses.field(init=False, repr=False, compare=False)
+    definition: EffectDefinition = dataclasses.field(init=False, repr=False, compare=False)
     proportional: bool = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -124,8 +146,9 @@ class Formula:
         with core_errors():
             entry, proportional = _core.formula(key)
         kept = dict(zip(names, tables, strict=True))
-        found = {"parameters": kept, "key": key, "entry": entry, "proportional": proportional}
-        for what, value in found.items():
+        definition = EffectDefinition.of(entry)
+        found = {"key": key, "definition": definition, "proportional": proportional}
+        for what, value in (found | {"parameters": kept}).items():
             object.__setattr__(self, what, value)
 
     def __hash__(self) -> int:
@@ -194,11 +217,6 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
         raise InputError(f"{os.fspath(path)}: {error}") from None
 
 
-def shown_key(key: str) -> str:
-    """Return a key of a file as it is written in messages."""
-    return key if key.isidentifier() else short_repr(key)
-
-
 def each_table(
     name: str, tables: object, keys: tuple[str, ...], examples: Mapping[str, str]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -209,10 +227,7 @@ def each_table(
         where = f"[[{name}]] {count}"
         if not isinstance(table, dict):
             raise InputError(f"{where}: must be a table, got {short_repr(table)}")
-        unknown = [shown_key(key) for key in table if key not in keys]
-        if unknown:
-            known = ", ".join(keys)
-            raise InputError(f"{where}: {unknown[0]} is not known: it must be one of {known}")
+        check_keys(f"{where}: ", table, keys)
         for key, example in examples.items():
             if key not in table:
                 raise InputError(f"{where}: {key} must be given, like {key} = {example}")
@@ -271,12 +286,7 @@ def _parameter(
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
     said = given if isinstance(given, Mapping) else {"power": given}
-    unknown = [key for key in said if key not in PARAMETER]
-    if unknown:
-        raise InputError(
-            f"parameter '{name}': {short_repr(unknown[0])} is not known: it must be one "
-            f"of {', '.join(PARAMETER)}"
-        )
+    check_keys(f"parameter '{name}': ", said, PARAMETER)
     if "power" not in said:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
     power, less = _power(name, said["power"], names)

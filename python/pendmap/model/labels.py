@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from pendmap.model import effects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from pendmap.model.effects import EffectDefinition
 
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -51,13 +53,11 @@ LABELS: Final[Mapping[str, Label]] = {
 
 
 def unit_of(
-    parameter: str, definition: Callable[[str], Mapping[str, Any]] = effects.definition
+    parameter: str, definition: Callable[[str], EffectDefinition] = effects.definition
 ) -> str:
     """Return the SI unit, with raised digits, of ``w0``, ``phi[2]`` or ``EFFECT.PARAMETER``."""
     effect, _, own = parameter.partition("[")[0].rpartition(".")
-    if effect:
-        entries = definition(effect)["parameters"]
-        unit = str(next(entry["unit"] for entry in entries if entry["name"] == own))
-    else:
-        unit = LABELS[own].unit if own in LABELS else "1"
+    if not effect and own not in LABELS:
+        return ""
+    unit = definition(effect)[own].unit if effect else LABELS[own].unit
     return "" if unit == "1" else re.sub(r"\^(\d)", lambda m: m[1].translate(_RAISED), unit)

@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
-from pendmap.model.covariance import misses_attribute
+from pendmap.model.covariance import misses
 from pendmap.model.effects import Effect
 from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS, unit_of
@@ -162,7 +162,7 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
         if effect.formula is not None:
             continue
         # The only parameter of an effect that duplicates one of the model has its name.
-        names = [entry["name"] for entry in effect.definition["parameters"]]
+        names = [parameter.name for parameter in effect.definition.parameters]
         if len(names) == 1 and names[0] in own:
             called, value = own[names[0]]
             if value != 0:
@@ -208,7 +208,8 @@ def attributes_of(
     ]
     angle = {"angle": "line"} if pendulum.counts_turns else {}
     found = {"units": model.units.name} | numbers | bare | {"effects": json.dumps(effects)} | angle
-    return found | misses_attribute(model.notes)
+    ratio = misses(model.notes)
+    return found | ({"misses_record": ratio} if math.isfinite(ratio) else {})
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:

@@ -6,9 +6,9 @@ import dataclasses
 import functools
 from typing import TYPE_CHECKING, Any
 
-from pendmap.errors import InputError, check_number, check_type
+from pendmap.errors import InputError, check_keys, check_number, check_type
 from pendmap.model import quantities
-from pendmap.model.effects import definition, library
+from pendmap.model.effects import library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.model.tables import SI_KEYS, read_model
@@ -25,9 +25,9 @@ def own_name(effect: str) -> str | None:
     """Return the parameter of a :class:`Rig` with the same term as an effect, if any."""
     if effect not in library():
         return None
-    entries = definition(effect)["parameters"]
-    known = COUNTERPARTS.get(entries[0]["name"])
-    return known[0] if len(entries) == 1 and known is not None else None
+    parameters = library()[effect].parameters
+    known = COUNTERPARTS.get(parameters[0].name)
+    return known[0] if len(parameters) == 1 and known is not None else None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,9 +147,7 @@ class Rig:
         >>> round(rig.w0, 4), round(rig.p, 4), round(rig.pendulum.gamma, 4)
         (6.2642, 0.2906, 0.02)
         """
-        unknown = [name for name in given if name not in SI_KEYS]
-        if unknown:
-            raise InputError(f"{unknown[0]} is not known: it must be one of {', '.join(SI_KEYS)}")
+        check_keys("", given, SI_KEYS)
         return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
 
     @classmethod

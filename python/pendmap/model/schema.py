@@ -19,6 +19,7 @@ from pendmap.model.tables import BARE_KEYS, EFFECT, FORMAT, SI_KEYS, TOP
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from pendmap.model.effects import EffectDefinition
     from pendmap.model.labels import Label
 
 _NUMBER = {"type": "number"}
@@ -65,14 +66,14 @@ def _labelled(label: Label) -> dict[str, Any]:
     return _NUMBER | {"description": ", ".join(filter(None, (label.meaning, label.unit)))}
 
 
-def _effect(entry: Mapping[str, Any]) -> dict[str, Any]:
+def _effect(effect: EffectDefinition) -> dict[str, Any]:
     """Return the schema of an effect of the library."""
     numbers = {
-        each["name"]: _NUMBER | {"description": f"{each['meaning']}, {each['unit']} in SI"}
-        for each in entry["parameters"]
+        each.name: _NUMBER | {"description": f"{each.meaning}, {each.unit} in SI"}
+        for each in effect.parameters
     }
-    parameters = _table(entry["formula"], numbers, numbers)
-    return _of_effect(entry["name"], {"const": entry["name"]}, parameters)
+    parameters = _table(effect.formula, numbers, numbers)
+    return _of_effect(effect.name, {"const": effect.name}, parameters)
 
 
 def _values(of: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,12 +6,12 @@ import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from pendmap.errors import InputError, check_number, check_whole, short_repr
+from pendmap.errors import InputError, check_keys, check_number, check_whole, short_repr, shown_key
 from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, each_table, formulas_of, in_file, shown_key
+from pendmap.model.formula import Formula, each_table, formulas_of, in_file
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
@@ -80,11 +80,8 @@ def check_notes(notes: object) -> None:
     """Raise InputError for notes that a model file cannot hold."""
     if not isinstance(notes, Mapping):
         raise InputError(f"notes must be a mapping, got {short_repr(notes)}")
+    check_keys("", notes, NOTES)
     for name, table in notes.items():
-        if name not in NOTES:
-            raise InputError(
-                f"{short_repr(name)} is not known: it must be one of {', '.join(NOTES)}"
-            )
         if not isinstance(table, Mapping):
             raise InputError(f"{name} must be a table [{name}], got {short_repr(table)}")
 

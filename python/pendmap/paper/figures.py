@@ -34,7 +34,7 @@ FIGURES: Final = {
 }
 """Titles of the figures, by the names a user types."""
 _TRANSIENT: Final = 500  # Forcing periods before figure 2 begins
-_RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s\u00b2"
+_RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s²"
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
 PRINTED: Final = {
@@ -99,14 +99,14 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import motions, pendulum  # noqa: PLC0415
     from pendmap.paper import tumbling as chaos  # noqa: PLC0415
-    from pendmap.render.written import save  # noqa: PLC0415
+    from pendmap.render.drawing import save  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
         raise InputError(f"key must be one figure, got {key!r}")
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
-    if key in ("1", "2"):
+    if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         return save(tongues.chart(_critical(), title=title, marks=marks), path)
     if key == "2":
@@ -125,8 +125,8 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         path,
         parts=(_PARTS[key],),
         title=title,
-        subtitle=f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1\u00b0, zero off by "
-        f"0.05\u00b0, seed {seed}",
+        subtitle=f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by "
+        f"0.05°, seed {seed}",
     )
 
 

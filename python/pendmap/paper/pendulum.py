@@ -9,11 +9,12 @@ import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Areas, Ends, Line, Mark, Text
+from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
 
-    Point = tuple[float, float]
+    Point = tuple[float, float] | Floats
 
 TITLE: Final = "The parametric pendulum"
 SIZE: Final = (6.0, 5.6)  # Width and height, inches
@@ -25,7 +26,10 @@ ASIDE: Final = 0.5
 """Lengths in units of the drawing, one inch each: rod, radius of the bob, distance of annotations
 from the rod."""
 
-_DRIVE: Final = "cos(\u03a9t + \u03c6)"
+_SIDE: Final = np.array([math.cos(THETA), math.sin(THETA)])  # Unit vector across the rod
+_END: Final = LENGTH * np.array([math.sin(THETA), -math.cos(THETA)])  # Centre of the bob
+
+_DRIVE: Final = "cos(Ωt + φ)"
 _STEEL, _DARK, _RAIL, _HELP = "#3d4f66", "#1d3557", "#b8c2cf", "#8a8a8a"
 _FORCE, _MOTION = "#d55e00", "#0072b2"
 _WHITE: Final = "#ffffff"
@@ -40,16 +44,14 @@ def chart(size: Ends | None = None, title: str | None = None) -> Chart:
     ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
     """
     width, height = size or SIZE
-    equation = f"th'' + (c/m) th' + w0\u00b2 (1 + p {_DRIVE}) sin th = \u2212Tr sign(th')"
-    known = "w0\u00b2 = g/l, p = Y\u03a9\u00b2/g"
-    equation = f"{equation};   {known}".replace("th", "\u03b8").replace("w0", "\u03c9\u2080")
+    equation = f"θ'' + (c/m) θ' + ω₀² (1 + p {_DRIVE}) sin θ = -Tr sign(θ');   ω₀² = g/l, p = YΩ²/g"
     scale = min((width - 0.2) / 5.8, (height - HEAD) / 4.85)
     wide, high = (width - 0.2) / scale, (height - HEAD) / scale
     sides = Axis("", (0.55 - wide / 2, 0.55 + wide / 2)), Axis("", (1.25 - high, 1.25))
     font = 11.0 * min(scale, 1.2)
     marks = [*_guide(font), *_rod(font), *_forces(font)]
     panel = Panel("pendulum", "", *sides, marks, bare=True)
-    return Chart(title or TITLE, equation, [panel], size=(width, height))
+    return Chart(title or TITLE, typographic(equation), [[panel]], size=(width, height))
 
 
 def _guide(font: float) -> list[Mark]:
@@ -66,63 +68,48 @@ def _guide(font: float) -> list[Mark]:
         Line(*slider.T, colour=_DARK, width=1.4, order=2.1),
         *_arrow((-0.82, -0.75), (-0.82, 0.75), _MOTION, both=True),
         _line((-0.94, 0.0), (-0.6, 0.0), _HELP, 0.8, dash=_DASHED),
-        Text(-0.98, 0.3, f"\u2212Y {_DRIVE}", **moves),
+        Text(-0.98, 0.3, typographic(f"-Y {_DRIVE}"), **moves),
         Text(-0.98, -0.02, "the pivot's place,\nupward", **place),
     ]
 
 
 def _rod(font: float) -> list[Mark]:
     """Return rod, bob, rest position, angle and length."""
-    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
-    side, half, radius = (math.cos(THETA), math.sin(THETA)), THETA / 2, 1.55
-    across, along = 0.055 * side[0], 0.055 * side[1]
-    rod = [(-across, -along), (across, along), (x + across, y + along), (x - across, y - along)]
+    radius, wide = 1.55, 0.055 * _SIDE
+    middle = np.array([math.sin(THETA / 2), -math.cos(THETA / 2)])
+    rod = np.array([-wide, wide, _END + wide, _END - wide])
     # The length is drawn beside the rod, opposite to the angle, from pivot to bob.
-    move = (ASIDE * side[0], ASIDE * side[1])
+    move = ASIDE * _SIDE
     marks: list[Mark] = [
         _line((0.0, -0.3), (0.0, -LENGTH - 0.3), _HELP, 0.9, dash=_DASHED),
         Line(*_arc((0.0, -LENGTH), BOB).T, colour=_HELP, width=0.9, dash=(3.0, 2.0)),
-        Areas([np.array(rod)], colour=_STEEL, order=3.0),
+        Areas([rod], colour=_STEEL, order=3.0),
         Areas([_arc((0.0, 0.0), 0.13)], colour=_WHITE, order=4.0),
         Line(*_arc((0.0, 0.0), 0.13).T, colour=_DARK, width=1.6, order=4.1),
-        Areas([_arc((0.0, 0.0), 0.04), _arc((x, y), BOB)], colour=_DARK, order=4.2),
-        Text(x, y, "$m$", colour=_WHITE, size=font, order=5.0),
+        Areas([_arc((0.0, 0.0), 0.04), _arc(_END, BOB)], colour=_DARK, order=4.2),
+        _text(_END, "$m$", colour=_WHITE, size=font, order=5.0),
         *_turn(radius, -math.pi / 2, THETA - math.pi / 2, _DARK, 1.3),
-        Text(
-            (radius + 0.22) * math.sin(half),
-            -(radius + 0.22) * math.cos(half),
-            "\u03b8",
-            colour=_DARK,
-            size=1.3 * font,
-        ),
-        *_arrow(move, (x + move[0], y + move[1]), _HELP, both=True, thin=True),
-        Text(x / 2 + 1.4 * move[0], y / 2 + 1.4 * move[1], "$l$", size=1.1 * font),
+        _text((radius + 0.22) * middle, "θ", colour=_DARK, size=1.3 * font),
+        *_arrow(move, _END + move, _HELP, both=True, thin=True),
+        _text(_END / 2 + 1.4 * move, "$l$", size=1.1 * font),
     ]
-    for (foot_x, foot_y), first in (((0.0, 0.0), 0.2), ((x, y), BOB + 0.04)):
-        near, far = (
-            (foot_x + end * side[0], foot_y + end * side[1]) for end in (first, ASIDE + 0.08)
-        )
-        marks.append(_line(near, far, _HELP, 0.7))
+    for foot, first in ((np.zeros(2), 0.2), (_END, BOB + 0.04)):
+        marks.append(_line(foot + first * _SIDE, foot + (ASIDE + 0.08) * _SIDE, _HELP, 0.7))
     return marks
 
 
 def _forces(font: float) -> list[Mark]:
     """Return gravity, the velocity, and friction and drag against the motion."""
-    x, y = LENGTH * math.sin(THETA), -LENGTH * math.cos(THETA)
-    side = (math.cos(THETA), math.sin(THETA))
     # The velocity is along the arc, upward.
-    start = (x + (ASIDE + 0.14) * side[0], y + (ASIDE + 0.14) * side[1])
-    torque = "drag and dry friction over m l\u00b2:\n(c/m) d\u03b8/dt + Tr sign(d\u03b8/dt)"
+    start = _END + (ASIDE + 0.14) * _SIDE
+    torque = "drag and dry friction over m l²:\n(c/m) dθ/dt + Tr sign(dθ/dt)"
     pull: dict[str, Any] = {"colour": _FORCE, "align": _LEFT}
-    end = (start[0] + 0.7 * side[0], start[1] + 0.7 * side[1])
     above: dict[str, Any] = {"colour": _MOTION, "align": ("center", "bottom"), "size": font}
     return [
-        *_arrow((x, y - BOB), (x, y - BOB - 0.75), _FORCE),
-        Text(x + 0.14, y - BOB - 0.5, "$m\\,g$", size=font, **pull),
-        *_arrow(start, end, _MOTION),
-        Text(
-            start[0] + 0.78 * side[0], start[1] + 0.78 * side[1] + 0.12, "d\u03b8/dt > 0", **above
-        ),
+        *_arrow(_END - (0.0, BOB), _END - (0.0, BOB + 0.75), _FORCE),
+        _text(np.add(_END, (0.14, -BOB - 0.5)), "$m\\,g$", size=font, **pull),
+        *_arrow(start, start + 0.7 * _SIDE, _MOTION),
+        _text(start + 0.78 * _SIDE + (0.0, 0.12), "dθ/dt > 0", **above),
         # Torque about the axle, opposite to the rotation.
         *_turn(0.98, math.radians(52), math.radians(-14), _FORCE, 1.6),
         Text(1.14, 0.42, torque, size=0.82 * font, **pull),
@@ -132,6 +119,10 @@ def _forces(font: float) -> list[Mark]:
 def _line(start: Point, end: Point, colour: str, width: float, **look: Any) -> Line:  # noqa: ANN401
     x, y = np.array([start, end]).T
     return Line(x, y, colour=colour, width=width, order=1.0, **look)
+
+
+def _text(at: Floats, text: str, **look: Any) -> Text:  # noqa: ANN401 (fields of a text)
+    return Text(float(at[0]), float(at[1]), text, **look)
 
 
 def _arc(centre: Point, radius: float, first: float = 0.0, last: float = math.tau) -> Floats:
@@ -150,11 +141,8 @@ def _arrow(
 ) -> list[Mark]:
     way = math.atan2(end[1] - start[1], end[0] - start[0])
     size = 0.12 if thin else 0.17
-    first, last = (
-        (at[0] + part * size * math.cos(way), at[1] + part * size * math.sin(way))
-        for at, part in ((start, 0.5 * both), (end, -0.5))
-    )
-    line = _line(first, last, colour, 0.9 if thin else 1.6)
+    short = 0.5 * size * np.array([math.cos(way), math.sin(way)])
+    line = _line(start + both * short, end - short, colour, 0.9 if thin else 1.6)
     marks: list[Mark] = [line, _head(end, way, colour, size)]
     return [*marks, _head(start, way + math.pi, colour, size)] if both else marks
 

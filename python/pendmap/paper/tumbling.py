@@ -27,18 +27,18 @@ def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
     damping = ", ".join(f"{gamma:g}" for gamma in gammas)
     periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]
     shared = (
-        f"\N{GREEK SMALL LETTER GAMMA} = {damping};   time history, phase plane ({min(periods)} "
-        f"periods), Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section ({points} points)"
+        f"γ = {damping};   time history, phase plane ({min(periods)} "
+        f"periods), Poincaré section ({points} points)"
     )
     rows = list(zip(*(_column(run, k) for k, run in enumerate(runs)), strict=True))
     size = (0.6 + 3.1 * len(runs), 9.0)
-    return Chart.of(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
+    return Chart(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
 
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:
     """Return time history, phase plane and section of a trajectory."""
     attrs, units = run.attrs, Units.of(run.attrs)
-    point = f"p = {attrs['p']:g}, \N{GREEK SMALL LETTER OMEGA} = {attrs['omega']:g}"
+    point = f"p = {attrs['p']:g}, ω = {attrs['omega']:g}"
     part, whole = _first(run, HISTORY), _first(run, CURVE)
     time, theta = part["time"].values, part["theta"].values
     clock = Axis(names.clock(units), (float(time[0]), float(time[-1])))

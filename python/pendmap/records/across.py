@@ -7,6 +7,7 @@ within their resolution. Two recordings of one motion, in contrast, differ by th
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -140,30 +141,24 @@ def _spread(theta: Floats, tick: NDArray[np.int64]) -> Floats:
 
 def _lags(a: Floats, b: Floats, least: int) -> set[int]:
     """Return the lags, in ticks, at which ``b`` is closest to ``a`` and to its mirror image."""
-    wide = 1 << (a.size + b.size - 1).bit_length()
+    from scipy.signal import correlate, correlation_lags
+
+    product = functools.partial(correlate, method="fft")
+    there_a, there_b = np.isfinite(a).astype(float), np.isfinite(b).astype(float)
     middle = float(np.nanmean(a))
-    lags = np.arange(1 - b.size, a.size)
-
-    def spectra(values: Floats) -> list[NDArray[np.complex128]]:
-        there = np.isfinite(values)
-        moved = np.where(there, values - middle, 0.0)
-        return [np.fft.rfft(part, wide) for part in (there.astype(float), moved, moved * moved)]
-
-    def product(x: NDArray[np.complex128], y: NDArray[np.complex128]) -> Floats:
-        return np.asarray(np.fft.irfft(x * np.conj(y), wide)[lags % wide])
-
-    (there_a, one_a, two_a), (there_b, one_b, two_b) = spectra(a), spectra(b)
+    one_a, one_b = np.nan_to_num(a - middle), np.nan_to_num(b - middle)
     count = np.round(product(there_a, there_b))
     enough = count >= least
     if not enough.any():
         return set()
     count = np.maximum(count, 1.0)
     mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
-    own = (product(two_a, there_b) + product(there_a, two_b)) / count - mean_a**2 - mean_b**2
+    squares = product(one_a**2, there_b) + product(there_a, one_b**2)
+    own = squares / count - mean_a**2 - mean_b**2
     both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
     # The variance of the difference, and of the sum.
     found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
-    return {int(lags[k]) for k in found}
+    return {int(correlation_lags(a.size, b.size)[k]) for k in found}
 
 
 def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:

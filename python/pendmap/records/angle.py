@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-TURN: Final = 2 * math.pi
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
@@ -125,9 +124,9 @@ def _accelerated(work: Work) -> None:
 def _unwrap(work: Work) -> None:
     """Unwrap the readings of a sensor that reads the angle modulo one turn."""
     steps = np.diff(work.theta)
-    jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * TURN)
+    jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * math.tau)
     span = float(np.ptp(work.theta))
-    if not jumps.size or span > WRAPPED_SPAN * TURN or span < 0.9 * TURN:
+    if not jumps.size or span > WRAPPED_SPAN * math.tau or span < 0.9 * math.tau:
         return
     work.theta = np.unwrap(work.theta)
     text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"

@@ -63,8 +63,7 @@ def check(work: Work) -> None:
 def _velocity(work: Work) -> None:
     """Compare a velocity with the angle's derivative: invert, rescale or remove it."""
     velocity = work.extra["velocity"]
-    missing = int(np.count_nonzero(~np.isfinite(velocity)))
-    if missing:
+    if missing := int(np.count_nonzero(~np.isfinite(velocity))):
         text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
         work.report("velocity-missing", text)
         del work.extra["velocity"]
@@ -185,9 +184,8 @@ def _acceleration(work: Work) -> None:
         return
     motion = None if work.plan.kind == "forced" else _motion(work)
     if motion is None:
-        forced = "on a forced run it includes the pivot's"
-        short = "too few samples have an angle to compare it with"
-        why = forced if work.plan.kind == "forced" else short
+        why = "too few samples have an angle to compare it with"
+        why = "on a forced run it includes the pivot's" if work.plan.kind == "forced" else why
         work.report("acceleration-unused", f"the acceleration is not used: {why}")
     elif work.accelerometer is None:
         _unplaced(work, motion)

@@ -201,7 +201,7 @@ class Experiment:
     @property
     def w0(self) -> float | None:
         """``w0`` of ``[rig]``, rad/s; None if not given or inconsistent with a record's period."""
-        doubtful = any(f.what == "period-unlike-rig" for f in self._said())
+        doubtful = any(found.what == "period-unlike-rig" for _, found in self.said(self.runs))
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
 
     @property
@@ -213,12 +213,11 @@ class Experiment:
         """Raise InputError if none of the runs has samples for fitting."""
         if any(run.moves for run in runs):
             return
-        why = next(
-            (f.text for f in self._said() if f.what in NOTHING_TO_FIT), "no sample is trusted"
-        )
+        whys = (found.text for _, found in self.said(self.runs) if found.what in NOTHING_TO_FIT)
+        why = next(whys, "no sample is trusted")
         raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 
-    def _said(self) -> Iterator[Finding]:
-        yield from self.findings
-        for run in self.runs:
-            yield from run.findings
+    def said(self, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
+        """Yield the findings about the experiment and some runs, with their places."""
+        yield from ((str(self.path), found) for found in self.findings)
+        yield from ((run.name, found) for run in runs for found in run.findings)

@@ -94,8 +94,9 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
 
 def _calm(theta: Floats) -> Floats:
     """Return readings with single outliers replaced by the median of their neighbours."""
-    padded = np.concatenate((theta[:1], theta[:1], theta, theta[-1:], theta[-1:]))
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    from scipy.ndimage import median_filter
+
+    middle = median_filter(theta, 5, mode="nearest")
     off = np.abs(theta - middle)
     return np.where(off > FALSE_READING * broad_scale(off), middle, theta)
 

@@ -12,11 +12,11 @@ from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
+from pendmap.records.from_acceleration import constant, release_after_hold, swinging
 from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.scale import middle_of, periods_of
-from pendmap.records.swinging import release_after_hold, swinging
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches
@@ -138,21 +138,14 @@ def _period(work: Work, middle: float) -> float | None:
 
 def _still(work: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches without motion, a period or longer, within ``span``."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
     theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
     bad = ~work.trusted[slice(*span)]
     theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
     width = max(round(work.period / float(np.median(np.diff(work.time)))), 5) | 1
     if width >= theta.size:
         return []
-    highest = maximum_filter1d(theta, width, mode="nearest")
-    spread = highest - minimum_filter1d(theta, width, mode="nearest")
-    still = np.asarray(spread <= work.limit, bool)
-    half = width // 2
-    still[:half], still[-half:] = still[half], still[-half - 1]
-    wide = [(max(a - half, 0), min(b + half, theta.size)) for a, b in stretches(still)]
-    return [(span[0] + a, span[0] + b) for a, b in wide]
+    found = stretches(constant(theta, width, work.limit))
+    return [(span[0] + a, span[0] + b) for a, b in found]
 
 
 def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -> None:
@@ -214,12 +207,7 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
 
 def check_zero(work: Work) -> None:
     """Report a rest angle, or middle of the swings, of a free run that is not 0."""
-    if (
-        work.plan.kind != "free"
-        or not work.releases
-        or work.angle_source is not None
-        or work.integrated
-    ):
+    if not work.releases or work.angle_source is not None or work.integrated:
         return  # an angle from a sensor on the rod has its zero at the middle
     last = work.segments[-1]
     if last.what == "rest":

@@ -25,7 +25,7 @@ import numpy as np
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.resolution import step_of, still_noise
 from pendmap.signal.local_polynomial import LocalFit, local_fit
-from pendmap.signal.robust import broad_scale
+from pendmap.signal.robust import broad_scale, widened
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -259,7 +259,7 @@ def check(work: Work) -> None:
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
     """Return a fit without windows that have bad samples or outliers among similar speeds."""
-    fit = fit.only(~_near(bad, fit.neighbours)[fit.middle])
+    fit = fit.only(~widened(bad, fit.neighbours)[fit.middle])
     false = np.zeros(speed.size, bool)
     sizes = np.abs(fit.residual)
     whole = broad_scale(sizes)
@@ -269,15 +269,7 @@ def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
         # Noise that grows with speed is largest for the fastest samples.
         scale = max(whole, broad_scale(sizes[part]))
         false[fit.middle[part[sizes[part] > OUTLIER * scale]]] = scale > 0
-    return fit.only(~_near(false, fit.neighbours)[fit.middle])
-
-
-def _near(marked: Mask, reach: int) -> Mask:
-    """Return the mask of indices within ``reach`` of a marked one."""
-    sums = np.concatenate([[0], np.cumsum(marked)])
-    place = np.arange(marked.size)
-    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, marked.size)
-    return np.asarray(sums[high] > sums[low], bool)
+    return fit.only(~widened(false, fit.neighbours)[fit.middle])
 
 
 def less(fit: LocalFit, other: LocalFit) -> bool:

@@ -17,7 +17,7 @@ from pendmap.formatting import counted, moment
 from pendmap.records.clock import slips_of
 from pendmap.records.noise import DEGREES
 from pendmap.signal.local_polynomial import POINTS, local_fit
-from pendmap.signal.robust import broad_scale, normal_scale
+from pendmap.signal.robust import broad_scale, normal_scale, widened
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,6 @@ WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviatio
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
 OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
 MOST_JUMPS: Final = 20  # Most jumps that are corrected
-TURN: Final = 2 * math.pi
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
 END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
@@ -65,8 +64,7 @@ def find(work: Work) -> None:
     _bridge(work.time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[_Jump]()
     # The motion has corners next to clipped or frozen samples.
-    # (mode="same" would return the length of the window for a shorter record.)
-    corner = np.convolve(bad, np.ones(2 * SIDE + 1))[SIDE : SIDE + bad.size] > 0.5
+    corner = widened(bad, SIDE)
     seen = corner.copy()
     for _ in range(PASSES):
         at, scale = _suspects(work, theta)
@@ -251,11 +249,11 @@ def _moved(work: Work, jumps: list[_Jump]) -> None:
     if len(jumps) > MOST_JUMPS:
         work.report("missed-counts", f"{many} that stay: the zero drifts", at=places)
         return
-    turns = [round(jump.size / TURN) for jump in jumps]
-    off = [abs(j.size - n * TURN) for j, n in zip(jumps, turns, strict=True)]
+    turns = [round(jump.size / math.tau) for jump in jumps]
+    off = [abs(j.size - n * math.tau) for j, n in zip(jumps, turns, strict=True)]
     counts = [_whole(jump, work.count) for jump in jumps]
     if all(turns) and max(off) < OFF_TURN:
-        step, numbers, what, said = TURN, turns, "turns-slipped", "whole turns"
+        step, numbers, what, said = math.tau, turns, "turns-slipped", "whole turns"
     else:
         said = f"{', '.join(f'{count:+d}' for count in counts[:4])} counts"
         step, numbers, what = work.count, counts, "missed-counts"

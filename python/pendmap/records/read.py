@@ -29,6 +29,7 @@ from pendmap.records.tables import read_table
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from pendmap.records.tables import Table
     from pendmap.records.work import Work
@@ -43,29 +44,16 @@ MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
     """Return the files from which an experiment is read, without reading any record.
 
-    Parameters
-    ----------
-    path : str or path
-        File or folder, as in :func:`read_experiment`.
-
-    Returns
-    -------
-    list of Path
-        The file; or ``experiment.toml`` and the files that it names, which need not exist; or, in a
-        folder without one, all files that may be records.
-
-    Raises
-    ------
-    InputError
-        If the ``experiment.toml`` is not valid.
+    They are the file; ``experiment.toml`` and the files that it names, which need not exist; or all
+    files of a plain folder that may be records. Raises InputError for an invalid description.
     """
     place = Path(path)
     if not place.is_dir():
         return [place]
-    if not (place / NAME).is_file():
-        return _tables(place)
-    plans = read_description(place / NAME).runs
-    return [place / NAME, *(place / file for file in dict.fromkeys(plan.file for plan in plans))]
+    own = [place / NAME] if (place / NAME).is_file() else []
+    return own + [
+        place / file for file in dict.fromkeys(plan.file for plan in _planned(place).runs)
+    ]
 
 
 def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
@@ -113,36 +101,43 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     rate = None if rate_hz is None else check_number("rate_hz", rate_hz)
     if rate is not None and not LEAST_RATE <= rate <= MOST_RATE:
         raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
-    description = Description(rate_hz=rate)
-    if not place.is_dir():
-        runs, findings = _runs(place, RunPlan(place.name), description, {}, place.stem)
-    elif not (place / NAME).is_file():
-        runs, findings = _plain(place, description)
-    else:
-        description = read_description(place / NAME)
-        description = dataclasses.replace(description, rate_hz=rate or description.rate_hz)
-        runs, findings = _described(place, description)
+    planned = _planned(place)
+    planned = dataclasses.replace(planned, rate_hz=rate or planned.rate_hz)
+    runs, findings = _every(place, planned)
     digests = {run.file: run.sha256 for run in runs}
     checked, together = checked_together(runs)
-    return Experiment(place, checked, description.known, (*findings, *together), digests)
+    return Experiment(place, checked, planned.known, (*findings, *together), digests)
 
 
-def _tables(folder: Path) -> list[Path]:
-    """Return the files of a folder that may be records, sorted by name."""
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in TABLES)
-    return [file for file in files if file.is_file() and not file.name.startswith((".", "~"))]
+def _planned(place: Path) -> Description:
+    """Return the description of an experiment; without an ``experiment.toml``, of free decays."""
+    if (place / NAME).is_file():
+        return read_description(place / NAME)
+    files = [place]
+    if place.is_dir():
+        files = sorted(file for file in place.iterdir() if file.suffix.lower() in TABLES)
+        files = [f for f in files if f.is_file() and not f.name.startswith((".", "~"))]
+    return Description(runs=tuple(RunPlan(file.name) for file in files))
 
 
-def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
-    """Read a folder without a description, in which each file is one free run."""
-    files = _tables(folder)
-    runs: list[Run] = []
-    text = f"no {NAME}: each file is taken for one free run, in the order of the names"
-    findings, refused = [Finding("no-description", text)], []
-    for file, name in zip(files, _names([file.name for file in files]), strict=True):
+def _every(place: Path, description: Description) -> tuple[list[Run], list[Finding]]:
+    """Read all runs; in a folder without a description, leave out files that are no records."""
+    plans, described = description.runs, (place / NAME).is_file()
+    plain = place.is_dir() and not described
+    runs, findings, refused = list[Run](), list[Finding](), list[str]()
+    if plain:
+        text = f"no {NAME}: each file is taken for one free run, in the order of the names"
+        findings.append(Finding("no-description", text))
+    tables: dict[str, tuple[Table, str]] = {}
+    for count, (plan, name) in enumerate(zip(plans, _names(plans), strict=True), 1):
+        path = place / plan.file if place.is_dir() else place
+        if described and not path.exists():
+            raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
         try:
-            found, shared = _runs(file, RunPlan(file.name), description, {}, name)
+            found, shared = _runs(path, plan, description, tables if described else {}, name)
         except InputError as error:
+            if not plain:
+                raise
             refused.append(str(error))
             findings.append(Finding("file-left-out", f"left out: {error}"))
         else:
@@ -150,35 +145,20 @@ def _plain(folder: Path, description: Description) -> tuple[list[Run], list[Find
             findings += shared
     if not runs:
         first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
-        count = counted(len(refused), "file")
         raise InputError(
-            f"{folder}: has no {NAME}: there must be one, or files that are records, got"
-            f" {count}{first}"
+            f"{place}: has no {NAME}: there must be one, or files that are records, got"
+            f" {counted(len(refused), 'file')}{first}"
         )
     return runs, findings
 
 
-def _described(folder: Path, description: Description) -> tuple[list[Run], list[Finding]]:
-    """Read the runs of an ``experiment.toml``."""
-    tables: dict[str, tuple[Table, str]] = {}
-    runs: list[Run] = []
-    findings: list[Finding] = []
-    names = _names([plan.file for plan in description.runs])
-    for count, (plan, name) in enumerate(zip(description.runs, names, strict=True), 1):
-        if not (folder / plan.file).exists():
-            raise InputError(f"{folder / NAME}: [[run]] {count}: no file {plan.file!r}")
-        found, shared = _runs(folder / plan.file, plan, description, tables, name)
-        runs += found
-        findings += shared
-    return runs, findings
-
-
-def _names(files: list[str]) -> list[str]:
+def _names(plans: Sequence[RunPlan]) -> list[str]:
     """Return distinct run names: file stems, with suffix or number if files share a stem."""
-    stems = {file: file.rsplit(".", 1)[0] for file in files}
-    alike, every, before = Counter(stems.values()), Counter(files), Counter[str]()
+    stems = {plan.file: plan.file.removesuffix(Path(plan.file).suffix) for plan in plans}
+    alike, every = Counter(stems.values()), Counter(plan.file for plan in plans)
+    before = Counter[str]()
     names = []
-    for file in files:
+    for file in (plan.file for plan in plans):
         before[file] += 1
         name = stems[file] if alike[stems[file]] == 1 else file
         names.append(f"{name} ({before[file]})" if every[file] > 1 else name)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import between, even_times, normal_scale, stretches
+from pendmap.signal.robust import between, even_times, normal_scale, stretches, widened
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -161,7 +161,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
     There the residual of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large; the
     coefficients are estimated by least trimmed squares over the moving ``parts``.
     """
-    from scipy.ndimage import binary_dilation, maximum_filter1d
+    from scipy.ndimage import maximum_filter1d
     from scipy.signal import savgol_filter
 
     none = np.zeros(work.time.size, bool)
@@ -204,7 +204,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
         moved[(even > low - period / 4) & (even < high + period / 4)] = False
     moved[(even < work.time[places[0]] + period / 4) & ~good[0]] = False
     moved[(even > work.time[places[-1]] - period / 4) & ~good[-1]] = False
-    moved = binary_dilation(moved, iterations=window // 2)
+    moved = widened(moved, window // 2)
     nearest = np.clip(np.round((work.time - work.time[0]) / interval), 0, count - 1)
     return np.asarray(moved[nearest.astype(np.intp)], bool)
 

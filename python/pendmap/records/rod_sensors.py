@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.units import ANGULAR_ACCELERATIONS, plain, spelling
+from pendmap.records.units import ANGULAR_ACCELERATIONS, name_and_unit, plain, spelling
 from pendmap.signal.half_cycles import swings
 
 if TYPE_CHECKING:
@@ -53,13 +53,12 @@ class Accelerometer:
         return "rad/s2" if self.direction == "angular" else "m/s2"
 
 
-def accelerometer_of(
-    column: Column, heading: str, unit: str | None, gravity: float
-) -> tuple[Accelerometer | None, str]:
+def accelerometer_of(column: Column, head: str, gravity: float) -> tuple[Accelerometer | None, str]:
     """Return the accelerometer of a column, or None and the missing keys of its position.
 
-    A ``heading`` like "linear acceleration" means without gravity; ``gravity`` is in m/s^2.
+    A heading like "linear acceleration" means without gravity; ``gravity`` is in m/s^2.
     """
+    heading, unit = name_and_unit(head)
     angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
     direction = column.direction or ("angular" if angular else None)
     if direction == "angular":

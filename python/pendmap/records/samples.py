@@ -14,11 +14,10 @@ import numpy as np
 
 from pendmap.formatting import counted
 from pendmap.records import outliers
+from pendmap.records.from_acceleration import swinging
 from pendmap.records.noise import DITHERED, FARTHEST, fastest, noise_of
-from pendmap.records.outliers import find_spikes
 from pendmap.records.resolution import step_of
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.swinging import swinging
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import equal_runs, normal_scale
 
@@ -50,12 +49,12 @@ def check(work: Work) -> None:
         # The acceleration is checked, since the angle computed from it has corners.
         readings = work.extra["acceleration"]
         free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        find_spikes(work, readings, work.angle_source.unit, free)
+        outliers.find_spikes(work, readings, work.angle_source.unit, free)
     elif work.integrated:
         rate = work.extra["velocity"]
         read = dataclasses.replace(work, theta=rate, count=step_of(rate))
         _clipped(read, "rad/s")
-        find_spikes(work, rate, "rad/s", [(0, rate.size)])
+        outliers.find_spikes(work, rate, "rad/s", [(0, rate.size)])
         work.theta = angle_of_rate(work.time, rate, work.trusted)
     else:
         work.estimated_step = work.estimated_step if work.edges else step_of(work.theta)

@@ -13,7 +13,7 @@ from pendmap.records.noise import noise_floor
 from pendmap.records.samples import FINEST
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.records.noise import NoiseFloor
@@ -137,7 +137,7 @@ def _line(found: Finding) -> str:
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
     """Return the texts of all uncorrected findings that make results doubtful."""
-    said = _findings(experiment, runs)
+    said = experiment.said(runs)
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
 
@@ -146,29 +146,22 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     return (f"Warning: {text}" for text in doubts(experiment, *runs))
 
 
-def doubted(experiment: Experiment, *runs: Run) -> bool:
-    """Return whether runs have uncorrected doubtful findings other than their angle's scale."""
-    said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
-    return bool(said - {SCALE_FINDING})
+def doubted(experiment: Experiment, *runs: Run) -> set[str]:
+    """Return the keys of uncorrected doubtful findings, without the scale of the angle."""
+    said = {found.what for _, found in experiment.said(runs) if _doubted(found)}
+    return said - {SCALE_FINDING}
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
     """Return whether a unit of these runs is wrong, which makes residuals meaningless."""
-    said = {found.what for _, found in _findings(experiment, runs) if _doubted(found)}
-    return bool(said & UNIT_FINDINGS - {SCALE_FINDING})
+    return bool(doubted(experiment, *runs) & UNIT_FINDINGS)
 
 
 def finding_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a line for each finding that is not in :func:`doubts`."""
-    for where, found in _findings(experiment, runs):
+    for where, found in experiment.said(runs):
         if not _doubted(found):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
-
-
-def _findings(experiment: Experiment, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
-    """Yield the findings of an experiment and of some runs, with their places."""
-    yield from ((str(experiment.path), found) for found in experiment.findings)
-    yield from ((run.name, found) for run in runs for found in run.findings)
 
 
 def _doubted(found: Finding) -> bool:

@@ -169,8 +169,7 @@ def read_workbook(data: bytes, reader: Reader, where: str) -> Table:
             " saved as CSV"
         ) from None
     except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        said = " ".join(str(error).split())
-        raise InputError(f"{where}: is no Excel file that can be read: {said}") from None
+        raise InputError(f"{where}: is no Excel file that can be read: {error}") from None
     numbers = {name: _count_numbers(frame) for name, frame in sheets.items()}
     if not any(numbers.values()):
         raise InputError(f"{where}: a sheet must have rows of numbers, got none")
@@ -308,10 +307,7 @@ def _split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     if '"' in line:
-        try:
-            return [part.strip() for part in next(csv.reader([line], delimiter=delimiter))]
-        except (csv.Error, StopIteration):
-            return [line]
+        return [part.strip() for part in next(csv.reader([line], delimiter=delimiter))]
     return [part.strip() for part in line.split(delimiter)]
 
 

@@ -21,7 +21,6 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-_TURN: Final = 2 * math.pi
 _DEGREE: Final = math.pi / 180
 
 
@@ -67,14 +66,14 @@ _ANGLES: Final = {
     **dict.fromkeys(("rad", "radian", "radians"), 1.0),
     "mrad": 1e-3,
     **dict.fromkeys(("deg", "degree", "degrees", "grad", "°"), _DEGREE),
-    **dict.fromkeys(("rev", "turn", "turns", "revolutions"), _TURN),
+    **dict.fromkeys(("rev", "turn", "turns", "revolutions"), math.tau),
 }
 _SPEEDS: Final = {
     **dict.fromkeys(("rad/s", "rads", "1/s"), 1.0),
     "mrad/s": 1e-3,
     **dict.fromkeys(("deg/s", "°/s", "dps", "degs"), _DEGREE),
-    "rpm": _TURN / 60,
-    **dict.fromkeys(("rev/s", "rps"), _TURN),
+    "rpm": math.tau / 60,
+    **dict.fromkeys(("rev/s", "rps"), math.tau),
 }
 # Units of an angular acceleration, in rad/s^2
 ANGULAR_ACCELERATIONS: Final = {

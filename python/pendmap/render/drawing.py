@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-import dataclasses
+import itertools
 import math
 import textwrap
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pendmap.charts import registry
 from pendmap.charts.chart import Sheet
-from pendmap.charts.marks import Image
+from pendmap.charts.marks import ALARM, QUIET, Image
 from pendmap.errors import InputError
 from pendmap.render import marks, style, ticks
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase, SubFigure
 
     from pendmap.charts.chart import Chart, Panel
-    from pendmap.charts.marks import Ends, Mark
+    from pendmap.charts.marks import Colours, Ends, Mark
+
+    Drawn = tuple[Axes, Panel]
 
 LEFT: Final = 0.1
 HEAD: Final = 0.72
@@ -46,70 +50,69 @@ _SMALLEST: Final = 0.9
 """Least font size of a two-line subtitle, over the normal one; below it a third line is used."""
 
 
+def save(
+    chart: Chart | Sheet,
+    path: str | os.PathLike[str],
+    *,
+    size: Ends | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Write the figure of a chart, or of a sheet of charts, into a file; return its path."""
+    return style.written(path, lambda dpi: draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
+
+
 def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
     """Return the figure of a chart or sheet; raise InputError if ``size``, inches, is too small."""
     if isinstance(chart, Sheet):
         return _sheet(chart, size, dpi)
     figure, needed = _made(chart, size or _size(chart), dpi)
     if size is not None and _lacks(size, needed):
-        least = _least(chart, dpi)
-        if _lacks(size, least):
-            raise _no_room(size, least)
+        _refuse(size, _least(chart, dpi))
     return figure
 
 
-def _no_room(size: Ends, least: Ends) -> InputError:
-    return InputError(
-        f"size {size} leaves no room for the panels; it must be at least"
-        f" {least[0]:.1f} x {least[1]:.1f} inches"
-    )
+def _refuse(size: Ends, least: Ends) -> None:
+    """Raise InputError for a size in inches below the least one."""
+    if _lacks(size, least):
+        raise InputError(
+            f"size {size} leaves no room for the panels; it must be at least"
+            f" {least[0]:.1f} x {least[1]:.1f} inches"
+        )
 
 
-def figure(
-    dataset: xr.Dataset,
-    *,
-    layer: str | None = None,
-    size: tuple[float, float] | None = None,
-    dpi: float = 200.0,
-    colormap: str | None = None,
-) -> Figure:
-    """Return the figure of a dataset that is ready to be drawn."""
-    pixels = math.ceil(max(size or (0.0,)) * dpi)
-    chart = registry.build(dataset, layer=layer, cells=max(CELLS, pixels))
-    if colormap is not None:
-        style.colour_map(colormap)
-        chart = _recoloured(chart, colormap)
-    return draw(chart, size=size, dpi=dpi)
-
-
-def _recoloured(chart: Chart, colormap: str) -> Chart:
+def in_colours(chart: Chart, colormap: str) -> Chart:
     """Return a chart with another colour map in its images of numbers."""
-    shown = {panel.name for row in chart.shown for panel in row}
-    panels, found = [], False
-    for panel in chart.panels:
-        marks: list[Mark] = []
-        for mark in panel.marks:
-            if isinstance(mark, Image) and mark.colours is not None:
-                found |= panel.name in shown
-                look = dataclasses.replace(mark.colours, map=colormap)
-                marks.append(dataclasses.replace(mark, colours=look))
-            else:
-                marks.append(mark)
-        panels.append(dataclasses.replace(panel, marks=marks))
-    if not found:
+    style.colour_map(colormap)
+    if not any(_scales(panel) for panel in chart.panels):
         raise InputError(
             f"colormap {colormap!r}: this figure has none; its colours identify attractors"
         )
-    return dataclasses.replace(chart, panels=panels)
+
+    def recoloured(mark: Mark) -> Mark:
+        if not isinstance(mark, Image) or mark.colours is None:
+            return mark
+        return replace(mark, colours=replace(mark.colours, map=colormap))
+
+    rows = [
+        [replace(panel, marks=[recoloured(mark) for mark in panel.marks]) for panel in row]
+        for row in chart.rows
+    ]
+    return replace(chart, rows=rows)
+
+
+def _scales(panel: Panel) -> list[Colours]:
+    """Return the colour scales of the images of a panel."""
+    images = [mark for mark in panel.marks if isinstance(mark, Image)]
+    return [image.colours for image in images if image.colours is not None]
 
 
 def _least(chart: Chart, dpi: float) -> Ends:
     """Return the least size with room for every panel and its text, in tenths of an inch."""
     size = _size(chart)
-    _, least = _made(chart, size, dpi)
+    least = _made(chart, size, dpi)[1]
     for _ in range(9):
         least = (math.ceil(10 * least[0] - 1e-6) / 10, math.ceil(10 * least[1] - 1e-6) / 10)
-        _, needed = _made(chart, least, dpi)
+        needed = _made(chart, least, dpi)[1]
         if not _lacks(least, needed):
             break
         least = (max(least[0], needed[0]), max(least[1], needed[1]))
@@ -124,7 +127,7 @@ def _size(chart: Chart) -> Ends:
     """Return the size of a chart in inches: its own, or one from its panels' proportions."""
     if chart.size is not None:
         return chart.size
-    rows = chart.shown
+    rows = chart.rows
     stacked = len(rows) > 1 and all(len(row) == 1 for row in rows)
     wide = STACKED if stacked else ALONE if len(rows[0]) == 1 else WIDE
     across = [sum(panel.share for panel in row) * wide + _aside(row) for row in rows]
@@ -135,8 +138,7 @@ def _size(chart: Chart) -> Ends:
 
 
 def _aside(row: Sequence[Panel]) -> float:
-    bars = sum(any(getattr(mark, "colours", None) for mark in panel.marks) for panel in row)
-    return BESIDE * len(row) + BAR * bars
+    return BESIDE * len(row) + BAR * sum(bool(_scales(panel)) for panel in row)
 
 
 def _rows(named: list[Mark], width: float) -> float:
@@ -146,7 +148,7 @@ def _rows(named: list[Mark], width: float) -> float:
 
 
 def _all_marks(chart: Chart) -> list[Mark]:
-    return [mark for row in chart.shown for panel in row for mark in panel.marks]
+    return [mark for panel in chart.panels for mark in panel.marks]
 
 
 def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
@@ -157,12 +159,12 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     for k, line in enumerate(chart.notes):
         at = (0.06 + LINE * (len(chart.notes) - k)) / size[1]
         figure.text(LEFT / size[0], at, line, fontsize=8.5, va="top")
-    axes = fill(figure, chart)
+    drawn = fill(figure, chart)
     above = LINE * len(chart.notes) / size[1]
     where: dict[str, Any] = {"bbox_to_anchor": (0.0, above, 1.0, 1.0)} if above else {}
     _legend(figure, _all_marks(chart), size[0], loc="outside lower left", borderpad=0.1, **where)
-    fits = settle(figure, [(axes[p.name], p) for row in chart.shown for p in row])
-    return figure, _needed(figure, chart, axes) if fits else (1.15 * size[0], 1.15 * size[1])
+    fits = settle(figure, [*itertools.chain(*drawn)])
+    return figure, _needed(figure, chart, drawn) if fits else (1.15 * size[0], 1.15 * size[1])
 
 
 def headed(  # noqa: PLR0913 (size, words, and room around)
@@ -198,46 +200,46 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
     figure.text(left, 1 - 0.22 / height, title, fontsize=bold, weight="bold", va="center")
     for k, line in enumerate(lines):
         down = 0.45 + LINE * k
-        figure.text(left, 1 - down / height, line, color=style.QUIET, va="center", fontsize=font)
+        figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)
     return float(HEAD + LINE * (len(lines) - 1) - (0.0 if subtitle else LINE))
 
 
 def fill(
     figure: Figure | SubFigure, chart: Chart, letters: Iterator[str] | None = None
-) -> dict[str, Axes]:
-    """Draw the panels of a chart into a figure; return the axes by panel name.
+) -> list[list[Drawn]]:
+    """Draw the panels of a chart into a figure; return them with their axes, row by row.
 
     ``letters`` label the panels; without them several panels are labelled from (a).
     """
-    rows = chart.shown
+    rows = chart.rows
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
     shares = [panel.share for panel in rows[0]] if len(rows) == 1 else []
     columns = chart.columns or math.lcm(*(len(row) for row in rows))
     grid = figure.add_gridspec(
         len(rows), columns, height_ratios=list(heights), width_ratios=shares or None
     )
-    several = chart.letters and (letters is not None or sum(len(row) for row in rows) > 1)
+    several = chart.letters and (letters is not None or len(chart.panels) > 1)
     letters = letters or iter(LETTERS)
-    axes: dict[str, Axes] = {}
+    drawn: list[list[Drawn]] = []
     for down, row in enumerate(rows):
         wide = 1 if chart.columns else columns // len(row)
+        drawn.append([])
         for k, panel in enumerate(row):
             place: Any = grid[down, k * wide : (k + 1) * wide]
             if panel.note and panel.share < 1:
                 parts = [panel.share, 1 - panel.share]
-                place = (
-                    place.subgridspec(2, 1, height_ratios=parts)[0, 0]
-                    if len(row) > 1
-                    else place.subgridspec(1, 2, width_ratios=parts)[0, 0]
-                )
-            axes[panel.name] = figure.add_subplot(place)
+                if len(row) > 1:
+                    place = place.subgridspec(2, 1, height_ratios=parts)[0, 0]
+                else:
+                    place = place.subgridspec(1, 2, width_ratios=parts)[0, 0]
+            axes = figure.add_subplot(place)
             if panel.title:
                 mark = f"({next(letters)}) " if several else ""
-                axes[panel.name].set_title(f"{mark}{panel.title}")
-    for row in rows:
-        for panel in row:
-            _panel(axes[panel.name], panel)
-    return axes
+                axes.set_title(f"{mark}{panel.title}")
+            drawn[-1].append((axes, panel))
+    for axes, panel in itertools.chain(*drawn):
+        _panel(axes, panel)
+    return drawn
 
 
 def _legend(
@@ -269,31 +271,29 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     high = [sum(_size(chart)[1] for chart in column) for column in sheet.columns]
     foot = _rows(named, sum(wide))
     given = size or (sum(wide), max(high) + HEAD + foot)
-    least = (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot)
-    if _lacks(given, least):
-        raise _no_room(given, least)
+    _refuse(given, (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot))
     figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)
     engine: Any = figure.get_layout_engine()
     _, low, _, tall = engine.get()["rect"]
     below_head = (0.0, low + tall + foot / given[1])
     _legend(figure, named, given[0], loc="upper left", bbox_to_anchor=below_head)
     letters = iter(LETTERS)
-    panels = []
+    panels: list[Drawn] = []
     columns = figure.subfigures(1, len(wide), squeeze=False, width_ratios=wide)[0]
     for part, column in zip(columns, sheet.columns, strict=True):
         shares = [_size(chart)[1] for chart in column]
         room = (given[1] - HEAD - foot) / sum(shares)
         blocks = part.subfigures(len(column), 1, squeeze=False, height_ratios=shares)[:, 0]
         for block, chart in zip(blocks, column, strict=True):
-            axes = _block(block, chart, room * _size(chart)[1], letters, own=not sheet.legend)
-            panels += [(axes[panel.name], panel) for row in chart.shown for panel in row]
+            drawn = _block(block, chart, room * _size(chart)[1], letters, own=not sheet.legend)
+            panels += itertools.chain(*drawn)
     settle(figure, panels)
     return figure
 
 
 def _block(
     figure: SubFigure, chart: Chart, high: float, letters: Iterator[str], *, own: bool
-) -> dict[str, Axes]:
+) -> list[list[Drawn]]:
     """Draw one chart of a sheet with its heading and its own legend below it."""
     wide = figure.bbox.width / _dpi(figure)
     named = _all_marks(chart) if own else []
@@ -314,13 +314,13 @@ def _panel(axes: Axes, panel: Panel) -> None:
     for artist in (*axes.lines, *axes.collections, *axes.images, *words):
         artist.set_in_layout(False)
     for which, side in (("x", panel.x), ("y", panel.y)):
-        bare = dataclasses.replace(side, ticks=()) if panel.bare else side
+        bare = replace(side, ticks=()) if panel.bare else side
         ticks.scale(axes, which, bare)
     if panel.bare:
         axes.set_axis_off()
 
 
-def settle(figure: Figure, panels: Sequence[tuple[Axes, Panel]]) -> bool:
+def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:
     """Lay out the panels, fold long titles, write notes; return whether there is room."""
     engine: Any = figure.get_layout_engine()
     with warnings.catch_warnings(record=True) as said:
@@ -349,7 +349,7 @@ def _note(axes: Axes, panel: Panel) -> None:
     free = wide * (1 - panel.share) / panel.share
     used, room = 0.0, high if beside else high * (1 - panel.share) / panel.share
     for k, (text, colour) in enumerate(panel.note):
-        bold = colour == style.ALARM
+        bold = colour == ALARM
         width = (free - 0.35 if beside else wide) / (0.081 if bold else 0.067)
         lines = textwrap.wrap(text, max(12, int(width)))
         if k and used + LINE * len(lines) > room:
@@ -369,19 +369,15 @@ def _note(axes: Axes, panel: Panel) -> None:
         used += LINE * len(lines) + 0.05
 
 
-def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
+def _needed(figure: Figure, chart: Chart, drawn: list[list[Drawn]]) -> Ends:
     """Return the size in inches at which every panel has room for its text."""
     width, height = figure.get_size_inches()
     across, down = [], 0.0
-    for row in chart.shown:
-        have = [_inches(axes[panel.name]) for panel in row]
-        least = [_room(axes[panel.name], panel) for panel in row]
-        unit = max(
-            (need[0] - one[0]) / panel.share
-            for need, one, panel in zip(least, have, row, strict=True)
-        )
-        across.append(unit * sum(panel.share for panel in row))
-        down += max(need[1] - one[1] for need, one in zip(least, have, strict=True))
+    for row in drawn:
+        lacks = [np.subtract(_room(axes, panel), _inches(axes)) for axes, panel in row]
+        unit = max(lack[0] / panel.share for lack, (_, panel) in zip(lacks, row, strict=True))
+        across.append(unit * sum(panel.share for _, panel in row))
+        down += max(lack[1] for lack in lacks)
     texts = marks.legend(_all_marks(chart))[1]
     words = [style.inches(chart.title, 12, bold=True), style.longest(style.halves(chart.subtitle))]
     words.append(max((_entry(text) for text in texts), default=0.0))
@@ -390,15 +386,11 @@ def _needed(figure: Figure, chart: Chart, axes: dict[str, Axes]) -> Ends:
 
 def _room(axes: Axes, panel: Panel) -> Ends:
     """Return the width and height that a panel needs, in inches."""
-    bars = [mark.colours.name for mark in panel.marks if getattr(mark, "colours", None)]  # type: ignore[attr-defined]
-    words = [*panel.y.name.split("\n"), *bars]
+    words = [*panel.y.name.split("\n"), *(look.name for look in _scales(panel))]
     high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
     title = axes.get_title(loc="left").replace("\n", " ")
     wide = max(LEAST, style.width_of(style.folded(title, 0.0)) - 0.15)
-    if panel.note:
-        wide = max(wide, 1.2)
-        high = max(high, 0.9)
-    return wide, high
+    return (max(wide, 1.2), max(high, 0.9)) if panel.note else (wide, high)
 
 
 def _inches(axes: Axes) -> Ends:

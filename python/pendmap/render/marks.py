@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from pendmap.charts import marks as charts
+from pendmap.formatting import typographic
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -80,16 +81,10 @@ def _band(axes: Axes, mark: charts.Band) -> None:
 
 
 def _steps(axes: Axes, mark: charts.Steps) -> None:
-    width = 0 if mark.filled else mark.width
-    axes.stairs(
-        mark.values,
-        mark.edges,
-        fill=mark.filled,
-        baseline=0 if mark.filled else None,
-        color=mark.colour,
-        lw=width,
-        **_common(mark),
-    )
+    look: dict[str, Any] = {"baseline": None, "lw": mark.width}
+    if mark.filled:
+        look = {"fill": True, "lw": 0}
+    axes.stairs(mark.values, mark.edges, color=mark.colour, **(look | _common(mark)))
 
 
 def _areas(axes: Axes, mark: charts.Areas) -> None:
@@ -117,32 +112,18 @@ def _text(axes: Axes, mark: charts.Text) -> None:
     if mark.boxed:
         look["bbox"] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2}
     across, up = mark.align
-    axes.text(
-        mark.x,
-        mark.y,
-        mark.text,
-        color=mark.colour,
-        ha=across,
-        va=up,
-        fontsize=mark.size,
-        **(look | _common(mark)),
-    )
+    look |= {"color": mark.colour, "ha": across, "va": up, "fontsize": mark.size}
+    axes.text(mark.x, mark.y, mark.text, **(look | _common(mark)))
 
 
 def _table(axes: Axes, mark: charts.Table) -> None:
     edges = np.cumsum(_columns(mark))
+    look: dict[str, Any] = {"va": "bottom", "fontsize": TABLE, "linespacing": 1.15}
     for down, row in enumerate([mark.head, *mark.rows]):
-        for k, text in enumerate(row):
-            axes.text(
-                edges[k] / edges[-1] if k else 0.0,
-                down + 1.4,
-                text,
-                color=style.INK if down else style.QUIET,
-                ha="right" if k else "left",
-                va="bottom",
-                fontsize=TABLE,
-                linespacing=1.15,
-            )
+        look["color"] = charts.INK if down else charts.QUIET
+        axes.text(0.0, down + 1.4, row[0], ha="left", **look)
+        for edge, text in zip(edges[1:], row[1:], strict=True):
+            axes.text(edge / edges[-1], down + 1.4, text, ha="right", **look)
 
 
 def _columns(mark: charts.Table) -> list[float]:
@@ -160,25 +141,19 @@ def across(mark: Mark) -> float:
 
 
 def _image(axes: Axes, mark: charts.Image) -> None:
-    where: dict[str, Any] = {
-        "extent": (*mark.x, *mark.y),
-        "origin": "lower",
-        "aspect": "auto",
-        "interpolation": "nearest",
-    }
+    where: dict[str, Any] = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+    where |= {"extent": (*mark.x, *mark.y)} | _common(mark)
     if mark.colours is None:
         shades = np.round(255 * np.array([to_rgb(colour) for _, colour in mark.classes]))
-        axes.imshow(shades.astype(np.uint8).reshape(-1, 3)[mark.values], **where, **_common(mark))
+        axes.imshow(shades.astype(np.uint8).reshape(-1, 3)[mark.values], **where)
         return
     look = mark.colours
-    drawn = axes.imshow(
-        mark.values, cmap=style.colour_map(look.map), norm=_norm(look), **where, **_common(mark)
-    )
+    drawn = axes.imshow(mark.values, cmap=style.colour_map(look.map), norm=_norm(look), **where)
     bar = axes.figure.colorbar(
         drawn, ax=axes, extend=look.beyond, extendfrac=0.03, pad=0.02, aspect=28, fraction=0.05
     )
     if look.ticks is not None:
-        texts = [f"{tick:.6g}".replace("-", "\N{MINUS SIGN}") for tick in look.ticks]
+        texts = [typographic(f"{tick:.6g}") for tick in look.ticks]
         bar.set_ticks(list(look.ticks), labels=texts)
     bar.ax.minorticks_off()
     bar.outline.set_linewidth(0.7)
@@ -215,13 +190,11 @@ def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
     for mark in marks:
         if isinstance(mark, charts.Image):
             for name, colour in mark.classes:
-                if name:
-                    named.setdefault(name, []).append(
-                        Patch(facecolor=colour, edgecolor=style.QUIET, linewidth=0.5)
-                    )
+                patch = Patch(facecolor=colour, edgecolor=charts.QUIET, linewidth=0.5)
+                named.setdefault(name, []).append(patch)
         elif mark.name:
             named.setdefault(mark.name, []).append(_handle(mark))
-    kept = {name: handles[:3] for name, handles in named.items()}
+    kept = {name: handles[:3] for name, handles in named.items() if name}
     return [tuple(each) if len(each) > 1 else each[0] for each in kept.values()], list(kept)
 
 

@@ -40,16 +40,17 @@ def write(found: Discrepancy, path: Path) -> Path:
     with mpl.rc_context(style.RC):
         drawn = figures(found)
         pictures = {name: _png(drawn[name]) for name in document.pictures if name in drawn}
-    if path.suffix.lower() == ".html" and not path.is_dir():
-        _put({path: _html(document, pictures)})
-    elif path.suffix.lower() == ".md" and not path.is_dir():
-        _put(_beside(path, document, pictures))
-    elif path.is_dir():
-        _put(_both(path, document, pictures))
+    html = report.as_html(document, pictures).encode()
+    suffix = "" if path.is_dir() else path.suffix.lower()
+    if suffix == ".html":
+        _put({path: html})
+    elif suffix == ".md":
+        _put(_markdown(path, document, pictures, f"{path.stem}_"))
     else:
-        with whole_folder(path) as part:
-            part.mkdir()
-            _put(_both(part, document, pictures))
+        with contextlib.nullcontext(path) if path.is_dir() else whole_folder(path) as folder:
+            folder.mkdir(exist_ok=True)
+            files = _markdown(folder / "report.md", document, pictures)
+            _put(files | {folder / "report.html": html})
     return path
 
 
@@ -66,19 +67,10 @@ def _png(made: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _html(document: Document, pictures: dict[str, bytes]) -> bytes:
-    return report.as_html(document, pictures).encode()
-
-
-def _beside(
-    path: Path, document: Document, pictures: dict[str, bytes], *, alone: bool = False
+def _markdown(
+    path: Path, document: Document, pictures: dict[str, bytes], prefix: str = ""
 ) -> dict[Path, bytes]:
-    """Return a Markdown file and its figures; figure names begin with its stem unless ``alone``."""
-    names = {n: f"{n}.png" if alone else f"{path.stem}_{n}.png" for n in pictures}
-    files = {path.with_name(names[n]): content for n, content in pictures.items()}
+    """Return a Markdown file and its figures, whose names begin with a prefix."""
+    names = {name: f"{prefix}{name}.png" for name in pictures}
+    files = {path.with_name(names[name]): content for name, content in pictures.items()}
     return files | {path: report.as_markdown(document, names).encode()}
-
-
-def _both(folder: Path, document: Document, pictures: dict[str, bytes]) -> dict[Path, bytes]:
-    beside = _beside(folder / "report.md", document, pictures, alone=True)
-    return beside | {folder / "report.html": _html(document, pictures)}

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import functools
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
+from pendmap.charts.marks import INK
 from pendmap.errors import InputError
+from pendmap.files import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    import os
+    from collections.abc import Callable, Sequence
 
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-INK = "#222222"
-QUIET = "#666666"
-ALARM = "#a61c00"
+SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
 
 RC: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -103,28 +104,29 @@ def colour_map(name: str) -> Colormap:
     return mpl.colormaps[name].copy()
 
 
-def resolution(dpi: float | None) -> float:
-    """Return the pixels per inch, 200 by default; raise InputError if out of range."""
-    if dpi is None:
-        return 200.0
-    low, high = DPI
-    if not low <= dpi <= high:
-        raise InputError(f"dpi {dpi:g} is not between {low} and {high}")
-    return float(dpi)
+def written(
+    path: str | os.PathLike[str],
+    make: Callable[[float], Figure],
+    *,
+    size: tuple[float, float] | None = None,
+    dpi: float | None = None,
+) -> Path:
+    """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-
-def check_size(size: tuple[float, float] | None, dpi: float) -> None:
-    """Raise InputError for a size in inches or pixels that is out of range."""
-    if size is None:
-        return
-    if not all(0 < side <= MOST for side in size):
+    ``size``, inches, and ``dpi`` are the requested values; InputError is raised for impossible
+    ones. Files are undated,
+    so that equal figures give equal files.
+    """
+    pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
+    if not low <= pixels <= high:
+        raise InputError(f"dpi {pixels:g} is not between {low} and {high}")
+    if size is not None and not all(0 < side <= MOST for side in size):
         raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
-    if max(size) * dpi > PIXELS:
-        raise InputError(f"size {size} at {dpi:g} dpi: at most {PIXELS} pixels a side are possible")
-
-
-def write(figure: Figure, path: Path) -> None:
-    """Write a figure in its suffix's format, undated, so that equal figures give equal files."""
-    suffix = path.suffix.lower().lstrip(".")
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
-    figure.savefig(path, format=suffix, dpi=figure.dpi, metadata=metadata)
+    if size is not None and max(size) * pixels > PIXELS:
+        said = f"at most {PIXELS} pixels a side are possible"
+        raise InputError(f"size {size} at {pixels:g} dpi: {said}")
+    with whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
+        figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
+        figure.savefig(part, format=suffix, dpi=figure.dpi, metadata=metadata)
+    return Path(path)

@@ -6,7 +6,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from matplotlib.ticker import Formatter, Locator, NullLocator
+from matplotlib.ticker import FuncFormatter, Locator, NullLocator
 
 from pendmap.charts import plane
 from pendmap.render import style
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
-    from pendmap.charts.chart import Axis
+    from pendmap.charts import chart as charts
 
 LINE: Final = 0.16  # Least distance between stacked labels, inches
 CLOSE: Final = 5.0  # Ratio of the ends below which a logarithmic axis has equally spaced labels
@@ -30,18 +31,17 @@ Labels = list[tuple[float, str]]
 class Ticks(Locator):
     """Locator of the fullest set of labels that fits; it measures the axes at every call."""
 
-    def __init__(self, axes: Axes, which: str, side: Axis) -> None:
-        self._axes, self._across, self._side = axes, which == "x", side
+    axis: Any  # matplotlib sets it
+
+    def __init__(self, side: charts.Axis) -> None:
+        self._side = side
         self.labels: dict[float, str] = {}
 
     def __call__(self) -> list[float]:
         """Return the tick places."""
-        axes, across = self._axes, self._across
-        low, high = axes.get_xlim() if across else axes.get_ylim()
-        every: Labels = next(
-            (some for some in _sets(self._side, low, high) if self._fits(some, low, high)), []
-        )
-        self.labels = dict(every)
+        low, high = self.axis.get_view_interval()
+        sets = _sets(self._side, low, high)
+        self.labels = dict(next((some for some in sets if self._fits(some, low, high)), []))
         return list(self.labels)
 
     def tick_values(self, vmin: float, vmax: float) -> Any:  # noqa: ANN401, ARG002 (as inherited)
@@ -49,66 +49,53 @@ class Ticks(Locator):
         return self()
 
     def _fits(self, labels: Labels, low: float, high: float) -> bool:
-        box = self._axes.get_window_extent()
-        room = (box.width if self._across else box.height) / self._axes.figure.dpi
-        axis = self._axes.xaxis if self._across else self._axes.yaxis
-        bent = axis.get_transform().transform
+        box, across = self.axis.axes.get_window_extent(), self.axis.axis_name == "x"
+        room = (box.width if across else box.height) / self.axis.axes.figure.dpi
+        bent = self.axis.get_transform().transform
         first, last = (float(bent(end)) for end in (low, high))
         for (a, one), (b, other) in itertools.pairwise(labels):
             apart = abs(float(bent(b)) - float(bent(a))) / abs(last - first) * room
-            wide = (style.inches(one) + style.inches(other)) / 2 + 0.1 if self._across else LINE
+            wide = (style.inches(one) + style.inches(other)) / 2 + 0.1 if across else LINE
             if apart < wide:
                 return False
         return True
 
 
-class _Names(Formatter):
-    def __init__(self, ticks: Ticks) -> None:
-        self._ticks = ticks
-
-    def __call__(self, x: float, pos: int | None = None) -> str:  # noqa: ARG002 (as inherited)
-        return self._ticks.labels.get(float(x), "")
-
-
-def scale(axes: Axes, which: str, side: Axis) -> None:
+def scale(axes: Axes, which: str, side: charts.Axis) -> None:
     """Set scale, limits, labels and name of a side of a panel."""
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    change = axes.set_xscale if which == "x" else axes.set_yscale
+    axis: Axis = getattr(axes, f"{which}axis")
+    change = getattr(axes, f"set_{which}scale")
     if side.scale == "log":
         change("log")
     elif side.scale == "signed":
         change("symlog", linthresh=side.straight, linscale=1.0)
     if side.ends is not None:
-        (axes.set_xlim if which == "x" else axes.set_ylim)(*side.ends)
+        getattr(axes, f"set_{which}lim")(*side.ends)
     elif which == "x":
         axes.margins(x=0.0)
-    ends = axes.get_xlim() if which == "x" else axes.get_ylim()
     name = side.name
     if side.ticks is not None:
         axis.set_ticks([at for at, _ in side.ticks], [text for _, text in side.ticks])
     else:
         if side.scale in ("plain", "angle"):
-            low, high = (end * side.factor for end in ends)
+            low, high = (end * side.factor for end in getattr(axes, f"get_{which}lim")())
             shift, _ = plane.short_ticks(low, high, angle=side.scale == "angle")
             name = plane.shifted(name, shift)
-        ticks = Ticks(axes, which, side)
+        ticks = Ticks(side)
         axis.set_major_locator(ticks)
-        axis.set_major_formatter(_Names(ticks))
+        axis.set_major_formatter(FuncFormatter(lambda at, _: ticks.labels.get(float(at), "")))
     axis.set_minor_locator(NullLocator())
-    if which == "x":
-        axes.set_xlabel(name)
-    else:
-        axes.set_ylabel(name, labelpad=2)
+    axis.set_label_text(name)
+    if which == "y":
+        axis.labelpad = 2
 
 
-def _sets(side: Axis, low: float, high: float) -> Iterator[Labels]:
+def _sets(side: charts.Axis, low: float, high: float) -> Iterator[Labels]:
     """Yield sets of labels between two ends, the fullest first."""
-    if side.scale == "log":
-        yield from ([(at, plane.power(at)) for at in places] for places in powers(low, high))
-    elif side.scale == "signed":
-        yield from (
-            [(at, plane.power(at)) for at in places] for places in signed(side.straight, low, high)
-        )
+    if side.scale in ("log", "signed"):
+        straight = side.straight
+        sets = powers(low, high) if side.scale == "log" else signed(straight, low, high)
+        yield from ([(at, plane.power(at)) for at in places] for places in sets)
     else:
         factor = side.factor
         shift, ticks = plane.short_ticks(low * factor, high * factor, angle=side.scale == "angle")

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 from pendmap.comparison.further import Reasons, compute_part
 from pendmap.comparison.replay import effect_strength
 from pendmap.diagnosis.result import ranking_table, zeroed
-from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
 from pendmap.report.document import Document, Picture, bullets, code, plain, table
@@ -97,7 +96,7 @@ def _terms(found: Discrepancy) -> Iterator[str]:
     terms, others = [], []
     meant = ["v = theta'", "a the pivot's acceleration over gravity"]
     for effect in found.effects:
-        formula, group = str(effect.definition["formula"]), effect.definition["group"]
+        formula, group = effect.definition.formula, effect.definition.group
         if group in {"drive", "reading"}:
             others.append(f"In the {'drive' if group == 'drive' else 'sensor'}: {code(formula)}.")
             continue
@@ -269,17 +268,17 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[str]:
             gained(other.behind),
             number(other.separation, 2),
             gained(other.separation * each.gain),
-            _why(other),
+            _why(other, found.assessment.thresholds.alike),
         )
         for other in each.alternatives[:ALTERNATIVES]
     ]
     yield table(head, rows, words=("why not",))
 
 
-def _why(alternative: Alternative) -> str:
+def _why(alternative: Alternative, alike: float) -> str:
     """Return the reason why an alternative was not accepted."""
     if alternative.contains:
         return "does the same with more parameters and gains no more"
     if alternative.alike:
-        return f"indistinguishable: behind by less than {Thresholds().alike:g}, or by one run alone"
+        return f"indistinguishable: behind by less than {alike:g}, or by one run alone"
     return "refitted, explains less" if alternative.refitted else "scored, explains less"

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.diagnosis.result import PLACES
-from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.diagnosis.result import PLACES, SAID
 from pendmap.report.document import Picture, bullets, code
 from pendmap.report.wording import (
     before_and_after,
@@ -25,16 +24,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
-
-SAID: Final = {
-    "none": "the model describes the records to within their noise.",
-    "named": "the effects found explain the whole gap.",
-    "ambiguous": "several effects explain the gap equally well; these records do not distinguish "
-    "them.",
-    "partial": "the effects found close part of the gap, and residuals remain: their form is only "
-    "approximate, or a further effect is missing.",
-    "unknown": "something is missing that no candidate explains. No name is claimed.",
-}
 
 PROBABILITY: Final = (
     "The probability of a name is that it is right, given that the effect is in the library. It "
@@ -56,7 +45,7 @@ QUIET: Final = 20
 def verdict(found: Discrepancy) -> Iterator[str]:
     """Yield the verdict with its probabilities and the statistics it is based on."""
     yield "## Verdict"
-    yield f"**{found.verdict.capitalize()}**: {SAID[found.verdict]}"
+    yield f"**{found.verdict.capitalize()}**: {SAID[found.verdict]}."
     if found.effects:
         yield bullets(
             f"{values(effect)}; probability {chance(effect.probability)}"
@@ -73,7 +62,7 @@ def verdict(found: Discrepancy) -> Iterator[str]:
 def _statistics(found: Discrepancy) -> Iterator[str]:
     """Yield the statistics on which the verdict is based."""
     judged = found.assessment
-    form, limits = judged.form, Thresholds()
+    form, limits = judged.form, judged.thresholds
     yield (
         f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
         f"1; the uncertainty of the noise allows up to {number(judged.ratio_allowed, 4)}. On "

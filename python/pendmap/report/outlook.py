@@ -162,14 +162,14 @@ def _limit(found: Discrepancy, effect: str, limit: Limit) -> tuple[str, ...]:
         return ", ".join(f"{name} = {number(value)}" for name, value in candidate.shape.items())
 
     definition, size = found.definition(effect), limit.size
-    parameter = str(definition["parameters"][0]["name"])
+    parameter = definition.parameters[0].name
     if not math.isfinite(size):
         return code(effect), code(parameter), "undetectable in these records", "", "", ""
     unit = unit_of(f"{effect}.{parameter}", found.definition)
     unseen = " or ".join(map(said, limit.unseen))
     shape = said(limit.candidate) + (f"; undetectable with {unseen}" if unseen else "")
     row = code(effect), code(parameter), plain(f"{number(size, 2)} {unit}".rstrip()), shape
-    if definition["group"] in {"drive", "reading"} or unit != unit_of("Tr"):
+    if definition.group in {"drive", "reading"} or unit != unit_of("Tr"):
         return (*row, "", "")
     fit = found.best.fitted.fit
     friction = fit.estimates.get("Tr")

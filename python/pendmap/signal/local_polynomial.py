@@ -23,7 +23,6 @@ _BLOCK: Final = 20_000  # Number of uneven windows solved at a time
 _NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
 _OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
 _ROUNDS: Final = 4  # Largest number of repetitions of a fit without outliers
-_EVEN_WINDOW: Final = 1e-3
 _WINDOW_BLOCK: Final = 4096  # Number of windows of uneven samples solved at a time
 
 
@@ -272,10 +271,10 @@ def _evenly(time: Floats, step: float, reach: int) -> Mask:
     """Return whether the window of ``reach`` samples to each side is even, for each sample."""
     even = np.zeros(time.size, bool)
     # The limit holds for each interval of a window and, times the root of their number, the sum.
-    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN_WINDOW)))
+    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN)))
     drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
     even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
-        drift < _EVEN_WINDOW * step * math.sqrt(2 * reach)
+        drift < _EVEN * step * math.sqrt(2 * reach)
     )
     return even
 

@@ -47,6 +47,14 @@ def stretches(mask: Mask) -> list[Stretch]:
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
+def widened(mask: Mask, reach: int) -> Mask:
+    """Return the mask of indices within ``reach`` of a marked one."""
+    sums = np.concatenate([[0], np.cumsum(mask)])
+    place = np.arange(mask.size)
+    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, mask.size)
+    return np.asarray(sums[high] > sums[low], bool)
+
+
 def between(stretches: list[Stretch], low: int, high: int) -> list[Stretch]:
     """Return the index ranges from ``low`` to ``high`` between sorted stretches."""
     edges = [low, *(place for stretch in stretches for place in stretch), high]

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from pendmap.charts import basins as layering
 from pendmap.charts import legend, palette, plane
 from pendmap.charts import names as axis_names
+from pendmap.formatting import typographic
 from pendmap.units import Units
 from pendmap.viewer import frame
 
@@ -177,7 +178,7 @@ def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame)
     colours = palette.diverging(span / top)
     context: list[Any] = [(0, "failed", palette.rgb("failed"))]
     context += [
-        (int(t) + offset, f"{t:+d} turns".replace("-", "\N{MINUS SIGN}"), c)
+        (int(t) + offset, typographic(f"{t:+d} turns"), c)
         for t, c in zip(span, colours, strict=True)
     ]
     stream.log(ROOTS["turns"], rr.AnnotationContext(context), static=True)

@@ -84,7 +84,7 @@ def blueprint(chart: Chart) -> rrb.Blueprint:
     """Return the layout: the panels, with legend and summary beside them."""
     views = [
         Place.of(panel, chart.ratio).frame.view(panel.where, _title(panel))
-        for panel in chart.panels
+        for panel in chart.recorded or chart.panels
         if _recorded(panel)
     ]
     front: rrb.Container = rrb.Vertical(*views)
@@ -112,7 +112,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset, chart: Chart) -> None:
     """Log every panel of a chart, the legend and the dataset's summary, all static."""
     frame.summary(stream, dataset)
     named: dict[str, str] = {}
-    for panel in chart.panels:
+    for panel in chart.recorded or chart.panels:
         if _recorded(panel):
             log_panel(stream, Place.of(panel, chart.ratio))
         named |= legend(panel.marks)

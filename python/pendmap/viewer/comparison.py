@@ -103,7 +103,7 @@ def _simulated(report: IdentificationReport) -> Comparison:
     start = first_state(peaks)
     zero = best["offset"] if "offset" in best.estimates else 0.0
     until = max(float(run.time[-1]) - start.time, 1e-3)
-    made = simulate(best.rig, start.theta - zero, start.velocity, until)
+    made = simulate(best.rig, start.theta - zero, 0.0, until)
     curve = CubicHermiteSpline(
         made["time"].values + start.time, made["theta"].values + zero, made["velocity"].values
     )

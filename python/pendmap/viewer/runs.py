@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
+from pendmap.formatting import MINUS
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import Look
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-MINUS, SIGMA = "\N{MINUS SIGN}", "\N{GREEK SMALL LETTER SIGMA}"
+SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 BAND: Final = 2.0  # Half width of the band of noise, standard deviations
 MILLI: Final = 1e3  # Residuals are in mrad, which needs fewer digits on the axis
 LEGEND: Final = rrb.Corner2D.RightTop  # Corner of a legend, which a decay leaves free

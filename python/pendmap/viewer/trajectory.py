@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.analysis.trajectory import energy
-from pendmap.charts import curves, names, plane
+from pendmap.charts import names, plane
 from pendmap.errors import InputError
 from pendmap.units import TIME, Units
 from pendmap.viewer import columns, frame
@@ -196,7 +196,7 @@ def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: 
         path = f"state/{name}"
         style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
         stream.log(path, style, static=True)
-        at, shown = curves.envelope(motion.time, values, bins)
+        at, shown = plane.envelope(motion.time, values, bins)
         stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
 
 

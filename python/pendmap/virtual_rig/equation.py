@@ -73,14 +73,8 @@ class Equation:
         side: Floats,
     ) -> Motion:
         """Return the motion of lanes; :class:`Motion` gives the shapes."""
-        m = Motion()
-        m.run, m.time, m.theta, m.velocity = run, time, theta, velocity
-        m.direction, m.side, m.w0 = direction, side, self.parameters.w0
-        m.lab = self.lab[run] + time
-        m.sin, m.cos = np.sin(theta), np.cos(theta)
-        m.speed = direction * velocity
-        m.vertical, m.lateral = self.drive.at(run, time)
-        return m
+        lab, pivot = self.lab[run] + time, self.drive.at(run, time)
+        return Motion(time, lab, theta, velocity, direction, side, *pivot, self.parameters.w0)
 
     def smooth(self, m: Motion, own: Floats) -> Floats:
         """Return the acceleration without dry friction, rad/s^2, shape (L, K), for unit inertia."""

@@ -310,10 +310,7 @@ def _integrate(equation: Equation, plans: list[RunPlan], readings: list[Effect])
         theta=np.array([plan.theta for plan in plans]),
         velocity=np.array([plan.velocity for plan in plans]),
     )
-    paths = integrate(equation, starts)
-    for path, plan in zip(paths, plans, strict=True):
-        path.lab = plan.lab_time
-    return paths
+    return integrate(equation, starts)
 
 
 def _true(time: Floats, readings: list[Effect]) -> Floats:

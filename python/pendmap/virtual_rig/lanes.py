@@ -52,7 +52,7 @@ class Lanes:
     def __init__(self, equation: Equation, starts: Starts) -> None:
         count = starts.run.size
         self.equation = equation
-        self.run, self.end = starts.run, starts.end
+        self.run = starts.run
         self.time = starts.begin.astype(float)
         self.theta = starts.theta.astype(float)
         self.velocity = starts.velocity.astype(float)
@@ -60,17 +60,13 @@ class Lanes:
         fastest = max(equation.parameters.w0, float(np.abs(equation.drive.frequency).max()))
         self.longest = 1.0 / fastest
         self.wish = np.full(count, _FIRST * self.longest)
-        self.paths = [Path() for _ in range(count)]
+        self.paths = [Path(lab) for lab in equation.lab[starts.run].tolist()]
+        # The end is a last kick of size 0.
         self._kicks = [
-            equation.kicks(int(run), float(begin), float(end))
+            [*equation.kicks(int(run), float(begin), float(end)), (float(end), 0.0)]
             for run, begin, end in zip(starts.run, starts.begin, starts.end, strict=True)
         ]
-        self.stop = np.array(
-            [
-                kicks[0][0] if kicks else end
-                for kicks, end in zip(self._kicks, self.end, strict=True)
-            ]
-        )
+        self.stop = np.array([kicks[0][0] for kicks in self._kicks])
         every = np.arange(count)
         state = self.time, self.theta, self.velocity
         motion = self.motion(every, *(part[:, np.newaxis] for part in state))
@@ -129,10 +125,10 @@ class Lanes:
 
     def kick(self, lane: int) -> None:
         """Apply the kick at ``stop``, if there is one."""
-        if not self._kicks[lane]:
+        if len(self._kicks[lane]) == 1:
             return
         _, jump = self._kicks[lane].pop(0)
-        self.stop[lane] = self._kicks[lane][0][0] if self._kicks[lane] else self.end[lane]
+        self.stop[lane] = self._kicks[lane][0][0]
         self.velocity[lane] += jump
         self.direction[lane] = np.sign(self.velocity[lane])
         if self.velocity[lane] == 0:

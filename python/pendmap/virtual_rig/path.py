@@ -86,8 +86,8 @@ class Path:
     ``lab`` is the lab time at which the run begins, s.
     """
 
-    def __init__(self) -> None:
-        self.lab = 0.0
+    def __init__(self, lab: float = 0.0) -> None:
+        self.lab = lab
         self.events: list[Event] = []
         self._begins: list[float] = []
         self._lengths: list[float] = []

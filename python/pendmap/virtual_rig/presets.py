@@ -44,7 +44,6 @@ class RunPlan:
 class Preset:
     """A named experiment: numbers of runs, and ranges of the random draws."""
 
-    about: str
     free: int  # number of runs
     forced: int
     duration: tuple[float, float]  # of a run, s
@@ -124,8 +123,8 @@ def _strong(rng: Generator, w0: float) -> RunPlan:
 _FORCED: Final = (_swinging, _rotating, _slow, _strong)
 
 PRESETS: Final[dict[str, Preset]] = {
+    # One release near pi until it rests; viscous damping and Coulomb friction.
     "free_decay": Preset(
-        about="one release near pi until it rests; viscous damping and Coulomb friction",
         free=1,
         forced=0,
         duration=(120.0, 120.0),
@@ -135,8 +134,8 @@ PRESETS: Final[dict[str, Preset]] = {
         effects=("none",),
         until_rest=True,
     ),
+    # Four runs under drive, swinging and rotating.
     "forced": Preset(
-        about="four runs under drive, swinging and rotating",
         free=0,
         forced=4,
         duration=(30.0, 40.0),
@@ -145,8 +144,8 @@ PRESETS: Final[dict[str, Preset]] = {
         noise=(0.1, 0.1),
         effects=("none",),
     ),
+    # Five free and four forced runs, an effect hidden in them that the seed chooses.
     "hidden": Preset(
-        about="five free and four forced runs, an effect hidden in them that the seed chooses",
         free=5,
         forced=4,
         duration=(15.0, 30.0),

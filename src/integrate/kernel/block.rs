@@ -9,11 +9,10 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
 use super::event::EventSearch;
-use super::runner::{Runner, smooth};
+use super::runner::{run, smooth};
 use super::stroboscopic::Strobe;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::Angle;
-use crate::model::pendulum::Route;
 
 /// Most trajectories of a block with events: enough for the queue of a step to fill its lanes.
 const WITH_EVENTS: usize = 6144;
@@ -110,11 +109,11 @@ impl Strobe {
     #[must_use]
     pub fn block_width(&self, count: usize) -> usize {
         let [few, wide, both] = dispatch::run(self.simd, Widths);
-        match (self.route, self.events, self.extra) {
-            (Route::Smooth, false, false) if count <= few => few,
-            (Route::Smooth, false, false) => wide,
-            (_, true, _) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
-            _ => both,
+        match (self.is_plain(), self.events) {
+            (true, _) if count <= few => few,
+            (true, _) => wide,
+            (false, true) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
+            (false, false) => both,
         }
     }
 
@@ -161,11 +160,11 @@ impl Job for Steps<'_> {
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
         let Self { strobe, block, range } = self;
-        if block.kick.len() == S::Few::WIDTH && strobe.route == Route::Smooth && !strobe.extra {
+        if block.kick.len() == S::Few::WIDTH && strobe.is_plain() {
             smooth::<S::Few>(strobe, isa, block, range);
-            return;
+        } else {
+            run::<S::Lanes, S::Narrow>(strobe, (isa, isa), block, range);
         }
-        Runner::<S::Lanes, S::Narrow>::new(strobe, (isa, isa)).run(block, range);
     }
 }
 
@@ -176,6 +175,6 @@ impl Job for Singly<'_> {
     #[inline(always)]
     fn run<S: Isa>(self, _: S) {
         let Steps { strobe, block, range } = self.0;
-        Runner::<S::Single, S::Single>::new(strobe, ((), ())).run(block, range);
+        run::<S::Single, S::Single>(strobe, ((), ()), block, range);
     }
 }

@@ -77,6 +77,12 @@ impl Strobe {
         Self::new(&self.pendulum, self.steps() * factor, self.simd)
     }
 
+    /// Whether it needs neither events nor effects.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.route == Route::Smooth && !self.extra
+    }
+
     /// Steps a period.
     #[must_use]
     pub fn steps(&self) -> usize {

@@ -1,5 +1,7 @@
 //! The equation over plain numbers: acceleration, and conversion to other numbers.
 
+use std::f64::consts::TAU;
+
 use super::Equation;
 use crate::lanes::Real;
 use crate::model::drive::Motion;
@@ -71,6 +73,12 @@ impl Equation<f64> {
             equation.formulas.push((formula.clone(), parameters));
         }
         equation
+    }
+
+    /// The unit of "periods": `2 pi / omega`, or `2 pi` without drive.
+    #[must_use]
+    pub fn drive_period(&self) -> f64 {
+        if self.is_autonomous() { TAU } else { TAU / self.motion.omega }
     }
 
     /// Whether nothing changes with the drive's phase: the pivot is at rest.

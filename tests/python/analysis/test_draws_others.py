@@ -268,6 +268,10 @@ def test_quantities_of_the_laboratory_vary_the_rigs_numbers(
             {"stroke_mm": (10, 20, 2), "p": (0.1, 0.2, 2)},
             "stroke_mm and p must be two parameters, they are one",
         ),
+        (
+            {"p": (0.1, 0.2, 2), "Tr": (-1, 1, 2)},
+            "Tr = -1: theta_r must be 0 or more, got -0.0260146 (without dimensions, w0 is 6.2)",
+        ),
     ],
 )
 def test_invalid_laboratory_ranges_are_refused(ranges: Any, said: str) -> None:  # noqa: ANN401

@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, Grid, Pendulum, Rig, render, viewer
-from pendmap.charts import basins, names
-from pendmap.render import style
+from pendmap.charts import basins, names, registry
+from pendmap.render import drawing, style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -217,7 +217,7 @@ def test_axes_are_named_in_the_units_of_the_result() -> None:
     for model, clock, speed in ((SWING, "t (s)", "dθ/dt (rad/s)"), (SWING.pendulum, "τ", "dθ/dτ")):
         run = pendmap.simulate(model, 1.0, 3.0, 5.0)
         with rc_context(style.RC):
-            sheet = render.figure(run, dpi=50.0)
+            sheet = drawing.draw(registry.build(run), dpi=50.0)
             sheet.canvas.draw()
         _, energy, phase, _ = sheet.axes
         assert energy.get_xlabel() == clock

@@ -348,7 +348,7 @@ def test_added_frequencies_resolve_the_turns_of_curves(finer: xr.Dataset) -> Non
 
 
 def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
-    panel = drawn.chart(finer).panel("omega-p")
+    panel = drawn.chart(finer).panels[0]
     (line,) = [mark for mark in panel.marks if mark.path == "undamped"]
     tips = np.stack([line.x, line.y], axis=1)
     assert any(np.allclose(tip, (2.0, 0.0), atol=1e-3) for tip in tips)
@@ -357,7 +357,7 @@ def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
 def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
     # Between the first two tongues a strip rises by its own width from one frequency to the next.
     omega = np.linspace(0.8, 3.0, 60)
-    stable = drawn.chart(tongues_of(omega)).panel("omega-p").marks[0]
+    stable = drawn.chart(tongues_of(omega)).panels[0].marks[0]
     areas = [Outline(area) for area in stable.shapes]
     middles = (omega[:-1] + omega[1:]) / 2
     between = tongues_of(middles)

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from hidden import once
 from pendmap import InputError, virtual_rig
-from pendmap.diagnosis import Discrepancy, diagnose
+from pendmap.diagnosis import Discrepancy, Thresholds, diagnose
 from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.next_experiment.information import Columns, Information, Prospects
 from pendmap.diagnosis.next_experiment.limits import required_gain
@@ -169,6 +170,20 @@ def test_an_effect_that_a_free_decay_does_not_show_has_no_limit() -> None:
     assert limits["encoder_offset"].size == pytest.approx(limits["rig_tilt"].size, rel=1e-3)
 
 
+def test_limits_follow_from_the_thresholds_of_the_diagnosis() -> None:
+    """An effect of one parameter must gain what noise gains with the given probability."""
+    usual = once("none", seed=5, free=1, forced=0).advice.limits
+    request = Request("hidden", seed=5, effects=("none",), free=1, forced=0)
+    strict = diagnose(recorded(request), thresholds=Thresholds(chance=1e-6)).advice.limits
+    gains = [
+        required_gain(float(chdtri(1, chance / len(usual))), 1)
+        for chance in (Thresholds().chance, 1e-6)
+    ]
+    ratio = strict["encoder_gain"].size / usual["encoder_gain"].size
+    assert ratio == pytest.approx(math.sqrt(gains[1] / gains[0]))
+    assert ratio > 1.2
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
     """The probability is compared with sums of squares of normal draws about the expected gain."""
@@ -210,7 +225,7 @@ def test_probabilities_of_names_follow_from_the_expected_gain() -> None:
     rng = np.random.default_rng(3)
     draws = 16 + 2 * 4 * rng.standard_normal(400_000)
     assert chance_wrong_name(16) == pytest.approx(np.mean(draws < 0), rel=0.03)
-    assert chance_resolved(16) == pytest.approx(np.mean(draws > 10), rel=0.01)
+    assert chance_resolved(16, 10) == pytest.approx(np.mean(draws > 10), rel=0.01)
 
 
 def test_the_rig_records_planned_runs() -> None:

@@ -137,7 +137,6 @@ def test_an_effect_that_contains_the_name_takes_no_share() -> None:
             500.0 - behind,
             behind,
             far,
-            1 - far,
             refitted=True,
             contains=contains,
             alike=behind < Thresholds().alike if alike is None else alike,

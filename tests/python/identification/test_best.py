@@ -32,7 +32,7 @@ def test_a_search_that_did_not_converge_gives_no_model() -> None:
     assert model.w0 == report.methods["combined_repaired"]["w0"]
     assert model.notes["provenance"]["method"] == "combined_repaired"
     alone = dataclasses.replace(report, methods={"trajectory": lost})
-    with pytest.raises(InputError, match="no model: trajectory did not converge"):
+    with pytest.raises(InputError, match="got one to which trajectory did not converge"):
         identified_model(alone)
     assert as_json(alone)["best"] is None
     assert not any(text.startswith("trajectory: 3001") for text in as_text(alone))

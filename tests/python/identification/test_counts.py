@@ -73,7 +73,8 @@ def test_errors_of_intervals_are_below_those_of_values_and_match_the_scatter(
     own, plain, z = [], [], []
     for seed in range(12):
         time, theta = coarse(256, noise, seed, rate=rate)
-        fit, reading = fit_decay(time, theta)
+        found = fit_decay(time, theta)
+        fit, (reading,) = found.fit, found.readings
         assert reading.coarse
         assert fit.widening == 1
         alone = run_of(time, theta, None, reading.sigma)
@@ -94,7 +95,7 @@ def test_samples_at_rest_on_one_count_add_no_information() -> None:
     errors = []
     for more in (0.5, 30.0):
         time, theta = record(made, seconds=rests + more, noise_deg=0.0, counts=360)
-        fit, _ = fit_decay(time, theta)
+        fit = fit_decay(time, theta).fit
         errors.append(fit.estimates["encoder_offset.d"].stderr)
     assert errors[1] > 0.9 * errors[0]
 

@@ -51,7 +51,7 @@ TRUE = {
 @pytest.mark.parametrize(("name", "made", "wanted"), ASSUMED)
 def test_a_method_finds_what_it_assumes(name: str, made: object, wanted: dict[str, float]) -> None:
     time, angle = record(made, seconds=30 if made is not WIDE else 85, noise_deg=1e-4)  # type: ignore[arg-type]
-    found = METHODS[name].identify(time, angle)
+    found = identify(time, angle, methods=[name])[name]
     assert found.method == name
     assert found.applicable, found.warnings
     for key, close in wanted.items():
@@ -85,7 +85,7 @@ def test_errors_of_the_energy_balance_match_the_scatter() -> None:
     off = []
     for seed in range(30):
         time, angle = record(WIDE, noise_deg=0.2, offset=2e-3, seed=seed)
-        found = METHODS["energy_balance"].identify(time, angle)
+        found = identify(time, angle, methods=["energy_balance"])["energy_balance"]
         assert found.misfit == pytest.approx(1, abs=0.5)
         true = {**BOTH, "offset": 2e-3}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
@@ -139,17 +139,21 @@ def test_the_envelope_is_that_of_the_equation_of_motion() -> None:
         assert work == pytest.approx(area, rel=1e-6)
 
 
-@pytest.mark.parametrize("seconds", [1.5, 3.0, 10.0, 40.0, 85.0])
+@pytest.mark.parametrize("seconds", [4.0, 10.0, 40.0, 85.0])
 def test_starting_values_are_near_enough(seconds: float) -> None:
     time, angle = record(WIDE, seconds=seconds, noise_deg=0.2, offset=1e-3)
     start = starting_values(time, angle)
-    assert start.w0 == pytest.approx(6.2, rel=0.05 if seconds < 2 else 0.02)
-    assert start.c_over_m >= 0
-    assert start.Tr >= 0
+    assert start["w0"] == pytest.approx(6.2, rel=0.02)
+    assert start["c_over_m"] >= 0
+    assert start["Tr"] >= 0
     if seconds >= 40:
-        assert start.c_over_m == pytest.approx(0.0496, rel=0.1)
-        assert start.Tr == pytest.approx(0.08, rel=0.1)
-        assert start.offset == pytest.approx(1e-3, abs=2e-3)
+        assert start["c_over_m"] == pytest.approx(0.0496, rel=0.1)
+        assert start["Tr"] == pytest.approx(0.08, rel=0.1)
+
+
+def test_three_half_swings_are_needed_for_starting_values() -> None:
+    with pytest.raises(InputError, match="three half swings or more"):
+        starting_values(*record(WIDE, seconds=3.0, noise_deg=0.2))
 
 
 def test_a_global_search_is_not_led_away_by_false_peaks() -> None:
@@ -158,11 +162,10 @@ def test_a_global_search_is_not_led_away_by_false_peaks() -> None:
     false = peaks.amplitude.copy()
     false[[20, 60, 100]] *= (0.5, 1.5, 2.0)
     start = global_start(dataclasses.replace(peaks, amplitude=false))
-    assert start.source == "global"
-    assert start.w0 == pytest.approx(6.2, rel=2e-3)
-    assert start.c_over_m == pytest.approx(0.0496, rel=0.05)
-    assert start.Tr == pytest.approx(0.08, rel=0.05)
-    with pytest.raises(InputError, match="peaks must be 4 or more"):
+    assert start["w0"] == pytest.approx(6.2, rel=2e-3)
+    assert start["c_over_m"] == pytest.approx(0.0496, rel=0.05)
+    assert start["Tr"] == pytest.approx(0.08, rel=0.05)
+    with pytest.raises(InputError, match="three half swings or more"):
         global_start(Peaks.of([0.0, 1.0], [0.3, 0.2]))
 
 
@@ -201,7 +204,7 @@ def test_a_record_that_begins_in_motion_is_compared_peak_by_peak(begin: int) -> 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_record_without_a_swing_is_not_applicable(name: str) -> None:
     time = np.arange(300) / 100
-    found = METHODS[name].identify(time, 0.5 * np.exp(-time))
+    found = identify(time, 0.5 * np.exp(-time), methods=[name])[name]
     assert not found.applicable
     assert found.warnings
     with pytest.raises(InputError, match="swing"):

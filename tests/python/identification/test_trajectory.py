@@ -265,6 +265,6 @@ def test_measured_records(
     drag = Effect("quadratic_drag", {"q": 0.0})
     for (friction, quadratic), limit in zip(LAWS.values(), limits, strict=True):
         effects = [drag] if quadratic else []
-        fit, _ = fit_decay(time[part], theta[part], friction=friction, effects=effects)
+        fit = fit_decay(time[part], theta[part], friction=friction, effects=effects).fit
         assert fit.rms <= limit
         assert len(fit.windows) == 1

@@ -107,7 +107,7 @@ def test_a_formula_is_found_by_its_name_alone(tmp_path: Path) -> None:
             r"typical must be \[low, high\], got 3",
         ),
         (("x", "-k*v", {"k": {"power": 1, "typical": [3, 1]}}), "the lower first"),
-        (("x", "-k*v", {"k": {"power": 1, "color": 3}}), "'color' is not known"),
+        (("x", "-k*v", {"k": {"power": 1, "color": 3}}), "color is not known"),
         (("x", "-k*v", {"k": {"power": 1, "unit": 3}}), "unit must be a text, got 3"),
         (("x", "-k*v", {"k": {"power": 1, "range": [1, 2]}}), "holds the typical"),
         (("x", "-k*v", {}), "with their powers of w0"),

@@ -251,7 +251,7 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
             EFFECT + "parameters = { q = nan }\n",
             "quadratic_drag: q must be a finite number, got nan",
         ),
-        (EFFECT + "parameters = { k = 1 }\n", "parameters: 'k' is not known: it must be one of q"),
+        (EFFECT + "parameters = { k = 1 }\n", "parameters: k is not known: it must be one of q"),
         (
             EFFECT + "parameters = { q = 1 }\nci95 = { q = 1 }\n",
             "ci95 of q must be [low, high], got 1",
@@ -298,7 +298,7 @@ def test_a_class_refuses_files_of_the_other(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("notes", "complaint"),
     [
-        ({"rig": {}}, "'rig' is not known: it must be one of covariance, provenance"),
+        ({"rig": {}}, "rig is not known: it must be one of covariance, provenance"),
         ({"covariance": [1]}, r"covariance must be a table \[covariance\], got \[1\]"),
         ({"covariance": {"a": None}}, "NoneType"),
         ({"covariance": {"a": 1j}}, "complex"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import copy
+import dataclasses
 from typing import Any
 
 import pytest
@@ -72,20 +72,20 @@ def test_a_search_begins_where_an_effect_is_weak_and_of_a_usual_shape(
             assert low < value < high
 
 
-def renamed(entry: dict[str, Any]) -> dict[str, Any]:
+def renamed(effect: pendmap.EffectDefinition) -> pendmap.EffectDefinition:
     """Return the definition with other names for its parameters."""
-    other = copy.deepcopy(entry)
-    for k, parameter in enumerate(other["parameters"]):
-        parameter["name"] = f"other{k}"
-        less = parameter["power_of_w0_less"]
-        names = [p["name"] for p in entry["parameters"]]
-        parameter["power_of_w0_less"] = None if less is None else f"other{names.index(less)}"
-    return other
+    names: list[str | None] = [p.name for p in effect.parameters]
+    parameters = []
+    for k, parameter in enumerate(effect.parameters):
+        less = parameter.power_of_w0_less
+        other = None if less is None else f"other{names.index(less)}"
+        parameters.append(dataclasses.replace(parameter, name=f"other{k}", power_of_w0_less=other))
+    return dataclasses.replace(effect, parameters=tuple(parameters))
 
 
 def predict_limits(name: str) -> list[Any]:
     """Return the candidates of an effect, with parameters by position."""
-    names = [p["name"] for p in effects.definition(name)["parameters"]]
+    names = [p.name for p in effects.definition(name).parameters]
     place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
 
     def of(one: Candidate) -> list[Any]:
@@ -128,7 +128,7 @@ def test_roles_in_a_formula_are_declared_or_inferred(
     term: str, parameters: dict[str, Any], roles: list[str]
 ) -> None:
     formula = pendmap.Formula("own_effect", term, parameters)
-    assert [p["role"] for p in formula.entry["parameters"]] == roles
+    assert [p.role for p in formula.definition.parameters] == roles
     again = pendmap.Formula(**formula.table)
     assert again == formula
     values = dict.fromkeys(parameters, 1.0)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import Run
+    from pendmap.charts.chart import Chart
 
 
 @pytest.mark.parametrize("name", ["4", "figure 4", "Figure_4", "fig.4", "fig4"])
@@ -147,6 +148,18 @@ def test_figure_2_has_a_column_for_each_point(tmp_path: Path) -> None:
     with pytest.raises(pendmap.InputError, match="no room"):
         drawing.draw(tumbling.chart(runs), size=(2.0, 2.0), dpi=100)
     assert paper_figures.draw("2", tmp_path / "2.png").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize(("key", "rows"), [("1", [1]), ("2", [3, 3, 3]), ("3", [1])])
+def test_each_figure_has_its_own_panels(
+    key: str, rows: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    charts: list[Chart] = []
+    monkeypatch.setattr(drawing, "save", lambda chart, _: charts.append(chart))
+    paper_figures.draw(key, tmp_path / "a.png")
+    (chart,) = charts
+    assert chart.title.startswith(f"Figure {key}: ")
+    assert [len(row) for row in chart.rows] == rows
 
 
 @pytest.fixture(scope="module")

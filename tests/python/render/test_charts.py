@@ -49,12 +49,15 @@ def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) ->
         "An example",
         "of every mark",
         [
-            charts.Panel("curves", "curves", across, up, curves),
-            charts.Panel("bins", "bins", charts.Axis("x"), charts.Axis("n", (0, 2)), [bins]),
-            charts.Panel("classes", "classes", *plain, [classes]),
-            charts.Panel("heights", "heights", *plain, [heights]),
+            [
+                charts.Panel("curves", "curves", across, up, curves),
+                charts.Panel("bins", "bins", charts.Axis("x"), charts.Axis("n", (0, 2)), [bins]),
+            ],
+            [
+                charts.Panel("classes", "classes", *plain, [classes]),
+                charts.Panel("heights", "heights", *plain, [heights]),
+            ],
         ],
-        rows=[["curves", "bins"], ["classes", "heights"]],
     ).only(layer)
 
 

@@ -17,7 +17,6 @@ import motions
 import synthetic
 from drawn import made, titles
 from pendmap import InputError, render
-from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -107,11 +106,11 @@ def test_an_interrupt_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mo
     file = tmp_path / "a.png"
     file.write_bytes(b"old")
 
-    def interrupted(_figure: Figure, part: Path) -> None:
+    def interrupted(_figure: Figure, part: Path, **_: object) -> None:
         part.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(style, "write", interrupted)
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
     with pytest.raises(KeyboardInterrupt):
         render.draw(synthetic.painted(), file)
     assert file.read_bytes() == b"old"

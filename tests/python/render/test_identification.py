@@ -20,7 +20,7 @@ from pendmap import render
 from pendmap.charts import chart as charts
 from pendmap.charts import decrement, half_cycles, identification, methods
 from pendmap.charts.names import signed
-from pendmap.formatting import estimate_text
+from pendmap.formatting import estimate_text, typographic
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
 from pendmap.identification.methods.combined import recursion
 from pendmap.paper import pendulum
@@ -214,7 +214,7 @@ def test_the_table_has_the_estimates() -> None:
     assert [len(row) for row in rows] == [len(identification.columns(found))] * len(rows)
     assert rows[0][0] == "trajectory"
     assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
-    said = estimate_text(Estimate(-0.0123456, 0.00123), minus=methods.MINUS)
+    said = typographic(estimate_text(Estimate(-0.0123456, 0.00123)))
     assert said == "\u22120.0123(12)"
 
 
@@ -225,7 +225,8 @@ def test_labels_over_many_powers_of_ten_have_room(scale: float, spread: float) -
     up, lines = signed([near, -near * spread], "error")
     panel = charts.Panel("error", "", charts.Axis("x", (0.0, 1.0)), up, lines)
     with rc_context(style.RC):
-        figure = drawing.draw(charts.Chart("Errors", "", [panel], size=(4.0, 2.5)), dpi=100.0)
+        chart = charts.Chart("Errors", "", [[panel]], size=(4.0, 2.5))
+        figure = drawing.draw(chart, dpi=100.0)
         figure.draw_without_rendering()
     assert_room(figure)
     assert len([t for t in figure.axes[0].get_yticklabels() if t.get_text()]) >= 3

@@ -15,10 +15,10 @@ from matplotlib.text import Text
 import motions
 import pendmap
 import synthetic
-from pendmap import InputError, render
+from pendmap import InputError
 from pendmap.charts import basins as layers
-from pendmap.charts import plane
-from pendmap.render import style
+from pendmap.charts import plane, registry
+from pendmap.render import drawing, style
 
 MAPS = {
     "usual": synthetic.painted(),
@@ -35,7 +35,7 @@ HUGE = (1.0, 1.0)
 
 def figure_of(dataset: Any, size: tuple[float, float] | None = None) -> Any:  # noqa: ANN401
     with rc_context(style.RC):
-        figure = render.figure(dataset, size=size, dpi=100.0)
+        figure = drawing.draw(registry.build(dataset), size=size, dpi=100.0)
         figure.canvas.draw()
     return figure
 

@@ -17,7 +17,7 @@ from matplotlib import rc_context
 from hidden import once
 from pendmap import InputError, render, report
 from pendmap.charts import diagnosis
-from pendmap.diagnosis import FunctionScore
+from pendmap.diagnosis import FunctionScore, Thresholds
 from pendmap.diagnosis.summary import as_json
 from pendmap.render import drawing, style
 from pendmap.render.report import figures
@@ -105,6 +105,16 @@ def test_each_verdict_has_a_report(verdict: str, tmp_path: Path) -> None:
         assert all(f"`{name}`" in markdown.split("\n")[2] for name in names)
         assert "The separation is the part of the gain" in markdown
         assert "| wrong name | one name left |" in markdown
+
+
+def test_a_report_states_the_thresholds_of_its_diagnosis() -> None:
+    found = once("quadratic_drag", size=0.1)
+    limits = Thresholds(rest=0.02, alike=12.5)
+    assessment = dataclasses.replace(found.assessment, thresholds=limits)
+    found = dataclasses.replace(found, assessment=assessment)
+    text = report.as_markdown(report.diagnosis(found), {})
+    assert "Below 0.02 the residuals are significant." in text
+    assert "indistinguishable: behind by less than 12.5, or by one run alone" in text
 
 
 def test_the_numbers_of_a_report_are_those_of_the_json() -> None:

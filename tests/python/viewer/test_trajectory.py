@@ -15,7 +15,7 @@ import motions
 import pendmap
 import synthetic
 from pendmap import InputError
-from pendmap.charts.curves import envelope
+from pendmap.charts.plane import envelope
 from pendmap.viewer import trajectory
 from recordings import recorded
 

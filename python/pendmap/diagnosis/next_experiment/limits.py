@@ -14,18 +14,15 @@ from pendmap.diagnosis.next_experiment.power import (
     predict_limits,
     predict_separation,
 )
-from pendmap.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.next_experiment.power import Outlook, Prospect
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.diagnosis.verdict import Assessment
-    from pendmap.units import Units
 
 
 DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
@@ -62,13 +59,14 @@ class Advice:
 
 
 def detection_limits(
-    scores: Scores, level: float, found: Collection[str], units: Units
+    scores: Scores, level: float, found: FittedModel, chance: float
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
     A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect,
     orthogonal to the fitted parameters and initial states. The gain has a noncentral chi-squared
-    distribution and must exceed the threshold of the search.
+    distribution and must exceed the threshold of the search, which noise alone exceeds with the
+    probability ``chance``.
     """
     from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
 
@@ -76,15 +74,17 @@ def detection_limits(
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
         candidate = score.candidate
-        if candidate.name in found:
+        if candidate.name in found.names:
             continue
         among = len(choices) * choices[candidate.name]
-        threshold = float(chdtri(candidate.count, Thresholds().chance / among))
+        threshold = float(chdtri(candidate.count, chance / among))
         wanted = required_gain(threshold, len(candidate.free))
         shown = score.information / level
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
-        most = max(map(abs, candidate.definition["parameters"][0]["typical"]))
-        if size > UNDETECTABLE * abs(candidate.effect(units, most).parameters[candidate.size]):
+        most = max(map(abs, candidate.definition.parameters[0].typical))
+        if size > UNDETECTABLE * abs(
+            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+        ):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))
     limits = {}
@@ -121,7 +121,6 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     nearest: ScoredModel,
     assessment: Assessment,
     scores: Scores,
-    level: float,
     reasons: Reasons,
 ) -> Advice:
     """Return the recommended next record, detection limits and predicted outcomes.
@@ -129,13 +128,14 @@ def advise(  # noqa: PLR0913, PLR0917 (what was recorded, found and judged)
     The aim is to distinguish equivalent names (``s G`` of 25), whatever the verdict; else to halve
     the widest interval of named effects; else to lower the detection limits.
     """
-    limits = detection_limits(scores, level, best.fitted.names, best.fitted.fit.model.units)
+    chance = assessment.thresholds.chance
+    limits = detection_limits(scores, nearest.fitted.level, best.fitted, chance)
 
     def proposed() -> Outlook | None:
         if any(len(each.equivalent) > 1 for each in assessment.identified):
-            return predict_separation(data, nearest, assessment.identified, level, reasons)
+            return predict_separation(data, nearest, assessment, reasons)
         if assessment.verdict == "named":
-            return predict_interval(data, best, level, reasons)
+            return predict_interval(data, best, reasons)
         return predict_limits(data, best, scores, reasons)
 
     outlook = compute_part(reasons, "proposals", proposed, None)
@@ -173,7 +173,7 @@ def _revealed(assessment: Assessment, name: str) -> str:
         for s in assessment.identified
         for c in (s.candidate, *(r.candidate for r in s.alternatives))
     )
-    return str(next(c for c in every if c.name == name).definition["revealed_by"])
+    return next(c for c in every if c.name == name).definition.revealed_by
 
 
 def _recommendation(outlook: Outlook, best: Prospect) -> str:

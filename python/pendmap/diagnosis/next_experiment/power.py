@@ -18,11 +18,10 @@ import numpy as np
 
 from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.diagnosis.next_experiment.information import Prospects
-from pendmap.diagnosis.refit import Z95
-from pendmap.diagnosis.thresholds import Thresholds
+from pendmap.identification.uncertainty import Z95
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.further import Reasons
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel
-    from pendmap.diagnosis.verdict import Alternative, Identifiability
+    from pendmap.diagnosis.verdict import Alternative, Assessment
 
 CLEAR: Final = 25.0  # ``s G`` from which a wrong name has a probability of at most 0.6 %
 
@@ -56,14 +55,13 @@ class _Pair:
 def predict_separation(
     data: DataSplit,
     found: ScoredModel,
-    identified: Sequence[Identifiability],
-    level: float,
+    assessment: Assessment,
     reasons: Reasons,
 ) -> Outlook:
     """Return the predicted separation of indistinguishable names after each proposal."""
     pairs = [
         _Pair(each.candidate, alternative, _shapes(alternative.candidate))
-        for each in identified
+        for each in assessment.identified
         for alternative in each.alternatives
         if alternative.alike and not alternative.contains
     ]
@@ -72,7 +70,7 @@ def predict_separation(
     before = [_separation(ahead, ahead.old, found, pair) for pair in pairs]
     added = [
         [
-            max(_separation(ahead, total, found, pair) - first, 0.0) / level
+            max(_separation(ahead, total, found, pair) - first, 0.0) / found.fitted.level
             for pair, first in zip(pairs, before, strict=True)
         ]
         for total in map(ahead.after, ahead.menu)
@@ -93,7 +91,7 @@ def predict_separation(
                 proposal,
                 min(powers),
                 min(sum(map(chance_wrong_name, powers)), 1.0),
-                math.prod(map(chance_resolved, powers)),
+                math.prod(chance_resolved(power, assessment.thresholds.alike) for power in powers),
             )
         )
     about = dict.fromkeys(
@@ -126,9 +124,7 @@ def _separation(ahead: Prospects, total: Information, found: ScoredModel, pair: 
     return value * min(right, other)
 
 
-def predict_interval(
-    data: DataSplit, found: ScoredModel, level: float, reasons: Reasons
-) -> Outlook | None:
+def predict_interval(data: DataSplit, found: ScoredModel, reasons: Reasons) -> Outlook | None:
     """Return the predicted widest interval of an effect's size after each proposal."""
     ahead = Prospects(data, found, (), reasons)
     shared = ahead.now.shared
@@ -140,7 +136,7 @@ def predict_interval(
 
     def width(information: Information, name: str) -> float:
         k = shared.index(name)
-        variance = level * float(information.covariance(every)[k, k])
+        variance = found.fitted.level * float(information.covariance(every)[k, k])
         return Z95 * math.sqrt(max(variance, 0.0)) / max(abs(found.fitted.fit[name]), 1e-300)
 
     weakest = max(sizes, key=lambda name: width(ahead.old, name))
@@ -264,9 +260,9 @@ def chance_wrong_name(power: float) -> float:
     return _tail(math.sqrt(max(power, 0.0)) / 2)
 
 
-def chance_resolved(power: float) -> float:
-    """Return the probability that the wrong one of two names falls behind by the threshold."""
-    return 1.0 - _tail((power - Thresholds().alike) / (2 * math.sqrt(power))) if power > 0 else 0.0
+def chance_resolved(power: float, alike: float) -> float:
+    """Return the probability that the wrong one of two names falls behind by ``alike``."""
+    return 1.0 - _tail((power - alike) / (2 * math.sqrt(power))) if power > 0 else 0.0
 
 
 def _tail(z: float) -> float:

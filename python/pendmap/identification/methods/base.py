@@ -15,9 +15,10 @@ from pendmap.model import Rig
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from pendmap.signal import Floats
 
 
+NEEDS_SAMPLES: Final = "the record has peaks only, and this method needs every sample"
 MISFIT: Final = 2.0  # chi^2 per degree of freedom above which a method of peaks warns
 
 
@@ -54,7 +55,7 @@ class Identification:
     used: str = ""
     warnings: tuple[str, ...] = ()
     applicable: bool = True
-    covariance: tuple[tuple[str, ...], NDArray[np.float64]] | None = None
+    covariance: tuple[tuple[str, ...], Floats] | None = None
     misfit: float | None = None
     model: Rig | None = None
     converged: bool = True
@@ -123,6 +124,11 @@ class Identification:
         return Rig(**known)
 
 
+def inapplicable(reason: str, warnings: Sequence[str] = ()) -> Identification:
+    """Return the result of a method that cannot be applied."""
+    return Identification(warnings=(*warnings, f"not applicable: {reason}"), applicable=False)
+
+
 def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
     count: int,
     least: int,
@@ -133,16 +139,35 @@ def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
 ) -> Identification:
     """Return an inapplicable result: ``count`` of ``total`` peaks, but ``least`` are needed."""
     peaks = counted(count, "peak") if total is None else f"{count} of {counted(total, 'peak')}"
-    text = f"not applicable: {f'{peaks} {where}'.strip()}, {least} are needed" + (
-        f": {because}" if because else ""
+    why = f": {because}" if because else ""
+    return inapplicable(f"{f'{peaks} {where}'.strip()}, {least} are needed{why}", warnings)
+
+
+def identified(  # noqa: PLR0913 (all of a result)
+    names: tuple[str, ...],
+    values: Floats,
+    covariance: Floats,
+    *,
+    used: str,
+    warnings: Sequence[str],
+    misfit: float | None = None,
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+) -> Identification:
+    """Return a result with normal 95 % intervals unless they are given.
+
+    A warning is added for each negative damping parameter.
+    """
+    estimates, negative = {}, []
+    for name, value, variance in zip(names, values.tolist(), np.diag(covariance), strict=True):
+        error = math.sqrt(max(float(variance), 0.0))
+        normal = (value - Z95 * error, value + Z95 * error)
+        estimates[name] = Estimate(value, error, (intervals or {}).get(name, normal))
+        if name in {"c_over_m", "Tr"} and value < 0:
+            negative.append(f"unphysical: {name} is {value:.4g}, below 0")
+    return Identification(
+        estimates=estimates,
+        used=used,
+        warnings=(*warnings, *negative),
+        covariance=(names, np.asarray(covariance)),
+        misfit=misfit,
     )
-    return Identification(warnings=(*warnings, text), applicable=False)
-
-
-def unphysical(values: Mapping[str, float]) -> list[str]:
-    """Return a warning for each negative damping parameter."""
-    return [
-        f"unphysical: {name} is {values[name]:.4g}, below 0"
-        for name in ("c_over_m", "Tr")
-        if values.get(name, 0.0) < 0
-    ]

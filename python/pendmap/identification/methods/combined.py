@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.identification.methods.base import Identification, too_few, unphysical
+from pendmap.identification.methods.base import Identification, identified, inapplicable, too_few
 from pendmap.identification.period import mean_period
-from pendmap.identification.uncertainty import bootstrap, estimates, propagated
+from pendmap.identification.uncertainty import bootstrap, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 Reading = Literal["all", "odd_ends", "odd_triplets"]  # Interpretations of the peaks to be used
@@ -184,8 +181,8 @@ def from_peaks(
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
     found = compute(values)
     if not np.isfinite(found).all():
-        text = "not applicable: a difference of peaks has the wrong sign: no logarithm in eq. 2.7"
-        return Identification(warnings=(*warnings, text), applicable=False)
+        reason = "a difference of peaks has the wrong sign: no logarithm in eq. 2.7"
+        return inapplicable(reason, warnings)
     covariance = propagated(compute, values, stderr)
     draws = bootstrap(compute, values, stderr)
     failed = float(np.mean(~np.isfinite(draws).all(axis=1)))
@@ -197,15 +194,16 @@ def from_peaks(
             f"noise reverses the sign of a difference of peaks in {failed:.0%} of simulated "
             "repetitions: the errors are too small"
         )
-    warnings += unphysical(dict(zip(names, found, strict=True)))
-    return Identification(
-        estimates=estimates(names, found, covariance, intervals=intervals),
+    return identified(
+        names,
+        found,
+        covariance,
+        intervals=intervals,
         used=(
             f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
             f"degrees); {_USES[reading]}; the mean of {count - 2} overlapping periods"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, covariance),
+        warnings=warnings,
     )
 
 

@@ -11,17 +11,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, identified, too_few
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import frequency
-from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
+from pendmap.identification.uncertainty import least_squares_line, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 FAST: Final = (CUT, math.radians(90.0))
@@ -78,15 +75,15 @@ def from_peaks(
     covariance = propagated(compute, inner, errors)
     found = compute(inner)
     names = ("w0", "c_over_m", "Tr")
-    warnings += unphysical(dict(zip(names, found, strict=True)))
-    return Identification(
-        estimates=estimates(names, found, covariance),
+    return identified(
+        names,
+        found,
+        covariance,
         used=(
             f"exponential through the {len(quick)} peaks {_between(fast)}, straight line through "
             f"the {len(slack)} {_between(slow)}; times of all of these"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, covariance),
+        warnings=warnings,
     )
 
 

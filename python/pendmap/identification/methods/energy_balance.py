@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.base import (
+    MISFIT,
+    NEEDS_SAMPLES,
+    Identification,
+    identified,
+    inapplicable,
+    too_few,
+)
 from pendmap.identification.period import frequency, viscous_work
-from pendmap.identification.uncertainty import chain_covariance, chain_least_squares, estimates
+from pendmap.identification.uncertainty import chain_covariance, chain_least_squares
 from pendmap.signal.local_polynomial import smoothed_velocity
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Indices
 
 
 _FEWEST: Final = 5  # Fewest peaks
@@ -33,7 +37,7 @@ _SAMPLES: Final = 25
 """Samples per period below which a warning is given: the quartic smooths the velocity."""
 
 
-def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
+def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identification:
     """Identify viscous damping and Coulomb friction from the energy loss of each half cycle.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
@@ -41,6 +45,8 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     over measured velocities from local quartics, less the noise's share; across a gap it is that of
     an undamped pendulum. Generalized least squares account for peaks shared by half cycles.
     """
+    if record is None:
+        return inapplicable(NEEDS_SAMPLES)
     turned = peaks.turned
     if len(turned) < _FEWEST:
         return too_few(len(turned), _FEWEST)
@@ -49,8 +55,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     if len(small) < _FEWEST:
         return too_few(len(small), _FEWEST, len(turned), f"under {_LARGEST:g} rad")
     if pairs.size < _FEWEST - 1:
-        text = f"not applicable: {pairs.size} whole half cycles, {_FEWEST - 1} are needed"
-        return Identification(warnings=(text,), applicable=False)
+        return inapplicable(f"{pairs.size} whole half cycles, {_FEWEST - 1} are needed")
     w0 = frequency(small).w0
     work = _measured_work(record, turned, pairs, w0)
     zero, values, covariance, misfit = 0.0, np.empty(0), np.empty((0, 0)), 1.0
@@ -67,7 +72,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     full[1:, 1:] = covariance
     lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
     full += np.outer(lever, lever) * period.stderr**2
-    warnings = unphysical(dict(zip(names, found, strict=True)))
+    warnings = []
     period_samples = 2 * math.pi / w0 / float(np.median(np.diff(record[0])))
     if period_samples < _SAMPLES:
         warnings.append(
@@ -79,20 +84,21 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
             f"the balance does not close: chi^2 per degree of freedom is {misfit:.3g}; the errors "
             "are widened by it"
         )
-    return Identification(
-        estimates=estimates(names, found, full),
+    return identified(
+        names,
+        found,
+        full,
         used=(
             f"{pairs.size} half cycles between peaks {turned.index[0]} and {turned.index[-1]}; w0 "
             f"from the {len(small)} peaks under {math.degrees(_LARGEST):.3g} degrees"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, full),
+        warnings=warnings,
         misfit=misfit,
     )
 
 
 def _balance(
-    peaks: Peaks, pairs: NDArray[np.intp], work: Floats, w0: float, zero: float
+    peaks: Peaks, pairs: Indices, work: Floats, w0: float, zero: float
 ) -> tuple[Floats, Floats, float]:
     """Return ``c_over_m``, ``Tr``, change of the zero; covariance; chi^2 per degree of freedom."""
     x = peaks.amplitude - zero
@@ -111,7 +117,7 @@ def _balance(
 
 
 def _measured_work(
-    record: tuple[Floats, Floats], peaks: Peaks, pairs: NDArray[np.intp], w0: float
+    record: tuple[Floats, Floats], peaks: Peaks, pairs: Indices, w0: float
 ) -> Floats:
     """Return ``int th'^2 dt`` over each half cycle, rad^2/s."""
     time, theta = record

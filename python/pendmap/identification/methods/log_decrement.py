@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.base import (
+    MISFIT,
+    Identification,
+    identified,
+    inapplicable,
+    too_few,
+)
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import mean_period
-from pendmap.identification.uncertainty import estimates, least_squares_line, propagated
+from pendmap.identification.uncertainty import least_squares_line, propagated
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 Reading = Literal["ends", "line"]
@@ -44,8 +47,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     decrements, _, misfit = least_squares_line(half_cycles, np.log(size), relative)
     full = np.flatnonzero(small.index[2:] - small.index[:-2] == 2)  # noqa: PLR2004 (one cycle)
     if full.size == 0:
-        text = f"not applicable: no two peaks{under} are one cycle apart"
-        return Identification(warnings=(text,), applicable=False)
+        return inapplicable(f"no two peaks{under} are one cycle apart")
 
     def compute(values: Floats) -> Floats:
         logs, times = np.log(values[:count]), values[count:]
@@ -79,15 +81,15 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
             "include non-viscous damping"
         )
     names = ("w0", "c_over_m")
-    warnings += unphysical(dict(zip(names, found, strict=True)))
     way = "the first and the last of" if reading == "ends" else "a line through the logarithms of"
-    return Identification(
-        estimates=estimates(names, found, covariance),
+    return identified(
+        names,
+        found,
+        covariance,
         used=(
             f"{way} peaks {small.index[0]} to {small.index[-1]} ({count}{under}); the mean of "
             f"{full.size} overlapping periods"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, np.asarray(covariance)),
+        warnings=warnings,
         misfit=misfit if small.known else None,
     )

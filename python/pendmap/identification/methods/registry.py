@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -18,78 +18,34 @@ from pendmap.identification.methods import (
     repaired,
     trajectory,
 )
-from pendmap.identification.methods.base import Identification
+from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
 from pendmap.identification.peaks import find_peaks, samples
 from pendmap.signal.robust import from_first, normal_scale
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True)
-class Method:
-    """Method of identification."""
-
-    name: str  # name in results and JSON
-    compute: Callable[..., Identification]  # from peaks, peaks and samples, or samples alone
-    reads_peaks: bool = True  # whether it uses peaks, found once for all methods
-    reads_samples: bool = False
-    needs_samples: bool = False  # whether it cannot be applied to peaks alone
-
-    def identify(
-        self,
-        time: ArrayLike,
-        theta: ArrayLike,
-        *,
-        sigma: float | None = None,
-        trusted: ArrayLike | None = None,
-        peaks: Peaks | None = None,
-    ) -> Identification:
-        """Identify the damping of a record, with the arguments of :func:`identify`."""
-        if not self.reads_peaks:
-            found = self.compute(time, theta, sigma=sigma, trusted=trusted)
-            return dataclasses.replace(found, method=self.name)
-        if peaks is None:
-            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-        return self.from_peaks(peaks, samples(time, theta, trusted))
-
-    def from_peaks(
-        self, peaks: Peaks, record: tuple[Floats, Floats] | None = None
-    ) -> Identification:
-        """Identify the damping from peaks, and from samples (s, rad) if given."""
-        if self.needs_samples and record is None:
-            text = "not applicable: the record has peaks only, and this method needs every sample"
-            return Identification(self.name, warnings=(text,), applicable=False)
-        given = {"record": record} if self.reads_samples else {}
-        found = self.compute(peaks, **given)
-        return dataclasses.replace(found, method=self.name)
+    from pendmap.signal import Floats
 
 
 BEST: Final = "trajectory"  # The default method
 
-_ODD_ENDS = functools.partial(combined.from_peaks, reading="odd_ends")
-_ODD_TRIPLETS = functools.partial(combined.from_peaks, reading="odd_triplets")
-
-METHODS: Final = {
-    method.name: method
-    for method in (
-        Method(BEST, trajectory.identify, reads_peaks=False, needs_samples=True),
-        Method("combined", combined.from_peaks, reads_samples=True),
-        Method("combined_odd_ends", _ODD_ENDS, reads_samples=True),
-        Method("combined_odd_triplets", _ODD_TRIPLETS, reads_samples=True),
-        Method("combined_repaired", repaired.from_peaks),
-        Method("log_decrement", log_decrement.from_peaks),
-        Method("de_paula", de_paula.from_peaks),
-        Method("energy_balance", energy_balance.from_peaks, reads_samples=True, needs_samples=True),
-    )
+_OF_PEAKS: Final[Mapping[str, Callable[[Peaks, tuple[Floats, Floats] | None], Identification]]] = {
+    "combined": combined.from_peaks,
+    "combined_odd_ends": functools.partial(combined.from_peaks, reading="odd_ends"),
+    "combined_odd_triplets": functools.partial(combined.from_peaks, reading="odd_triplets"),
+    "combined_repaired": lambda peaks, _: repaired.from_peaks(peaks),
+    "log_decrement": lambda peaks, _: log_decrement.from_peaks(peaks),
+    "de_paula": lambda peaks, _: de_paula.from_peaks(peaks),
+    "energy_balance": energy_balance.from_peaks,
 }
-"""Every method by its name, the default first, then in the order of the paper's tables."""
+"""Methods of peaks by name, which also read the samples (s, rad) of the record if it has them."""
+
+METHODS: Final = (BEST, *_OF_PEAKS)
+"""Names of all methods, the default first, then in the order of the paper's tables."""
 
 
 def check_names(methods: Iterable[str] | None) -> list[str]:
@@ -124,7 +80,7 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
     trusted : array of bool, shape (N,), optional
         Samples that may be used; by default all.
     methods : iterable of str, optional
-        Names of :data:`METHODS`; by default all.
+        Names among :data:`METHODS`; by default all.
     peaks : Peaks, optional
         Peaks of the record; by default found from the samples.
     progress : callable, optional
@@ -141,18 +97,20 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
         If a method is unknown or the arrays are not a valid record.
     """
     names = check_names(methods)
-    if samples(time, theta, trusted)[0].size == 0:
-        raise InputError("time must have samples of a decay, got none that may be used")
     elapsed, first = from_first(time)
-    if any(METHODS[name].reads_peaks for name in names):
-        if peaks is None:
-            peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-        peaks = peaks.later(-first)
+    record = samples(elapsed, theta, trusted)
+    if record[0].size == 0:
+        raise InputError("time must have samples of a decay, got none that may be used")
+    known: dict[str, Any] = {"sigma": sigma, "trusted": trusted}
+    if peaks is None and names != [BEST]:
+        peaks = find_peaks(time, theta, **known)
     found = {}
     for name in names:
-        # The trajectory method reports times of the record, and subtracts the first itself.
-        own, known = (elapsed, {"peaks": peaks}) if METHODS[name].reads_peaks else (time, {})
-        found[name] = METHODS[name].identify(own, theta, sigma=sigma, trusted=trusted, **known)
+        if peaks is None or name == BEST:
+            one = trajectory.identify(time, theta, **known)
+        else:
+            one = _OF_PEAKS[name](peaks.later(-first), record)
+        found[name] = dataclasses.replace(one, method=name)
         if progress is not None:
             progress(len(found), len(names))
     return found
@@ -172,8 +130,10 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
             stderr_time=np.full(size, scatter(peaks.time)),
             stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
         )
-    found = {name: METHODS[name].from_peaks(peaks) for name in check_names(methods)}
-    for name, one in found.items():
+    found = {}
+    for name in check_names(methods):
+        one = inapplicable(NEEDS_SAMPLES) if name == BEST else _OF_PEAKS[name](peaks, None)
+        found[name] = one = dataclasses.replace(one, method=name)
         # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
         if not peaks.known and not any(each.stderr for each in one.estimates.values()):
             bare = {n: Estimate(each.value) for n, each in one.estimates.items()}

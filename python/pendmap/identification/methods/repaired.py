@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from pendmap.identification.methods.base import MISFIT, Identification, too_few, unphysical
+from pendmap.identification.methods.base import MISFIT, Identification, identified, too_few
 from pendmap.identification.methods.combined import CUT, recursion, small_peaks
 from pendmap.identification.period import frequency
-from pendmap.identification.uncertainty import estimates, jacobian
+from pendmap.identification.uncertainty import jacobian
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _FEWEST: Final = 6  # Fewest peaks below the cut
@@ -96,14 +93,14 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     outer = slopes @ inner @ slopes.T
     names = ("w0", "c_over_m", "Tr", "offset")
     found = si(values)
-    warnings += unphysical(dict(zip(names, found, strict=True)))
-    return Identification(
-        estimates=estimates(names, found, outer),
+    return identified(
+        names,
+        found,
+        outer,
         used=(
             f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
             "degrees), all of them, and their times"
         ),
-        warnings=tuple(warnings),
-        covariance=(names, np.asarray(outer)),
+        warnings=warnings,
         misfit=misfit,
     )

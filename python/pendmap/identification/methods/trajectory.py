@@ -14,28 +14,28 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_number
+from pendmap.formatting import counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.start import starting_values
+from pendmap.identification.methods.start import TooShortError, starting_values
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
-from pendmap.model.effects import Effect, opposes
+from pendmap.model.effects import Effect
 from pendmap.records import Run
 from pendmap.signal.robust import from_first, span
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 TOO_GOOD: Final = 0.7
@@ -46,13 +46,9 @@ LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
 
 
-class TooShortError(InputError):
-    """Error raised for a record with too few decaying half swings for starting values."""
-
-
 def identify(
-    time: Floats,
-    theta: Floats,
+    time: ArrayLike,
+    theta: ArrayLike,
     **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
     """Identify the damping of a free decay by fitting its whole trajectory.
@@ -62,14 +58,15 @@ def identify(
     missing.
     """
     try:
-        fit, reading = fit_decay(time, theta, **choices)
+        return identification_of(fit_decay(time, theta, **choices))
     except TooShortError as error:
         return Identification(warnings=(str(error),), applicable=False)
-    return identification_of(fit, [reading], span(np.asarray(time)))
 
 
-def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str) -> Identification:
-    """Return the identification from a fit; ``part`` describes the fitted part of the records."""
+def identification_of(joint: JointFit) -> Identification:
+    """Return the identification from a fit."""
+    fit, runs, readings = joint.fit, joint.runs, joint.readings
+    part = span(runs[0].time) if len(runs) == 1 else counted(len(runs), "free run")
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
     # If the model does not fit, errors are widened by the misfit.
@@ -79,9 +76,9 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
         for e in fit.estimates.values()
     ]
     estimates = dict(zip(names, found, strict=True))
-    count, whole = len(fit.windows), len(readings)
-    motions = "one motion" if whole == 1 else f"{whole} motions"
-    how = f"as {motions}" if count == whole else f"in {count} windows"
+    count = len(fit.windows)
+    motions = "one motion" if len(runs) == 1 else f"{len(runs)} motions"
+    how = f"as {motions}" if count == len(runs) else f"in {count} windows"
     total = sum(len(reading.each) for reading in readings)
     units = {r.unit for r in readings}
     sigmas = [r.sigma * (r.gain if len(units) == 1 else 1.0) for r in readings]
@@ -99,34 +96,32 @@ def identification_of(fit: TrajectoryFit, readings: Sequence[Reading], part: str
 
 
 def fit_decay(
-    time: Floats,
-    theta: Floats,
+    time: ArrayLike,
+    theta: ArrayLike,
     *,
     sigma: float | None = None,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: ArrayLike | None = None,
     **choices: Any,  # noqa: ANN401 (those of fit_from_start)
-) -> tuple[TrajectoryFit, Reading]:
-    """Return the fit to a free decay (s, and rad from the downward rest) and its readings.
+) -> JointFit:
+    """Return the fit to a free decay (s, and rad from the downward rest).
 
     ``sigma`` (rad) is by default the noise estimated without a model; ``choices`` are those of
     :func:`fit_from_start`.
     """
-    time, theta = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, theta))
-    if time.shape != theta.shape or time.ndim != 1:
-        raise InputError(
-            f"time has {time.shape} values and theta {theta.shape}: they must be as many"
-        )
-    if not (np.all(np.isfinite(time)) and np.all(np.isfinite(theta))):
+    t, x = (np.ascontiguousarray(values, dtype=np.float64) for values in (time, theta))
+    if t.shape != x.shape or t.ndim != 1:
+        raise InputError(f"time has {t.shape} values and theta {x.shape}: they must be as many")
+    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(x))):
         raise InputError("time and theta must be finite numbers, one is not")
     if sigma is not None and check_number("sigma", sigma) <= 0:
         raise InputError(f"sigma must be a number above 0, got {sigma:g}")
-    good = np.ones(time.shape, bool) if trusted is None else np.asarray(trusted, bool)
-    if good.shape != time.shape:
+    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if good.shape != t.shape:
         raise InputError("trusted and time differ in length: they must be as many")
-    reading = reading_of(from_first(time)[0], theta, sigma, trusted=good)
-    run = as_fit_run(Run("", "", "free", time, theta, good), reading)
-    found, (reading,) = fit_from_start([run], [reading], **choices)
-    return found, reading
+    run = Run("", "", "free", t, x, good)
+    reading = reading_of(from_first(t)[0], x, sigma, trusted=good)
+    fit, readings = fit_from_start([as_fit_run(run, reading)], [reading], **choices)
+    return JointFit(fit, (run,), readings)
 
 
 def _warnings(
@@ -134,7 +129,7 @@ def _warnings(
 ) -> list[str]:
     found = []
     opposing = [
-        f"{e.name}.{size}" for e in fit.model.effects if opposes(e.definition) for size in e.sizes
+        f"{e.name}.{size}" for e in fit.model.effects if e.definition.opposes for size in e.sizes
     ]
     for name in ("c_over_m", "Tr", *opposing):
         if name in estimates and estimates[name].value < 0:
@@ -218,8 +213,8 @@ def fit_from_start(
     if isinstance(start, Rig) or not poor:
         return found, tuple(readings)
     try:
-        found_by_peaks = _by_peaks(time, theta, readings[0].sigma)
-        again = fitted(dict(start or {}) | found_by_peaks)
+        by_peaks = starting_values(time, theta, sigma=readings[0].sigma)
+        again = fitted(dict(start or {}) | by_peaks)
     except (FitDiverged, TooShortError):
         return found, tuple(readings)
     better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
@@ -234,22 +229,10 @@ def _start_of(
         return start
     known: dict[str, Any] = dict(start or {})
     if "w0" not in known:
-        known = (rough_start(time, theta, sigma) or _by_peaks(time, theta, sigma)) | known
+        # The methods of peaks also handle rotations.
+        rough = rough_start(time, theta, sigma) or starting_values(time, theta, sigma=sigma)
+        known = rough | known
     return Rig(**known)
-
-
-def _by_peaks(time: Floats, theta: Floats, sigma: float) -> dict[str, float]:
-    """Return starting values from the methods of peaks, which also handle rotations."""
-    try:
-        start = starting_values(time, theta, sigma=sigma)
-    except InputError:
-        start = None
-    if start is None or start.source == "guess":
-        raise TooShortError(
-            "the record must show three half swings or more of a free decay, or a natural frequency"
-            " must be given: w0 = 6.2 under [rig] in experiment.toml"
-        )
-    return {"w0": start.w0, "c_over_m": start.c_over_m, "Tr": start.Tr}
 
 
 @dataclasses.dataclass(frozen=True)

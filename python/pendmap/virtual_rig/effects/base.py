@@ -33,22 +33,23 @@ MOST: Final = 1e4
 """Largest allowed value of a parameter over the largest drawn: bounds the integration time."""
 
 
+@dataclasses.dataclass
 class Motion:
     """State of L lanes at K times each; a lane is one run under integration."""
 
-    run: NDArray[np.intp]  # the lane's run, shape (L, 1)
     time: Floats  # since the run began, s, shape (L, K) as all below
     lab: Floats  # since the first run began, s
     theta: Floats  # rad
     velocity: Floats  # rad/s
     direction: Floats  # sign of the velocity, held through a step; 0: sticking; shape (L, 1)
     side: Floats  # sign of the load on the bearing, held through a step; shape (L, 1)
-    speed: Floats  # direction * velocity: the smooth continuation of abs(velocity)
     vertical: Floats | float  # acceleration of the pivot over g, upward
     lateral: Floats | float  # acceleration of the pivot over g, toward positive angles
     w0: float  # natural frequency, rad/s
-    sin: Floats  # of theta
-    cos: Floats
+
+    def __post_init__(self) -> None:
+        self.sin, self.cos = np.sin(self.theta), np.cos(self.theta)
+        self.speed = self.direction * self.velocity  # the smooth continuation of abs(velocity)
 
     @property
     def load(self) -> Floats:
@@ -209,12 +210,13 @@ def effect(
     method: str,
     group: str,
     formula: str,
+    of: type[Effect] = Effect,
     **said: Any,  # noqa: ANN401 (parameters and class variables)
 ) -> Callable[[Callable[..., Any]], type[Effect]]:
     """Return an Effect class, named after the function that implements its one ``method``.
 
     The function takes the method's arguments, then the effect's parameters. ``said`` holds these,
-    made by :func:`size` and :func:`shape`, and class variables.
+    made by :func:`size` and :func:`shape`, and class variables; a variant has those ``of`` another.
     """
     parameters = [name for name, value in said.items() if isinstance(value, dataclasses.Field)]
 
@@ -226,12 +228,12 @@ def effect(
             "__doc__": function.__doc__,
             "__module__": function.__module__,
             "__annotations__": dict.fromkeys(parameters, float),
-            "name": function.__name__,
+            "name": getattr(of, "name", function.__name__),
             "group": group,
             "formula": formula,
             method: term,
         }
-        return type(function.__name__, (Effect,), body | said)
+        return type(function.__name__, (of,), body | said)
 
     return make
 

@@ -78,14 +78,7 @@ def stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
     return np.asarray(a * np.exp(-(slow**2.0)))
 
 
-@friction(
-    "friction",
-    "-a exp(-abs(v/vs)) sign v",
-    name="stribeck_friction",
-    variant="sharp",
-    a=size(0.05, 0.2, "rad/s^2"),
-    vs=shape(0.1, 0.6, "rad/s", least=1e-3),
-)
+@friction("friction", "-a exp(-abs(v/vs)) sign v", of=stribeck_friction, variant="sharp")
 def sharp_stribeck_friction(m: Motion, a: float, vs: float) -> Floats:
     """Stribeck friction with a cusp at rest (Tustin's form) instead of a round top."""
     return np.asarray(a * np.exp(-np.maximum(m.speed / vs, -1.0)))
@@ -166,15 +159,7 @@ def coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
     return np.asarray(f * np.expm1(-m.lab / tau))
 
 
-@friction(
-    "friction",
-    "+f t/(t + tau) sign v, t lab time",
-    name="coulomb_warm_up",
-    variant="hyperbolic",
-    lowers="Tr",
-    f=size(0.01, 0.04, "rad/s^2"),
-    tau=shape(60.0, 240.0, "s", least=1e-3),
-)
+@friction("friction", "+f t/(t + tau) sign v, t lab time", of=coulomb_warm_up, variant="hyperbolic")
 def slow_coulomb_warm_up(m: Motion, f: float, tau: float) -> Floats:
     """A bearing that warms up: dry friction decays hyperbolically, with a longer tail."""
     return -f * m.lab / (m.lab + tau)
@@ -198,15 +183,7 @@ def viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
     return np.asarray(-b * np.expm1(-m.lab / tau) * m.velocity)
 
 
-@acceleration(
-    "damping",
-    "+b t/(t + tau) v, t lab time",
-    name="viscous_warm_up",
-    variant="hyperbolic",
-    lowers="c/m",
-    b=size(0.0012, 0.005, "1/s"),
-    tau=shape(60.0, 240.0, "s", least=1e-3),
-)
+@acceleration("damping", "+b t/(t + tau) v, t lab time", of=viscous_warm_up, variant="hyperbolic")
 def slow_viscous_warm_up(m: Motion, b: float, tau: float) -> Floats:
     """Grease that warms up: viscous damping decays hyperbolically, with a longer tail."""
     return b * m.lab / (m.lab + tau) * m.velocity

@@ -70,64 +70,53 @@ def encoder_eccentricity(seen: Reading, e: float, psi: float) -> Floats:
     return seen.angle + e * np.sin(seen.angle + psi)
 
 
-class EncoderBacklash(Effect):
+@_reading(
+    "reading y with abs(th - y) <= b/2, y moves only when pushed",
+    order=1,
+    b=size(0.0014, 0.006, "rad"),
+)
+def encoder_backlash(seen: Reading, b: float) -> Floats:
     """Play between shaft and sensor, centred at the start: the reading lags in both directions."""
-
-    name = "encoder_backlash"
-    group = "reading"
-    formula = "reading y with abs(th - y) <= b/2, y moves only when pushed"
-    order = 1
-
-    b: float = size(0.0014, 0.006, "rad")
-
-    def distort(self, seen: Reading) -> Floats:
-        half = self.b / 2
-        result = []
-        y = float(seen.angle[0])
-        for theta in seen.angle.tolist():
-            y = min(max(y, theta - half), theta + half)
-            result.append(y)
-        return np.array(result)
+    half = b / 2
+    result = []
+    y = float(seen.angle[0])
+    for theta in seen.angle.tolist():
+        y = min(max(y, theta - half), theta + half)
+        result.append(y)
+    return np.array(result)
 
 
-class SensorLag(Effect):
+@_reading("reading y, y' = (th - y)/tau", tau=size(0.00016, 0.0006, "s", most=10.0))
+def sensor_lag(seen: Reading, tau: float) -> Floats:
     """A first-order filter in the sensor, in steady state when the run begins."""
+    time, angle, path = seen
+    if tau == 0:
+        return angle
+    grid = np.linspace(time[0], time[-1], max(math.ceil((time[-1] - time[0]) / _FINE), 1) + 1)
+    theta, velocity = path.angle(grid), path.velocity(grid)
+    step = grid[1] - grid[0]
+    # Hermite's cubic on each interval: theta + velocity t + c t^2 + d t^3.
+    rise = np.diff(theta) / step
+    c = (3 * rise - 2 * velocity[:-1] - velocity[1:]) / step
+    d = (velocity[:-1] + velocity[1:] - 2 * rise) / step**2
 
-    name = "sensor_lag"
-    group = "reading"
-    formula = "reading y, y' = (th - y)/tau"
+    def settled(k: NDArray[np.intp], t: Floats) -> Floats:
+        """Return the steady-state response to a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
+        p = theta[k] + t * (velocity[k] + t * (c[k] + t * d[k]))
+        first = velocity[k] + t * (2 * c[k] + 3 * t * d[k])
+        second = 2 * c[k] + 6 * t * d[k]
+        return np.asarray(p - tau * (first - tau * (second - tau * 6 * d[k])))
 
-    tau: float = size(0.00016, 0.0006, "s", most=10.0)
-
-    def distort(self, seen: Reading) -> Floats:
-        time, angle, path = seen
-        if self.tau == 0:
-            return angle
-        grid = np.linspace(time[0], time[-1], max(math.ceil((time[-1] - time[0]) / _FINE), 1) + 1)
-        theta, velocity = path.angle(grid), path.velocity(grid)
-        step = grid[1] - grid[0]
-        # Hermite's cubic on each interval: theta + velocity t + c t^2 + d t^3.
-        rise = np.diff(theta) / step
-        c = (3 * rise - 2 * velocity[:-1] - velocity[1:]) / step
-        d = (velocity[:-1] + velocity[1:] - 2 * rise) / step**2
-
-        def settled(k: NDArray[np.intp], t: Floats) -> Floats:
-            """Return the steady-state response to a cubic: P - tau P' + tau^2 P'' - tau^3 P'''."""
-            p = theta[k] + t * (velocity[k] + t * (c[k] + t * d[k]))
-            first = velocity[k] + t * (2 * c[k] + 3 * t * d[k])
-            second = 2 * c[k] + 6 * t * d[k]
-            return np.asarray(p - self.tau * (first - self.tau * (second - self.tau * 6 * d[k])))
-
-        every = np.arange(step_count := grid.size - 1)
-        fade = math.exp(-step / self.tau)
-        begin = settled(every, np.zeros(step_count))
-        end = settled(every, np.full(step_count, step))
-        # Difference from the steady-state response at the start of each interval.
-        jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
-        departure = first_order_filter(jumps, fade)
-        k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)
-        t = time - grid[k]
-        return np.asarray(settled(k, t) + departure[k] * np.exp(-t / self.tau))
+    every = np.arange(step_count := grid.size - 1)
+    fade = math.exp(-step / tau)
+    begin = settled(every, np.zeros(step_count))
+    end = settled(every, np.full(step_count, step))
+    # Difference from the steady-state response at the start of each interval.
+    jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
+    departure = first_order_filter(jumps, fade)
+    k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)
+    t = time - grid[k]
+    return np.asarray(settled(k, t) + departure[k] * np.exp(-t / tau))
 
 
 @effect(

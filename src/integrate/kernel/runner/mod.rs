@@ -23,6 +23,21 @@ use queue::keep;
 /// Largest change of a velocity within a step, relative to that by its first acceleration.
 const REACH: f64 = 1.25;
 
+/// Runs a block; `Q` is the narrower kind of lanes, for the queue and for effects.
+#[inline(always)]
+pub(super) fn run<L: Lane, Q: Lane>(
+    strobe: &Strobe,
+    tokens: (L::Token, Q::Token),
+    block: &mut Block,
+    range: Range<usize>,
+) {
+    if strobe.is_plain() {
+        smooth::<L>(strobe, tokens.0, block, range);
+    } else {
+        Runner::<L, Q>::new(strobe, tokens).run(block, range);
+    }
+}
+
 /// Steps of a block without events or effects.
 #[inline(always)]
 pub(super) fn smooth<L: Lane>(
@@ -105,31 +120,27 @@ apart! {
 }
 
 /// Runs the blocks of one pendulum; `Q` is the narrower kind of lanes, for the queue and for effects.
-pub(super) struct Runner<'a, L: Lane, Q: Lane> {
+struct Runner<'a, L: Lane, Q: Lane> {
     strobe: &'a Strobe,
     tokens: (L::Token, Q::Token),
     equation: Equation<Q>,
-    single: Equation<f64>,
+    single: &'a Equation<f64>,
     corner: Option<Corner<Q>>,
     length: f64,
 }
 
 impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     #[inline(always)]
-    pub(super) fn new(strobe: &'a Strobe, tokens: (L::Token, Q::Token)) -> Self {
-        let single = strobe.equation.clone();
+    fn new(strobe: &'a Strobe, tokens: (L::Token, Q::Token)) -> Self {
+        let single = &strobe.equation;
         let equation = single.map(Q::splat(tokens.1, 0.0));
-        let corner = Corner::new(&single, Q::splat(tokens.1, 0.0));
-        Self { strobe, tokens, equation, single, corner, length: strobe.pendulum.period() }
+        let corner = Corner::new(single, Q::splat(tokens.1, 0.0));
+        Self { strobe, tokens, equation, single, corner, length: single.drive_period() }
     }
 
     #[inline(always)]
-    pub(super) fn run(&self, block: &mut Block, range: Range<usize>) {
+    fn run(&self, block: &mut Block, range: Range<usize>) {
         let Strobe { route, events, extra, .. } = *self.strobe;
-        if route == Route::Smooth && !extra {
-            smooth::<L>(self.strobe, self.tokens.0, block, range);
-            return;
-        }
         if events && range.start == 0 {
             self.begin(block);
         }
@@ -164,7 +175,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                 continue;
             }
             let half_turns = block.half_turns[lane];
-            let (until, sense) = match release(&self.single, 0.0, half_turns * PI, self.length) {
+            let (until, sense) = match release(self.single, 0.0, half_turns * PI, self.length) {
                 Release::Now(sense) => (0.0, sense),
                 Release::At(time, sense) => (time, sense),
                 Release::Later | Release::Never => (f64::INFINITY, 1.0),

@@ -100,7 +100,7 @@ impl<L: Lane, Q: Lane> Runner<'_, L, Q> {
 
     #[inline(never)]
     fn answer(&self, block: &mut Block, first: usize, count: usize) {
-        let holds = self.strobe.friction.then_some(&self.single);
+        let holds = self.strobe.friction.then_some(self.single);
         for i in 0..count {
             let ends = &block.scratch;
             let reached = Reached {
