@@ -11,13 +11,12 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.basins import basins_over
-from pendmap.analysis.draws.basins import fields as drawn_fields
+from pendmap.analysis.draws import drawn
+from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, drawn_field, none_below_0, records, variable
+from pendmap.analysis.result import Field, Schema, none_below_0, variable
 from pendmap.analysis.summary import summarise
 from pendmap.errors import MOST_PERIODS, check_flag, core_errors
 from pendmap.formatting import counted
@@ -41,12 +40,6 @@ _LAYERS: Final = {
 }
 
 
-def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the attractors with their shares for the JSON object."""
-    shares = records(dataset, fraction="fraction", stderr="stderr")
-    return [orbit_table.row(dataset, "attractor", k) | own for k, own in enumerate(shares)]
-
-
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
     a = dataset.attrs
@@ -67,7 +60,12 @@ def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
 SCHEMA = Schema(
     "basins",
     result.UNITS,
-    Field("attractors", "", "attractors with their shares of the starts", read=_attractors),
+    Field(
+        "attractors",
+        "",
+        "attractors with their shares of the starts",
+        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr"),
+    ),
     Field("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Field("failed", "1", "share of the starts that failed or diverged"),
     Field("cells", "1", "starts"),
@@ -106,7 +104,7 @@ SCHEMA = Schema(
     Field("mean_settle", "periods", "mean time of capture; -1: none", convert=none_below_0),
     Field("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_basins,
     result.SECTION,
     Field("layers", "", "labels or finite_time: layers that describe the plane", json=False),
     Field("boundary_boxes", "1", "boxes with more than one label", None, json=False),
@@ -224,10 +222,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     choices = _choices(numerics, layer_periods, check=check)
     if draws is not None:
-        several = drawn(pendulum, draws, seed)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
-        own = same(pendulum, check=check, progress=part(progress, 0, len(several) + 1))
-        return basins_over(own, several, partial(same, check=False), progress)
+        own = same(pendulum, check=check, progress=several.first)
+        return basins_over(own, several, partial(same, check=False))
     with core_errors():
         raw = _core.basins_grid(bare, *grid.bare(units), choices, progress)
     angle, speed = grid.theta, grid.velocity
@@ -380,7 +378,7 @@ def _complete(
             "fraction": ("attractor", fraction),
             "stderr": ("attractor", stderr),
         }
-    ).assign_coords(attractor=("attractor", np.array([a.name for a in attractors], dtype=str)))
+    )
     settle = dataset["settle_periods"].values
     settled = settle[settle >= 0]
     values = {

@@ -9,14 +9,11 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import result
+from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.parameter_map import CHAOS_PERIODS, chaos, entries, undecided
-from pendmap.analysis.regimes import kind_of
 from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.summary import box_said
-from pendmap.analysis.sweep import SEARCH, STARTS, CellSearch, title, varied, without_damping
-from pendmap.errors import check_number, core_errors
+from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
@@ -30,6 +27,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats, Indices, Mask
     from pendmap.units import Units
 
 
@@ -51,7 +49,7 @@ SCHEMA = Schema(
     Field("varied", "", "parameter that varies"),
     Field("branches", "", "attractors followed along the parameter", read=_branches),
     Field("points", "1", "stroboscopic points"),
-    *SEARCH,
+    *sweep.SEARCH,
 )
 
 
@@ -60,7 +58,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges: Mapping[str, tuple[float, float, int]],
     *,
     start: tuple[float, float] | None = None,
-    starts: int = STARTS,
+    starts: int = sweep.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -115,48 +113,36 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(result.sizes)
     ['bound', 'branch', 'entry', 'kind', 'loose', 'p', 'point']
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
-    (axis,) = varied(model, ranges, 1)
-    search = CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
+    bare, units = without_dimensions(pendulum)
+    (axis,) = sweep.varied(pendulum, ranges, 1)
+    search = sweep.CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
     first = None
     if start is not None:
+        if np.shape(start) != (2,):
+            raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
     with core_errors():
-        raw = _core.bifurcation(
-            pendulum,
-            axis.kernel,
-            *search.initial(units),
-            starts,
-            first,
-            search.numerics.tol,
-            search.numerics.max_periods,
-            search.numerics.workers,
-            progress,
-        )
+        initial, limits = search.initial(units), search.numerics.limits
+        raw = _core.bifurcation(bare, axis.kernel, *initial, first, *limits, progress)
     dataset = _dataset(raw, axis, units)
     values = {
         **search.attributes(raw, units),
         "varied": axis.name,
         "points": dataset.sizes["point"],
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    dataset.attrs["title"] = title(model, axis)
-    lines = [*_summary(dataset), *without_damping(model, axis)]
-    summarised(dataset, lines, model, "attractors are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    dataset.attrs["title"] = sweep.title(pendulum, axis)
+    lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
+    summarised(dataset, lines, pendulum, "attractors are")
     return dataset
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    names = [
-        kind_of(kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)
-    ]
-    kinds = sorted(set(names))
-    which = np.array([kinds.index(name) for name in names], dtype=np.intp)
+    kinds, which = sweep.kinds_of(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
-    value = axis.values[raw.cell] if raw.cell.size else np.empty(0)
+    value = axis.values[raw.cell]
     speed = {"units": units.of_velocity}
     ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
     loose = {
@@ -164,7 +150,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         for key in ("value", "theta", "velocity")
     }
     data: dict[str, Any] = {
-        **entries(raw, which, units),
+        **sweep.entries(raw, which, units),
         "entry_value": ("entry", value, axis.attributes),
         "entry_branch": ("entry", of_entry),
         "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
@@ -179,7 +165,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "down": (axis.name, raw.down.on, {"comment": "entry, -1: none"}),
         "undecided": (axis.name, raw.undecided),
         "failed": (axis.name, raw.failed),
-        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": CHAOS_PERIODS}),
+        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": sweep.CHAOS_PERIODS}),
         "loose_sweep": ("loose", np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
@@ -187,7 +173,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     }
     coordinates = {
         **axis.coordinates,
-        "kind": ("kind", np.array(kinds, dtype=str)),
+        "kind": ("kind", kinds),
         "entry": ("entry", np.arange(which.size)),
     }
     return xr.Dataset(data, coords=coordinates)
@@ -211,7 +197,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
-    lines += [*chaos(a), *undecided(a)]
+    lines += [*sweep.chaos(a), *sweep.undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():
         lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
@@ -241,7 +227,7 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
     return lines
 
 
-def _spans(values: NDArray[np.float64], where: NDArray[np.bool_]) -> str:
+def _spans(values: Floats, where: Mask) -> str:
     """Return the three widest ranges of the marked values, as text."""
     every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
     spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
@@ -300,9 +286,7 @@ def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], lis
     return of_entry, members
 
 
-def _apart(
-    plane: NDArray[np.float64], first: NDArray[np.intp], a: int, b: int, *, closed: bool
-) -> float:
+def _apart(plane: Floats, first: Indices, a: int, b: int, *, closed: bool) -> float:
     """Return the distance from the first point of ``a`` to the nearest of ``b``; 0 for chaos."""
     if not closed:
         return 0.0

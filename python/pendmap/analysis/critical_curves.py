@@ -15,16 +15,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from pendmap._core import CriticalAmplitudes
+    from pendmap.signal import Floats, Indices, Mask
 
-Floats: TypeAlias = NDArray[np.float64]
 
 _BENT = 2e-3  # Largest distance of a drawn line from its curve, fraction of the figure's height
 
@@ -109,7 +109,7 @@ class _Column:
         return cls(heights[kept], multiplier[kept], float(heights[-1]))
 
 
-def _wanted(x: Floats, columns: Sequence[_Column]) -> NDArray[np.bool_]:
+def _wanted(x: Floats, columns: Sequence[_Column]) -> Mask:
     """Return which intervals must be halved for the curves of one model."""
     widths = np.abs(np.diff(x))
     wanted = np.zeros(widths.size, dtype=bool)
@@ -147,7 +147,7 @@ def _seen_to_end(a: _Column, b: _Column) -> bool:
     return bool((~ended & (heights < _IN_VIEW)).any())
 
 
-def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _graded(widths: Floats, wanted: Mask) -> Indices:
     """Return indices of intervals to halve, including those much longer than a neighbour."""
     while True:
         after = np.where(wanted, widths / 2, widths)
@@ -158,6 +158,25 @@ def _graded(widths: Floats, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
         if not longer.any():
             return np.flatnonzero(wanted)
         wanted = wanted | longer
+
+
+def fold_ends(
+    omega: Floats,
+    found: list[CriticalAmplitudes],
+    looked: Mask,
+    solve: Callable[[Floats], list[CriticalAmplitudes]],
+) -> Mask:
+    """Bisect added frequencies for the ends of folds; return where folds were sought."""
+    while True:
+        places = np.flatnonzero(looked)
+        folded = np.array([found[k].fold is not None for k in places])
+        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
+        middles = ((places[:-1] + places[1:]) // 2)[change]
+        if not middles.size:
+            return looked
+        for k, row in zip(middles, solve(omega[middles]), strict=True):
+            found[k] = row
+        looked[middles] = True
 
 
 def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
@@ -228,3 +247,22 @@ CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
     "tongue 2, second order": (1, second_tongue),
 }
 """Name of each curve, the multiplier on it, and its formula."""
+
+
+def asymptotic(
+    found: list[CriticalAmplitudes], omega: Floats, gamma: float, p_max: float
+) -> tuple[Floats, Floats]:
+    """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
+    curves, errors = [], []
+    for multiplier, formula in CURVES.values():
+        p = formula(omega, gamma)
+        p[p > p_max] = np.nan
+        error = np.full_like(p, np.nan)
+        for k, row in enumerate(found):
+            exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
+            if exact and np.isfinite(p[k]):
+                nearest = min(exact, key=lambda q: abs(q - p[k]))
+                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
+        curves.append(p)
+        errors.append(error)
+    return np.array(curves), np.array(errors)

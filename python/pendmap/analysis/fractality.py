@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from pendmap.formatting import Table
+    from pendmap.signal import Floats
 
-    Floats = npt.NDArray[np.float64]
     Labels = npt.NDArray[np.int16]
 
 
@@ -162,7 +162,7 @@ def uncertainty_exponent(
     """
     if isinstance(labels, xr.Dataset):
         return _of_map(labels)
-    cells, _ = numbered(labels)
+    cells = _numbered(labels)
     eps, uncertain, tried = _on_grid(cells, periodic)
     hit, all_ = uncertain.sum(axis=(1, 2)), tried.sum(axis=(1, 2))
     # Neighbouring cells are correlated: their effective number follows from the spread.
@@ -172,8 +172,8 @@ def uncertainty_exponent(
     found = fitted(eps, hit / fewer, all_ / fewer, "cell")
     if found is None:
         raise InputError("labels have no boundary at enough distances: there is no exponent")
-    counts = (values.astype(np.int64) for values in (hit, all_))
-    return dataclasses.replace(found, **dict(zip(("uncertain", "tried"), counts, strict=True)))
+    hit, all_ = (values.astype(np.int64) for values in (hit, all_))
+    return dataclasses.replace(found, uncertain=hit, tried=all_)
 
 
 def fitted(
@@ -364,7 +364,7 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     >>> round(pendmap.basin_entropy(labels).value, 2)
     0.67
     """
-    cells, _ = numbered(labels)
+    cells = _numbered(labels)
     found = _core.texture(np.ascontiguousarray(cells).ravel(), cells.shape[1])
     return BasinEntropy(
         value=found.basin_entropy,
@@ -380,8 +380,8 @@ def passes_log2(boundary: float, stderr: float) -> bool:
     return boundary - _TIMES * stderr > math.log(2)
 
 
-def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
-    """Return labels of a plane renumbered from 1, 0 where unknown, and the original ones."""
+def _numbered(labels: npt.ArrayLike) -> Labels:
+    """Return labels of a plane renumbered from 1, 0 where unknown."""
     given = np.asarray(labels)
     if given.ndim != 2 or not given.size:  # noqa: PLR2004 (a plane)
         raise InputError(f"labels must have the shape (M, N), both above 0, got {given.shape}")
@@ -391,5 +391,4 @@ def numbered(labels: npt.ArrayLike) -> tuple[Labels, npt.NDArray[np.int64]]:
     if known.size > _MOST_LABELS:
         raise InputError(f"labels must be at most {_MOST_LABELS} different ones, got {known.size}")
     first = 0 if known[0] == 0 else 1
-    cells = (place.reshape(given.shape) + first).astype(np.int16)
-    return cells, known.astype(np.int64)
+    return (place.reshape(given.shape) + first).astype(np.int16)

@@ -13,8 +13,9 @@ from pendmap.errors import MOST_CELLS, InputError, check_number, check_type, che
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 
@@ -46,13 +47,13 @@ class Axis:
         object.__setattr__(self, "count", check_whole("count", self.count, 1, MOST_CELLS))
 
     @property
-    def centres(self) -> NDArray[np.float64]:
+    def centres(self) -> Floats:
         """Centres of the cells, shape (count,)."""
         index = np.arange(self.count, dtype=np.float64)
         return self.low + (index + 0.5) * ((self.high - self.low) / self.count)
 
     @property
-    def edges(self) -> NDArray[np.float64]:
+    def edges(self) -> Floats:
         """Edges of the cells, shape (count + 1,)."""
         return np.linspace(self.low, self.high, self.count + 1)
 
@@ -133,8 +134,8 @@ class Grid:
 
 def coordinate(
     name: str,
-    centres: NDArray[np.float64],
-    edges: NDArray[np.float64],
+    centres: Floats,
+    edges: Floats,
     units: str,
     long_name: str,
 ) -> dict[str, Any]:
@@ -147,7 +148,7 @@ def coordinate(
     }
 
 
-def frequencies(values: ArrayLike) -> NDArray[np.float64]:
+def frequencies(values: ArrayLike) -> Floats:
     """Return frequencies ``Omega/w0`` of the drive, above 0 and ascending, as an array."""
     try:
         array = np.atleast_1d(np.asarray(values, dtype=np.float64))
@@ -161,14 +162,12 @@ def frequencies(values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def starts(
-    theta: ArrayLike, velocity: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
     """Return angles and velocities of a list of starts as two arrays of one length."""
     arrays = []
     for name, given in (("theta", theta), ("velocity", velocity)):
         try:
-            array: NDArray[np.float64] = np.ascontiguousarray(given, dtype=np.float64)
+            array: Floats = np.ascontiguousarray(given, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
                 f"{name} must be an array (N,) of numbers, got {short_repr(given)}"

@@ -7,25 +7,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import xarray as xr
 
 from pendmap.analysis import result, survival
 from pendmap.analysis.basins import basins_of
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.lifetime import fields as drawn_fields
-from pendmap.analysis.draws.lifetime import lifetime_over
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import (
-    Field,
-    Schema,
-    drawn_field,
-    none_below_0,
-    records,
-    summarised,
-    variable,
-)
+from pendmap.analysis.result import Field, Schema, none_below_0, records, summarised, variable
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.formatting import counted, with_error
@@ -33,25 +22,38 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
 
 
 _STARTS: Final = 40_000  # Default number of starts
 _MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
 """Excess of the exponent over the escape rate that shows transient chaos, standard errors."""
-_DRAWN: Final = 4000  # Largest number of periods of a stored survival curve
+_STORED: Final = 4000  # Largest number of periods of a stored survival curve
+_DRAWN: Final = ("mean_periods", "stderr", "transient_chaos", "persistent")
+"""Attributes that are kept of each draw."""
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
     last = dataset.isel(elapsed=-1)
     return records(last, name="attractor", fraction="fraction", captured="captured")
+
+
+@drawn_field
+def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of a lifetime for the JSON object."""
+    a = dataset.attrs
+    return {
+        "mean_periods_ci95": [a["mean_periods_low"], a["mean_periods_high"]],
+        "transient_share": a["transient_share"],
+        "persistent_share": a["persistent_share"],
+    }
 
 
 SCHEMA = Schema(
@@ -87,7 +89,7 @@ SCHEMA = Schema(
     *result.RUN,
     Field("attractors", "", "attractors with the starts that each captured", read=_attractors),
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_lifetimes,
     result.SECTION,
     Field("from_period_given", "", "1 where the caller chose the beginning", json=False),
     Field("exponent_trajectories", "1", "trajectories the exponent was measured on", json=False),
@@ -138,7 +140,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Draws the starts, and the models of ``draws``.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the interval of the mean lifetime
-        (:func:`pendmap.analysis.draws.lifetime.lifetime_over`).
+        (:func:`pendmap.analysis.lifetime.lifetime_over`).
     max_periods, tol, threads, progress
         As for :func:`pendmap.basins`.
 
@@ -170,20 +172,18 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(result.attrs["mean_periods"])
     132
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(lifetime, from_period=from_period, **numerics.options)
-        first = part(progress, 0, len(several) + 1)
-        own = same(model, theta, velocity, starts=starts, progress=first)
+        own = same(pendulum, theta, velocity, starts=starts, progress=several.first)
         again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
-        return lifetime_over(own, several, again, progress)
+        return lifetime_over(own, several, again)
     window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(numerics.seed)
@@ -192,7 +192,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         velocity = draw.uniform(-reach, reach, starts)
         window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
-    found = basins_of(model, angles, speeds, check=False, progress=progress, **numerics.options)
+    found = basins_of(pendulum, angles, speeds, check=False, progress=progress, **numerics.options)
     label = found["label"].values.astype(np.int64)
     settle = found["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]
@@ -204,26 +204,18 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = survival.growth_on_saddle(found, fitted, pendulum, threads)
-    dataset = xr.Dataset(
+    saddle = survival.growth_on_saddle(found, fitted, bare, threads)
+    dataset = found.drop_dims("start").assign(
         {
-            **{
-                name: found[name]
-                for name in found.data_vars
-                if "attractor" in found[name].dims or "point" in found[name].dims
-            },
             **_curves(found, times, censored, bound),
-            "start_theta": found["start_theta"],
-            "start_velocity": found["start_velocity"],
+            **{name: found[name] for name in ("start_theta", "start_velocity", "label")},
             "capture_period": ("start", settle.astype(np.int32), {"comment": "-1: never"}),
-            "label": found["label"],
-        },
-        coords={"attractor": found["attractor"]},
+        }
     )
     values = {
         **found.attrs,
         **numerics.provenance(),
-        **_measures(found, fitted, saddle, pendulum, units),
+        **_measures(found, fitted, saddle, bare, units),
         "starts": angles.size,
         "captured": int(times.size),
         "censored": censored,
@@ -231,11 +223,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "chaotic_share": _chaotic(found),
         "from_period_given": int(from_period is not None),
     }
-    SCHEMA.complete(dataset, model, values)
+    SCHEMA.complete(dataset, pendulum, values)
     lines = _summary(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
-    summarised(dataset, lines, model, "these lifetimes are")
+    summarised(dataset, lines, pendulum, "these lifetimes are")
     return dataset
 
 
@@ -250,7 +242,7 @@ def _curves(
     """Return captures up to each period by each attractor, and tails from all beginnings."""
     label, settle = found["label"].values, found["settle_periods"].values
     last = bound if censored else int(times.max(initial=0)) + 1
-    elapsed = np.unique(np.linspace(0, last, min(last, _DRAWN) + 1).round().astype(np.int64))
+    elapsed = np.unique(np.linspace(0, last, min(last, _STORED) + 1).round().astype(np.int64))
     by = [
         np.searchsorted(np.sort(settle[(label == k) & (settle >= 0)]), elapsed, side="right")
         for k in found["id"].values
@@ -402,3 +394,42 @@ def _why_not(dataset: xr.Dataset, exponent: str) -> str:
         f"{a['exponent_per_period']:.3g} per period; rate {a['escape_rate']:.3g}): those at the "
         "edge of a basin."
     )
+
+
+def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return a lifetime with the lifetimes of D draws from the same starts.
+
+    Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
+    ``drawn_persistent`` (D) and ``drawn`` (D, parameter); attributes ``mean_periods_low`` and
+    ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
+    ``transient_share`` and ``persistent_share``.
+    """
+    rows = [[float(one.attrs[key]) for key in _DRAWN] for one in draws.each(run)]
+    mean, error, transient, persistent = np.array(rows).T
+    _, _, low, high = interval(mean)
+    found = dataset.assign(
+        drawn_mean_periods=("draw", mean),
+        drawn_stderr=("draw", error),
+        drawn_persistent=("draw", persistent.astype(np.int8)),
+    )
+    found.attrs |= {
+        "mean_periods_low": float(low),
+        "mean_periods_high": float(high),
+        "transient_share": float(transient.mean()),
+        "persistent_share": float(persistent.mean()),
+    }
+    return draws.complete(found, _drawn_summary(found.attrs))
+
+
+def _drawn_summary(a: dict[str, Any]) -> list[str]:
+    lines = []
+    if a["transient_share"]:
+        lines.append(
+            f"Mean lifetime: 95 % of the draws in [{a['mean_periods_low']:.4g}, "
+            f"{a['mean_periods_high']:.4g}] periods."
+        )
+    lines.append(
+        f"{100 * a['transient_share']:.3g} % of the draws have transient chaos; in "
+        f"{100 * a['persistent_share']:.3g} % chaos persists."
+    )
+    return lines

@@ -19,12 +19,9 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _CLEAR = 3.0
@@ -38,11 +35,6 @@ _BY_ROUNDING = math.log(1e10)
 """Logarithm of a deviation's growth from which rounding determines the result."""
 
 
-def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the attractor for the JSON object."""
-    return orbit_table.row(dataset, "attractor", 0) if dataset.sizes["attractor"] else None
-
-
 SCHEMA = Schema(
     "lyapunov",
     result.UNITS,
@@ -54,7 +46,12 @@ SCHEMA = Schema(
     Field("exponent_sum", result.OF_RATE, "sum of both exponents"),
     Field("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
     Field("end", "", "captured, chaotic, undamped, undecided or failed"),
-    Field("attractor", "", "the attractor that was reached", read=_attractor),
+    Field(
+        "attractor",
+        "",
+        "the attractor that was reached",
+        read=lambda d: next(iter(orbit_table.objects(d, "attractor")), None),
+    ),
     Field("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
     Field("trajectories", "1", "trajectories of the ensemble"),
     Field("periods", "periods", "length of each of them"),
@@ -154,8 +151,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(result.attrs["exponent"], 1)
     0.3
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
     precision = check_number("precision", precision)
     if not 0 < precision <= _MOST_PRECISION:
@@ -166,37 +162,35 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
-        raw = _core.lyapunov(pendulum, start, choices, progress)
+        raw = _core.lyapunov(bare, start, choices, progress)
     found, members = raw.attractor, raw.ensemble
-    exponent, stderr, regular = _value(raw, pendulum.period)
-    attractors = [] if found is None else [found]
+    growth = np.empty((0, 0)) if members is None else members.growth
+    exponent, stderr, regular = _value(raw, bare.period)
     dataset = xr.Dataset(
         {
-            **orbit_table.table(attractors, units, "attractor"),
-            **_growth(raw, pendulum.period, units),
-        },
-        coords={"attractor": ("attractor", np.array([a.name for a in attractors], dtype=str))},
+            **orbit_table.table([] if found is None else [found], units, "attractor"),
+            **_growth(raw, growth, bare.period, units),
+        }
     )
-    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     values = {
         **numerics.provenance(),
-        **_second(raw, exponent, pendulum, units),
-        "forcing_period": units.given(pendulum.period, TIME),
+        **_second(raw, exponent, bare, units),
+        "forcing_period": units.given(bare.period, TIME),
         "theta0": theta,
         "velocity0": velocity,
         "exponent": units.given(exponent, RATE),
         "stderr": units.given(stderr, RATE),
         "regular": units.given(regular, RATE),
-        "per_period": exponent * pendulum.period,
-        "per_period_stderr": stderr * pendulum.period,
+        "per_period": exponent * bare.period,
+        "per_period_stderr": stderr * bare.period,
         "transient_periods": -1 if raw.transient is None else raw.transient,
         "trajectories": growth.shape[0],
         "periods": growth.shape[1] * raw.window,
         "dropped_periods": 0 if members is None else members.dropped,
         "precision": precision,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, _summary(dataset), model, "this exponent is")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset), pendulum, "this exponent is")
     return dataset
 
 
@@ -241,10 +235,9 @@ def _second(
     }
 
 
-def _growth(raw: _core.Lyapunov, period: float, units: Units) -> dict[str, Any]:
+def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) -> dict[str, Any]:
     """Return the growth along the start's trajectory, running means, finite-time exponents."""
     course = np.concatenate([[0.0], np.cumsum(raw.course)])
-    growth = np.empty((0, 0)) if raw.ensemble is None else raw.ensemble.growth
     count, windows = growth.shape
     time = raw.window * period
     averaged = np.arange(1, windows + 1)

@@ -19,11 +19,10 @@ from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 _PHASES, _FINE = (8, 16, 32, 64), 4096
@@ -125,9 +124,8 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     >>> round(result.attrs["p_melnikov"], 6)
     0.367608
     """
-    model = pendulum
-    pendulum, _ = without_dimensions(model)
-    if pendulum.counts_turns:
+    bare, _ = without_dimensions(pendulum)
+    if bare.counts_turns:
         raise InputError(
             "effects: an effect counts turns, so that no orbit leads from one upright position to "
             "the next at the same energy, and Melnikov's criterion has none to follow"
@@ -136,13 +134,12 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         omega = np.linspace(*_RANGE)
     frequencies = grid.frequencies(omega)
     with core_errors():
-        orbits, sense = _orbits(pendulum)
-        at = {name: _threshold(pendulum, pendulum.omega, orbit) for name, orbit in orbits.items()}
+        orbits, sense = _orbits(bare)
+        at = {name: _threshold(bare, bare.omega, orbit) for name, orbit in orbits.items()}
         if not sense:
             orbits.pop("loop", None)
         curve = [
-            [_threshold(pendulum, float(w), orbit) for orbit in orbits.values()]
-            for w in frequencies
+            [_threshold(bare, float(w), orbit) for orbit in orbits.values()] for w in frequencies
         ]
     known = [at[name] for name in orbits if math.isfinite(at[name])]
     first = at["loop"] if sense else min(known, default=math.nan)
@@ -159,16 +156,16 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     )
     values = {
         **Numerics().provenance(),
-        "own_p": pendulum.p,
-        "own_omega": pendulum.omega,
+        "own_p": bare.p,
+        "own_omega": bare.omega,
         "p_melnikov": first,
         "p_forward": at["forward"],
         "p_backward": at["backward"],
         "p_loop": at.get("loop", math.nan),
         "p_tangency": math.nan,
     }
-    SCHEMA.complete(dataset, model, values)
-    summarised(dataset, _summary(pendulum, at, first, sense), model, "the threshold is")
+    SCHEMA.complete(dataset, pendulum, values)
+    summarised(dataset, _summary(bare, at, first, sense), pendulum, "the threshold is")
     return dataset
 
 

@@ -21,24 +21,16 @@ from pendmap.files.dataset import FORMAT_VERSION
 
 Progress = Callable[[int, int], object]  # Called with units of work done and in total
 
+_STEPS = 10_000  # Number of progress steps of a part of a computation
 TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
 class Choices(TypedDict):
-    """Numerical choices as passed to the core; 0 threads mean one per processor."""
+    """Numerical choices as keyword arguments of analyses, or as passed to the core."""
 
     tol: float
     max_periods: int | None
-    threads: int
-    seed: int
-
-
-class Options(TypedDict):
-    """Numerical choices as keyword arguments of analyses."""
-
-    tol: float
-    max_periods: int | None
-    threads: int | None
+    threads: Any  # None for one per processor, 0 in the core
     seed: int
 
 
@@ -69,7 +61,7 @@ class Numerics:
         return self.threads or 0
 
     @property
-    def options(self) -> Options:
+    def options(self) -> Choices:
         """The choices as keyword arguments of another analysis."""
         return {
             "tol": self.tol,
@@ -83,6 +75,11 @@ class Numerics:
         """The choices as passed to the core."""
         return {**self.options, "threads": self.workers}
 
+    @property
+    def limits(self) -> tuple[float, int | None, int]:
+        """Tolerance, largest number of periods and threads, as passed to the core."""
+        return self.tol, self.max_periods, self.workers
+
     def provenance(self) -> dict[str, Any]:
         """Return attributes on how a result was computed, with the time since ``began``."""
         return {
@@ -94,6 +91,20 @@ class Numerics:
             "pendmap_version": _core.__version__,
             "format_version": FORMAT_VERSION,
         }
+
+
+def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
+    """Return the progress of one of ``parts`` equal parts of a computation; it never falls."""
+    if progress is None:
+        return None
+    furthest = 0.0
+
+    def report(done: int, total: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done / max(total, 1))
+        progress(round(_STEPS * (number + furthest)), _STEPS * parts)
+
+    return report
 
 
 def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:

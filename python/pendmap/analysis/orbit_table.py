@@ -1,11 +1,14 @@
-"""Closed orbits and attractors as columns: kind, multipliers, stroboscopic points."""
+"""Closed orbits and attractors: columns, JSON objects, identification between two models."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
+from pendmap.analysis.result import records
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -15,17 +18,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap import _core
+    from pendmap.signal import Floats
+
+
+_APART = math.pi  # Distance assigned to an attractor without points, rad
 
 
 def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
     """Return orbits as variables over the dimension ``one``, their points over ``point``."""
 
-    def column(key: str, none: float) -> list[float]:
-        return [none if getattr(a, key) is None else getattr(a, key) for a in orbits]
+    def whole(key: str) -> NDArray[np.int32]:
+        return np.array([getattr(a, key) or 0 for a in orbits], dtype=np.int32)
 
-    def measured(key: str, power: int) -> NDArray[np.float64]:
-        values: NDArray[np.float64] = np.array(column(key, np.nan), dtype=float)
-        return np.asarray(units.given(values, power))
+    def measured(key: str, power: int) -> Floats:
+        return np.asarray(units.given(np.array([getattr(a, key) for a in orbits], float), power))
 
     multipliers = np.full((len(orbits), 2, 2), np.nan)
     for pairs, orbit in zip(multipliers, orbits, strict=True):
@@ -38,10 +44,11 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
     of_velocity = {"units": units.of_velocity}
     return {
+        one: (one, np.array([a.name for a in orbits], dtype=str)),
         "id": (one, np.arange(1, len(orbits) + 1, dtype=np.int32)),
         "kind": (one, np.array([a.kind for a in orbits], dtype=str)),
-        "n": (one, np.array(column("n", 0), dtype=np.int32), {"comment": "0: no meaning"}),
-        "w": (one, np.array(column("w", 0), dtype=np.int32)),
+        "n": (one, whole("n"), {"comment": "0: no meaning"}),
+        "w": (one, whole("w")),
         "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
         "velocity_point": (one, speed, of_velocity),
         "period": (one, measured("period", TIME), {"units": units.of_time}),
@@ -49,7 +56,7 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
         "exponent_stderr": (one, measured("exponent_stderr", RATE), {"units": units.of_rate}),
         "twin": (
             one,
-            np.array(column("twin", 0), dtype=np.int32),
+            whole("twin"),
             {"comment": "number of the mirror image; its own where symmetric, 0 if not known"},
         ),
         "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),
@@ -59,29 +66,69 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     }
 
 
-def row(dataset: xr.Dataset, one: str, k: int) -> dict[str, Any]:
-    """Return one orbit of a :func:`table` over ``one`` for the JSON object."""
-    own = dataset.isel({one: k})
-    n = int(own["n"])
-    closed = n > 0
-    multipliers = [[float(x) for x in pair] for pair in own["multipliers"].values]
-    multipliers = [pair for pair in multipliers if pair[0] == pair[0]]
-    mine = dataset[f"point_{one}"].values == int(own["id"])
-    points = zip(
-        dataset["point_theta"].values[mine], dataset["point_velocity"].values[mine], strict=True
+def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
+    """Return the orbits of a :func:`table` over ``one`` for JSON, with ``more`` variables."""
+    found = records(
+        dataset,
+        id="id",
+        name=one,
+        kind="kind",
+        n="n",
+        w="w",
+        theta="theta_point",
+        velocity="velocity_point",
+        points="id",  # replaced below
+        multipliers="multipliers",
+        exponent="exponent",
+        exponent_stderr="exponent_stderr",
+        period="period",
+        twin="twin",
+        **{name: name for name in more},
     )
-    return {
-        "id": int(own["id"]),
-        "name": str(own[one].values),
-        "kind": str(own["kind"].values),
-        "n": n if closed else None,
-        "w": int(own["w"]) if closed else None,
-        "theta": float(own["theta_point"]),
-        "velocity": float(own["velocity_point"]),
-        "points": [list(point) for point in points] if closed else None,
-        "multipliers": multipliers or None,
-        "exponent": float(own["exponent"]),
-        "exponent_stderr": float(own["exponent_stderr"]),
-        "period": float(own["period"]),
-        "twin": int(own["twin"]) or None,
-    }
+    for own, points in zip(found, points_of(dataset, one), strict=True):
+        closed = own["n"] > 0
+        own["n"], own["w"] = (own["n"], own["w"]) if closed else (None, None)
+        own["points"] = points.tolist() if closed else None
+        own["multipliers"] = [p for p in own["multipliers"] if not math.isnan(p[0])] or None
+        own["twin"] = own["twin"] or None
+    return found
+
+
+def points_of(dataset: xr.Dataset, one: str) -> list[Floats]:
+    """Return the stroboscopic points of each orbit, shape (M, 2)."""
+    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    owner = dataset[f"point_{one}"].values
+    return [points[owner == k] for k in dataset["id"].values]
+
+
+def plain(name: str) -> str:
+    """Return a name without its angle (``... at +0.1234``), which moves with the parameters."""
+    return name.partition(" at ")[0]
+
+
+def matched(
+    names: list[str],
+    points: list[Floats],
+    others: list[str],
+    theirs: list[Floats],
+) -> list[int]:
+    """Match attractors of equal :func:`plain` names by least distance; return indices, else -1."""
+    found = [-1] * len(others)
+    for name in dict.fromkeys(map(plain, others)):
+        mine = [k for k, own in enumerate(names) if plain(own) == name]
+        new = [k for k, own in enumerate(others) if plain(own) == name]
+        if not mine:
+            continue
+        far = np.array([[distance(points[i], theirs[j]) for j in new] for i in mine])
+        for i, j in zip(*linear_sum_assignment(far), strict=True):
+            found[new[j]] = mine[i]
+    return found
+
+
+def distance(one: Floats, other: Floats) -> float:
+    """Return the mean distance from points of ``one`` to the nearest of ``other``, modulo turns."""
+    if not (one.size and other.size):
+        return _APART
+    away = one[:, None] - other[None]
+    away[..., 0] = np.remainder(away[..., 0] + math.pi, math.tau) - math.pi
+    return float(np.hypot(away[..., 0], away[..., 1]).min(axis=1).mean())

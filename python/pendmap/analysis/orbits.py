@@ -10,19 +10,19 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import orbit_table, result
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.orbits import fields as drawn_fields
-from pendmap.analysis.draws.orbits import orbits_over
+from pendmap.analysis import result
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised
+from pendmap.analysis.orbit_table import matched, objects, points_of, table
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
-from pendmap.formatting import counted
+from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
 
@@ -36,10 +36,16 @@ _LISTED = 12  # Largest number of orbits in a summary
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
-    return [
-        orbit_table.row(dataset, "orbit", k) | own | {"stable": bool(own["stable"])}
-        for k, own in enumerate(records(dataset, stable="stable", residual="residual"))
-    ]
+    found = objects(dataset, "orbit", "stable", "residual")
+    return [own | {"stable": bool(own["stable"])} for own in found]
+
+
+@drawn_field
+def drawn_orbits(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of closed orbits for the JSON object."""
+    spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
+    orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
+    return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
 
 
 SCHEMA = Schema(
@@ -50,11 +56,9 @@ SCHEMA = Schema(
     Field("w", "turns", "net turns over it"),
     Field("cells", "1", "cells of the box"),
     Field("begun", "1", "places from which Newton's method began"),
-    result.SECONDS,
-    result.SIMD,
-    result.THREADS,
+    *result.TIMED,
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_orbits,
     result.SECTION,
     *result.BOX,
     *result.VERSIONS,
@@ -111,7 +115,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     draws : int, optional
         As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
-        and are stable (:func:`pendmap.analysis.draws.orbits.orbits_over`).
+        and are stable (:func:`pendmap.analysis.orbits.orbits_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -135,31 +139,28 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> result.theta_point.values.round(3), result.stable.values
     (array([-1.318]), array([1], dtype=int8))
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
     numerics = Numerics(threads=threads, seed=seed, progress=progress)
-    grid = window(model, n, w) if grid is None else grid
+    grid = window(pendulum, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
-        own = same(model, progress=part(progress, 0, len(several) + 1))
-        return orbits_over(own, several, same, progress)
+        return orbits_over(same(pendulum, progress=several.first), several, same)
     with core_errors():
         box = grid.bare(units)
-        raw = _core.orbits(pendulum, (n, w), *box, numerics.workers, progress)
-        paths = _paths(pendulum, raw.orbits, units)
+        raw = _core.orbits(bare, (n, w), *box, numerics.workers, progress)
+        paths = _paths(bare, raw.orbits, units)
     found = raw.orbits
     dataset = xr.Dataset(
         {
-            **orbit_table.table(found, units, "orbit"),
+            **table(found, units, "orbit"),
             "stable": ("orbit", np.array([o.stable for o in found], dtype=np.int8)),
             "residual": ("orbit", np.array([o.residual for o in found], dtype=float)),
             **paths,
-        },
-        coords={"orbit": ("orbit", np.array([o.name for o in found], dtype=str))},
+        }
     )
     values = {
         **numerics.provenance(),
@@ -168,8 +169,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         "w": w,
         "cells": grid.cells,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, _summary(dataset, pendulum, friction=raw.friction), model, "orbits are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset, bare, friction=raw.friction), pendulum, "orbits are")
     return dataset
 
 
@@ -241,3 +242,71 @@ def _written(value: complex) -> str:
     if value.imag == 0:
         return f"{value.real:.6g}"
     return f"{value.real:.6g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.6g} i"
+
+
+def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return K closed orbits with statistics of the orbits of D draws.
+
+    Orbits are matched by name, and among those of one name by their points. Of each the point and
+    the multipliers nearest to those of the model's orbit are taken. Adds ``drawn_theta``,
+    ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
+    has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
+    standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
+    which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
+    mean number of orbits of a draw that the model itself lacks.
+    """
+    names, points = dataset["orbit"].values.tolist(), points_of(dataset, "orbit")
+    count, total = len(names), len(draws)
+    state = np.full((count, 2, total), np.nan)
+    multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
+    there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
+    others = 0
+    for d, one in enumerate(draws.each(run)):
+        theirs = points_of(one, "orbit")
+        for j, k in enumerate(matched(names, points, one["orbit"].values.tolist(), theirs)):
+            if k < 0:
+                others += 1
+                continue
+            there[k, d], stable[k, d] = True, bool(one["stable"][j])
+            point = np.array([dataset["theta_point"][k], dataset["velocity_point"][k]])
+            away = theirs[j] - point
+            away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
+            state[k, :, d] = point + away[np.argmin(np.hypot(*away.T))]
+            own, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
+            swapped = np.abs(pair[::-1] - own).sum() < np.abs(pair - own).sum()
+            multipliers[k, ..., d] = pair[::-1] if swapped else pair
+    spread = interval(state)[1]
+    dims = dataset["multipliers"].dims
+    found = dataset.assign(
+        drawn_theta=(("orbit", "draw"), state[:, 0], {"units": "rad"}),
+        drawn_velocity=(("orbit", "draw"), state[:, 1], dataset["velocity_point"].attrs),
+        drawn_multipliers=((*dims, "draw"), multipliers),
+        theta_spread=("orbit", spread[:, 0], {"units": "rad"}),
+        velocity_spread=("orbit", spread[:, 1], dataset["velocity_point"].attrs),
+        multipliers_spread=(dims, interval(multipliers)[1]),
+        exists=("orbit", there.mean(axis=1)),
+        stable_share=("orbit", stable.mean(axis=1)),
+    )
+    found.attrs["drawn_others"] = others / total
+    return draws.complete(found, _drawn_summary(found, others))
+
+
+def _drawn_summary(found: xr.Dataset, others: int) -> list[str]:
+    lines = []
+    for k, name in enumerate(found["orbit"].values):
+        theta, velocity = (
+            with_error(float(found[f"{what}_point"][k]), float(found[f"{what}_spread"][k]))
+            for what in ("theta", "velocity")
+        )
+        sizes = np.hypot(*np.moveaxis(found["drawn_multipliers"].values[k], 1, 0))
+        mean, error, _, _ = interval(sizes.max(axis=0))
+        largest = f", largest multiplier {with_error(float(mean), float(error))} in size"
+        lines.append(
+            f"{name}: there in {100 * float(found['exists'][k]):.3g} % of the draws, stable in "
+            f"{100 * float(found['stable_share'][k]):.3g} %; theta = {theta}, velocity = {velocity}"
+            f"{largest if math.isfinite(mean) else ''}."
+        )
+    if others:
+        more = counted(others, "orbit")
+        lines.append(f"All draws together have {more} more, which the own model has not.")
+    return lines

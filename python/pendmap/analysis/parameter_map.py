@@ -10,34 +10,21 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.parameter_map import fields as drawn_fields
-from pendmap.analysis.draws.parameter_map import regimes_over
-from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.result import Field, Schema, drawn_field, records, summarised, variable
+from pendmap.analysis import result, sweep
+from pendmap.analysis.draws import count_sure_cells, drawn, drawn_field, outcomes
+from pendmap.analysis.numerics import Numerics, part
+from pendmap.analysis.result import Field, Schema, records, rows, summarised, variable
 from pendmap.analysis.summary import box_said
-from pendmap.analysis.sweep import (
-    SEARCH,
-    STARTS,
-    CellSearch,
-    title,
-    undecided_cells,
-    varied,
-    without_damping,
-)
 from pendmap.analysis.tongues import MOST_P, tongues
 from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
-from pendmap.units import RATE, VELOCITY
+from pendmap.units import RATE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
@@ -45,18 +32,26 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
-"""Comment of the variable ``chaos_periods``."""
 _LISTED = 10  # Largest number of regimes in a summary
+_SHARES = ("outcome_kinds", "share_mean", "share_low", "share_high")  # Variables over the outcomes
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
 _FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
-_STEPS = 10_000  # Number of progress steps that two parts of a computation share
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regimes with their shares of the cells for the JSON object."""
     found = records(dataset, kinds="regime_kinds", share="regime_share")
     return [one | {"kinds": json.loads(one["kinds"])} for one in found]
+
+
+@drawn_field
+def drawn_regimes(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of a map over two parameters for the JSON object."""
+    regimes = [
+        {"kinds": json.loads(text), "share": mean, "ci95": [low, high]}
+        for text, mean, low, high in rows(dataset, *_SHARES)
+    ]
+    return {"regimes": regimes, "sure_cells": dataset.attrs["sure_cells"]}
 
 
 SCHEMA = Schema(
@@ -66,8 +61,8 @@ SCHEMA = Schema(
     Field("rows", "", "parameter that varies along rows"),
     Field("regimes", "", "sets of attractors with their shares of the cells", read=_regimes),
     Field("cells", "1", "cells of the plane"),
-    *SEARCH,
-    drawn_field(drawn_fields),
+    *sweep.SEARCH,
+    drawn_regimes,
 )
 
 
@@ -75,7 +70,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, tuple[float, float, int]],
     *,
-    starts: int = STARTS,
+    starts: int = sweep.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -129,7 +124,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell
-        (:func:`pendmap.analysis.draws.parameter_map.regimes_over`).
+        (:func:`pendmap.analysis.parameter_map.regimes_over`).
     threads, progress
         As for :func:`pendmap.basins`.
 
@@ -163,33 +158,24 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(pendmap.parameter_map(pendulum, ranges, starts=4).sizes)
     ['bound', 'entry', 'kind', 'omega', 'p', 'set']
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
-    columns, rows = varied(model, ranges, 2)
+    bare, units = without_dimensions(pendulum)
+    columns, rows = sweep.varied(pendulum, ranges, 2)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    search = CellSearch(starts, box, numerics)
+    search = sweep.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(pendulum, draws, seed, progress)
         box = search.within(units)
         same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
-        own = same(model, curves=curves, progress=part(progress, 0, len(several) + 1))
-        return regimes_over(own, several, same, progress)
+        own = same(pendulum, curves=curves, progress=several.first)
+        return regimes_over(own, several, same)
     over = None
     if curves:
-        first, progress = _halves(progress)
-        over = _curves(model, columns, rows, first)
+        over = _curves(pendulum, columns, rows, part(progress, 0, 2))
+        progress = part(progress, 1, 2)
     with core_errors():
-        raw = _core.parameter_map(
-            pendulum,
-            (columns.kernel, rows.kernel),
-            *search.initial(units),
-            starts,
-            numerics.tol,
-            numerics.max_periods,
-            numerics.workers,
-            progress,
-        )
+        axes, initial = (columns.kernel, rows.kernel), search.initial(units)
+        raw = _core.parameter_map(bare, axes, *initial, *numerics.limits, progress)
     dataset = _dataset(raw, (columns, rows), units).assign(over or {})
     values = {
         **search.attributes(raw, units),
@@ -197,10 +183,10 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         "rows": rows.name,
         "cells": columns.values.size * rows.values.size,
     }
-    SCHEMA.complete(dataset, model, values, raw)
-    dataset.attrs["title"] = title(model, columns, rows)
-    lines = [*_summary(dataset), *without_damping(model, columns, rows)]
-    summarised(dataset, lines, model, "attractors are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
+    lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
+    summarised(dataset, lines, pendulum, "attractors are")
     return dataset
 
 
@@ -209,17 +195,11 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     shape = (rows.values.size, columns.values.size)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
-    cell, n, w, own = raw.cell, raw.n, raw.w, raw.share
-    names = [
-        kind_of(kind, int(period), int(turns))
-        for kind, period, turns in zip(raw.kind, n, w, strict=True)
-    ]
-    sets, regime, frequency = regimes(names, cell, cells)
-    kinds = sorted({name for one in sets for name in one if name in set(names)})
-    share = np.zeros((len(kinds), cells))
-    place = {name: k for k, name in enumerate(kinds)}
-    which = np.array([place[name] for name in names], dtype=np.intp)
-    np.add.at(share, (which, cell), own)
+    cell, n, w = raw.cell, raw.n, raw.w
+    kinds, which = sweep.kinds_of(raw)
+    sets, regime, frequency = sweep.regimes(kinds[which].tolist(), cell, cells)
+    share = np.zeros((kinds.size, cells))
+    np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
     np.fmax.at(exponent, cell, raw.exponent)
     period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
@@ -237,34 +217,17 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "exponent": variable(dims, units.given(exponent, RATE).reshape(shape), units.of_rate),
         "undecided": (dims, raw.undecided.reshape(shape)),
         "failed": (dims, raw.failed.reshape(shape)),
-        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": CHAOS_PERIODS}),
-        "share": (("kind", *dims), share.reshape((len(kinds), *shape))),
-        **entries(raw, which, units),
+        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": sweep.CHAOS_PERIODS}),
+        "share": (("kind", *dims), share.reshape((kinds.size, *shape))),
+        **sweep.entries(raw, which, units),
     }
     coordinates = {
         **columns.coordinates,
         **rows.coordinates,
-        "kind": ("kind", np.array(kinds, dtype=str)),
+        "kind": ("kind", kinds),
         "set": ("set", np.arange(len(sets))),
     }
     return xr.Dataset(data, coords=coordinates)
-
-
-def _halves(progress: Progress | None) -> tuple[Progress | None, Progress | None]:
-    """Return the progress of two halves of a computation; the first may be restarted."""
-    if progress is None:
-        return None, None
-    furthest = 0.0
-
-    def half(number: int) -> Progress:
-        def report(done: int, total: int) -> None:
-            nonlocal furthest
-            furthest = max(furthest, (number + done / max(total, 1)) / 2)
-            progress(round(_STEPS * furthest), _STEPS)
-
-        return report
-
-    return half(0), half(1)
 
 
 def _curves(
@@ -297,44 +260,6 @@ def _curves(
     }
 
 
-def entries(raw: _core.ParameterMap, kind: NDArray[np.intp], units: Units) -> dict[str, Any]:
-    """Return all attractors, each with the index of its kind, over ``entry``."""
-    rate = {"units": units.of_rate}
-    speed = {"units": units.of_velocity}
-    return {
-        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
-        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
-        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
-        "entry_w": ("entry", raw.w),
-        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
-        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
-        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
-        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
-        "entry_share": ("entry", raw.share),
-    }
-
-
-def chaos(attributes: Mapping[str, Any]) -> list[str]:
-    """Return a summary line on how long chaos was followed, if there is any."""
-    periods = attributes["chaos_periods"]
-    if not periods:
-        return []
-    line = (
-        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
-        "chaos_periods contains each); a longer transient looks the same."
-    )
-    return [line]
-
-
-def undecided(attributes: Mapping[str, Any]) -> list[str]:
-    """Return summary lines on the shares of undecided and failed starts."""
-    return [
-        f"{100 * attributes[key]:.3g} % of the starts {word}."
-        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
-        if attributes[key] > 0
-    ]
-
-
 def _place_text(place: dict[str, Any]) -> str:
     """Return the ranges of a group of cells, and its size, as text."""
     spans = [
@@ -359,8 +284,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    lines += [*chaos(a), *undecided(a)]
-    places = undecided_cells(dataset)
+    lines += [*sweep.chaos(a), *sweep.undecided(a)]
+    places = sweep.undecided_cells(dataset)
     if places:
         listed = "; ".join(_place_text(place) for place in places[:_PLACES])
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
@@ -372,3 +297,43 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
     )
     return lines
+
+
+def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return a map of M x N cells with the regimes of D draws of the other parameters.
+
+    Adds, over ``outcome``, all regimes: ``outcome_kinds`` (as ``regime_kinds``), ``probability``
+    (outcome, M, N), ``drawn_share`` (outcome, D), ``share_mean``, ``share_low`` and ``share_high``
+    (the 95 % interval over the draws); over the cells ``certainty``, the probability of the most
+    likely regime; ``drawn`` (D, parameter). Attribute ``sure_cells``: the share of the cells with a
+    certainty of 95 % or more.
+    """
+    dims, shape = dataset["regime"].dims, dataset["regime"].shape
+    counts: dict[str, np.ndarray] = {}
+    shares: list[dict[str, float]] = []
+    for one in draws.each(run):
+        own = [str(text) for text in one["regime_kinds"].values]
+        shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
+        for k, text in enumerate(own):
+            counts.setdefault(text, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
+    share = np.array([[one.get(text, 0.0) for one in shares] for text in counts])
+    order = np.argsort(-share.mean(axis=1), kind="stable")
+    texts = np.array(list(counts), dtype=str)[order]
+    probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
+    found = dataset.assign(outcome_kinds=("outcome", texts))
+    found = found.assign(outcomes(dims, probability, share[order]))
+    return draws.complete(found, _drawn_summary(found))
+
+
+def _drawn_summary(found: xr.Dataset) -> list[str]:
+    lines = []
+    every = list(rows(found, *_SHARES))
+    for kinds, mean, low, high in every[:_LISTED]:
+        text = kinds.strip("[]").replace('"', "")
+        lines.append(
+            f"{text}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
+            f"[{100 * low:.3g}, {100 * high:.3g}] %."
+        )
+    if len(every) > _LISTED:
+        lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
+    return [*lines, count_sure_cells(found, "a regime")]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import operator
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.analysis.summary import of_model
+from pendmap.model.covariance import misses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Mapping
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 
     import xarray as xr
 
@@ -85,6 +86,21 @@ class Schema:
         }
 
 
+def of_model(model: Pendulum | Rig, what: str) -> list[str]:
+    """Return summary lines on a model that misses its record or has effects on its reading."""
+    ratio = misses(model.notes)
+    lines = []
+    if math.isfinite(ratio):
+        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
+    names = [effect.name for effect in model.effects if effect.reads]
+    if names:
+        verb = "acts" if len(names) == 1 else "act"
+        lines.append(
+            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
+        )
+    return lines
+
+
 def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
     """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
     dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
@@ -104,27 +120,17 @@ def variable(
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
     """Return a JSON object for each index of a dimension, from variables named by its keys."""
-    columns = [dataset[name].values.tolist() for name in variables.values()]
-    return [dict(zip(variables, row, strict=True)) for row in zip(*columns, strict=True)]
+    return [dict(zip(variables, row, strict=True)) for row in rows(dataset, *variables.values())]
+
+
+def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
+    """Return an iterator over the values of variables, index by index of a dimension."""
+    return zip(*(dataset[name].values.tolist() for name in names), strict=True)
 
 
 def none_below_0(value: float) -> float | None:
     """Return a number, or None if it is negative: an event that did not happen."""
     return None if value < 0 else value
-
-
-def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
-    """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
-
-    def read(dataset: xr.Dataset) -> dict[str, Any] | None:
-        a = dataset.attrs
-        if "draws" not in a:
-            return None
-        names = [str(name) for name in dataset["parameter"].values]
-        common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
-        return common | own(dataset)
-
-    return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
 
 UNITS: Final = Field("units", "", "SI or nondimensional", None)
@@ -150,7 +156,8 @@ OWN: Final = (
     Field("own_p", "1", "amplitude of the model itself", json=False),
     Field("own_omega", "1", "frequency of the model itself", json=False),
 )
-RUN: Final = (SECONDS, SIMD, THREADS, SEED, VERSION, FORMAT)
+TIMED: Final = (SECONDS, SIMD, THREADS)
+RUN: Final = (*TIMED, SEED, VERSION, FORMAT)
 VERSIONS: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
 SUMMARY: Final = Field(
     "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.grid import FASTEST
+from pendmap.analysis.result import of_model, rows
 from pendmap.formatting import counted, with_error, written
-from pendmap.model.covariance import misses
 from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.units import TIME, VELOCITY, Units
 
@@ -18,26 +18,11 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.model import Pendulum, Rig
+    from pendmap.model import Pendulum
 
 
 _NEARLY_CHANCE = 0.15  # Agreement of neighbours above chance, below which it is hardly better
 _STILL = 1e-12  # Sine of the angle below which a start hangs or is upright
-
-
-def of_model(model: Pendulum | Rig, what: str) -> list[str]:
-    """Return summary lines on a model that misses its record or has effects on its reading."""
-    ratio = misses(model.notes)
-    lines = []
-    if math.isfinite(ratio):
-        lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
-    names = [effect.name for effect in model.effects if effect.reads]
-    if names:
-        verb = "acts" if len(names) == 1 else "act"
-        lines.append(
-            f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
-        )
-    return lines
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
@@ -192,20 +177,16 @@ def _only_chaos(dataset: xr.Dataset) -> str:
 
 def _attractors(dataset: xr.Dataset) -> list[str]:
     lines = []
-    names = [str(name) for name in dataset["attractor"].values]
+    names = dataset["attractor"].values.tolist()
     units = Units.of(dataset.attrs)
     unit = f" {units.of_rate}" if units.si else ""
-    for k, name in enumerate(names):
-        keys = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
-        row = {key: dataset[key].values[k] for key in keys}
-        twin = int(row["twin"])
+    columns = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
+    for k, (share, error, twin, exponent, spread) in enumerate(rows(dataset, *columns)):
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
-        held = not math.isfinite(row["exponent"])
-        value = with_error(row["exponent"], row["exponent_stderr"])
-        rate = "held by friction" if held else f"exponent {value}{unit}"
+        value = f"exponent {with_error(exponent, spread)}{unit}"
+        rate = value if math.isfinite(exponent) else "held by friction"
         lines.append(
-            f"{name}: {100 * row['fraction']:.2f} +- {100 * row['stderr']:.2f} % of the starts, "
-            f"{rate}{mirror}."
+            f"{names[k]}: {100 * share:.2f} +- {100 * error:.2f} % of the starts, {rate}{mirror}."
         )
     if len(lines) > 1:
         lines.append("These shares are the basin stability in this window.")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +23,12 @@ from pendmap.errors import (
     check_whole,
     short_repr,
 )
+from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
-from pendmap.units import VELOCITY
+from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.numerics import Numerics
     from pendmap.model import Pendulum
+    from pendmap.signal import Floats, Indices
     from pendmap.units import Units
 
 
@@ -44,11 +48,11 @@ class Varied:
 
     name: str
     """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
-    values: NDArray[np.float64]
+    values: Floats
     """Values in the units of the parameter."""
     parameter: str
     """Name of the parameter in the core."""
-    bare: NDArray[np.float64]
+    bare: Floats
     """The values without dimensions."""
     unit: str
     """Unit of the values; empty where they have none."""
@@ -134,30 +138,27 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
 def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
-    powers: dict[str, tuple[str, float]] = {bare: (bare, 0) for bare in known if "." not in bare}
-    # Parameter of the rig that each laboratory quantity changes, and the factor.
-    laboratory: dict[str, tuple[str, float]] = {}
+    # Name in the core, factor and power of w0 of each quantity.
+    own = {bare: (bare, 1.0, 0) for bare in known if "." not in bare}
     if isinstance(model, Rig):
-        laboratory["frequency_hz"] = ("Omega", math.tau)
+        for bare in ("gamma", "omega", "phase", "theta_r"):
+            si, power = COUNTERPARTS[bare]
+            own[si] = (bare, 1.0, power)
+        own["frequency_hz"] = ("omega", math.tau, 1)
         if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
-            laboratory["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity)
-        own = {si: (bare, power) for bare, (si, power) in COUNTERPARTS.items()}
-        powers |= {si: own[si] for si in ("c_over_m", "Omega", "phi", "Tr")}
-        powers |= {name: own[si] for name, (si, _) in laboratory.items()}
+            own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
-    if name not in powers and name not in shared:
-        there = ", ".join([*powers, *shared])
+    if name not in own and name not in shared:
+        there = ", ".join([*own, *shared])
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
         )
     values = _values(name, given)
-    if name in powers:
-        bare, power = powers[name]
-        factor = 1.0
-        if name in laboratory:
+    if name in own:
+        bare, factor, power = own[name]
+        if name in {"frequency_hz", "stroke_mm"}:
             check(name, values[0])
-            factor = laboratory[name][1]
         plain = units.bare(factor * values, power)
         # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
@@ -171,7 +172,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
             )
         one = dataclasses.replace(effects[which], ci95={})
         changed = ({**one.parameters, parameter: float(x)} for x in values)
-        bared = [dataclasses.replace(one, parameters=own).bare(units) for own in changed]
+        bared = [dataclasses.replace(one, parameters=mine).bare(units) for mine in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
         if units.si:
             unit = effects[which].definition[parameter].unit
@@ -180,7 +181,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
     return Varied(name, values, bare, plain, unit)
 
 
-def _values(name: str, given: object) -> NDArray[np.float64]:
+def _values(name: str, given: object) -> Floats:
     wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
     if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
         raise InputError(f"{wanted}, got {short_repr(given)}")
@@ -211,14 +212,29 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
+CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
+"""Comment of the variable ``chaos_periods``."""
 STARTS = 9  # Default number of initial conditions of a cell
 _SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746
 """Plastic number, whose powers give an even additive recurrence in two dimensions."""
 _CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
+UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
+
+_ORDER = (
+    "rest",
+    "inverted rest",
+    "oscillation",
+    "rotation",
+    "quasiperiodic rotation",
+    "libration chaos",
+    "rotating chaos",
+    "tumbling chaos",
+    UNDECIDED,
+)
 
 
-def spread(grid: Grid, count: int, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
     """Return angles and velocities that cover a box evenly; no two are mirror images."""
     shift = 0.5 + (seed * 0.6180339887498949) % 1.0
     # k = 0 may be the centre, where a pendulum at rest stays even if that is unstable.
@@ -246,10 +262,10 @@ class CellSearch:
         """Return the box, in these units; by default that of :func:`pendmap.basins`."""
         return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))
 
-    def initial(self, units: Units) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return initial conditions without dimensions; each cell takes the next ``starts``."""
+    def initial(self, units: Units) -> tuple[Floats, Floats, int]:
+        """Return initial conditions without dimensions, and how many of them each cell takes."""
         theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
-        return theta, units.bare(velocity, VELOCITY)
+        return theta, units.bare(velocity, VELOCITY), self.starts
 
     def attributes(self, raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
         """Return the attributes of the search whose result is ``raw``."""
@@ -279,14 +295,91 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: -one["cells"])
 
 
+def kind_of(kind: str, n: int, w: int) -> str:
+    """Return the name of a kind of attractor, like ``rotation 1:2``; mirror images have one."""
+    if kind == "oscillation":
+        return f"oscillation period {n}"
+    if kind == "rotation":
+        return f"rotation {n}:{abs(w)}"
+    return kind.replace("_", " ")
+
+
+def order(name: str) -> tuple[int, int, int]:
+    """Return the rank of a kind: rest first, chaos last, short periods before long."""
+    place = next(k for k, word in enumerate(_ORDER) if name.startswith(word))
+    digits = name.rsplit(" ", 1)[-1]
+    n, _, w = digits.partition(":")
+    return (place, int(n) if n.isdigit() else 0, int(w) if w.isdigit() else 0)
+
+
+def regimes(
+    names: Sequence[str], cell: NDArray[np.int32], cells: int
+) -> tuple[list[tuple[str, ...]], NDArray[np.int16], Floats]:
+    """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
+    bounds = np.searchsorted(cell, np.arange(cells + 1))
+    own = [
+        tuple(sorted(set(names[low:high]), key=order)) or (UNDECIDED,)
+        for low, high in itertools.pairwise(bounds)
+    ]
+    count = Counter(own)
+    sets = sorted(count, key=lambda one: (-count[one], [order(name) for name in one]))
+    place = {one: k for k, one in enumerate(sets)}
+    share = np.array([count[one] / cells for one in sets])
+    return sets, np.array([place[one] for one in own], dtype=np.int16), share
+
+
+def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
+    """Return the kinds of all attractors, sorted, and the index of the kind of each."""
+    each = zip(raw.kind, raw.n.tolist(), raw.w.tolist(), strict=True)
+    names = np.array([kind_of(*one) for one in each], dtype=str)
+    kinds, which = np.unique(names, return_inverse=True)
+    return kinds, which
+
+
+def entries(raw: _core.ParameterMap, kind: Indices, units: Units) -> dict[str, Any]:
+    """Return all attractors, each with the index of its kind, over ``entry``."""
+    rate = {"units": units.of_rate}
+    speed = {"units": units.of_velocity}
+    return {
+        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
+        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
+        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
+        "entry_w": ("entry", raw.w),
+        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
+        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
+        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
+        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
+        "entry_share": ("entry", raw.share),
+    }
+
+
+def chaos(attributes: Mapping[str, Any]) -> list[str]:
+    """Return a summary line on how long chaos was followed, if there is any."""
+    periods = attributes["chaos_periods"]
+    if not periods:
+        return []
+    line = (
+        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
+        "chaos_periods contains each); a longer transient looks the same."
+    )
+    return [line]
+
+
+def undecided(attributes: Mapping[str, Any]) -> list[str]:
+    """Return summary lines on the shares of undecided and failed starts."""
+    return [
+        f"{100 * attributes[key]:.3g} % of the starts {word}."
+        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
+        if attributes[key] > 0
+    ]
+
+
 SEARCH = (
     Field("starts", "1", "initial conditions of each pendulum"),
     Field("undecided", "1", "share of the starts that no attractor captured"),
     Field("failed", "1", "share of the starts that failed or diverged"),
     Field("chaos_periods", "periods", "least time for which chaos was not captured; 0: no chaos"),
-    result.SECONDS,
-    result.SIMD,
-    result.THREADS,
+    *result.TIMED,
     result.REACHED,
     Field("undecided_at", "", "groups of cells with undecided starts", read=undecided_cells),
     *result.END,

@@ -13,11 +13,9 @@ from pendmap import _core
 from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
-from pendmap.analysis.draws import drawn, part
-from pendmap.analysis.draws.tongues import fields as drawn_fields
-from pendmap.analysis.draws.tongues import tongues_over
+from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, drawn_field, summarised, variable
+from pendmap.analysis.result import Field, Schema, summarised, variable
 from pendmap.analysis.sweep import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.formatting import counted
@@ -25,14 +23,12 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from numpy.typing import ArrayLike
 
-    from numpy.typing import ArrayLike, NDArray
-
+    from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
 
 
 _Row: TypeAlias = _core.CriticalAmplitudes
@@ -43,6 +39,8 @@ _OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
 _TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
 _STRIP = 1e-6  # Width in p of a strip of stability below which a summary leaves it out
+_TABLES = {"curves": ("critical", ""), "inverted": ("inverted", "inverted_")}
+"""Tables of critical amplitudes over draws: JSON key, dimension, prefix of the variables."""
 NEAR = 0.05  # Relative error below which an asymptotic curve is near the exact one
 
 
@@ -73,6 +71,21 @@ def _asymptotic_curves(dataset: xr.Dataset) -> dict[str, list[float]]:
     return {str(name): p[asked].tolist() for name, p in rows}
 
 
+@drawn_field
+def drawn_tongues(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the draws of critical curves for the JSON object."""
+    asked = dataset["asked"].values.astype(bool)
+    found = {}
+    for key, (table, prefix) in _TABLES.items():
+        mine = dataset.isel({table: asked[dataset[f"{prefix}index"].values]})
+        names = (f"{prefix}{name}" for name in ("multiplier", "p", "p_low", "p_high", "exists"))
+        found[key] = [
+            {"omega": omega, "multiplier": sign, "p": p, "ci95": [low, high], "exists": exists}
+            for omega, sign, p, low, high, exists in result.rows(mine, f"{table}_omega", *names)
+        ]
+    return found
+
+
 SCHEMA = Schema(
     "tongues",
     result.UNITS,
@@ -83,11 +96,9 @@ SCHEMA = Schema(
     Field("undamped", "", "the same without damping", read=lambda d: _curves(d, "undamped_")),
     Field("asymptotic", "1", "critical amplitudes by perturbation", read=_asymptotic_curves),
     Field("p_max", "1", "largest amplitude that was looked at"),
-    result.SECONDS,
-    result.SIMD,
-    result.THREADS,
+    *result.TIMED,
     *result.END,
-    drawn_field(drawn_fields),
+    drawn_tongues,
     Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
     Field("moved", "", "1 where a torque makes an orbit of rest", json=False),
     *result.OWN,
@@ -147,7 +158,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         figures.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the band of each critical amplitude
-        (:func:`pendmap.analysis.draws.tongues.tongues_over`).
+        (:func:`pendmap.analysis.tongues.tongues_over`).
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -181,8 +192,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(float(result.p.min()), 3)
     0.2
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     if omega is None:  # evenly spread in the plane
         low, high, count = OMEGA
         omega = np.linspace(*OMEGA)
@@ -194,28 +204,30 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     if plane not in PLANES:
         raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
     refine, inverted = check_flag("refine", refine), check_flag("inverted", inverted)
-    if pendulum.theta_r > 0:
+    if bare.theta_r > 0:
         raise InputError(
-            f"theta_r must be 0, got {pendulum.theta_r:g}: friction holds hanging rest whatever "
+            f"theta_r must be 0, got {bare.theta_r:g}: friction holds hanging rest whatever "
             "the drive, and it never loses its stability"
         )
     if draws is not None:
-        several = drawn(model, draws, seed)
+        several = drawn(pendulum, draws, seed, progress)
         same = partial(tongues, p_max=p_max, inverted=inverted, threads=threads)
-        first = part(progress, 0, len(several) + 1)
-        own = same(model, asked, plane=plane, refine=refine, progress=first)
-        return tongues_over(own, several, partial(same, omega=own["omega"]), progress)
+        own = same(pendulum, asked, plane=plane, refine=refine, progress=several.first)
+        return tongues_over(own, several, partial(same, omega=own["omega"]))
     frequencies, looked, (found, undamped, upright) = _solved(
-        pendulum, asked, p_max, numerics, inverted=inverted, refine=refine
+        bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
     moved = bool(found[0].moved)
     if moved:
         undamped = [_NO_REST] * len(found)
+    reach = 0.0 if moved else p_max
+    asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
     of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
         **_variables(frequencies, found, undamped, upright),
         **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
-        **_asymptotic(found, frequencies, pendulum.gamma, 0.0 if moved else p_max),
+        "asymptotic": (("curve", "omega"), asymptotic, _OF_P),
+        "asymptotic_error": (("curve", "omega"), errors, {"units": "1"}),
     }
     coords: dict[str, Any] = {
         "omega": variable("omega", frequencies, "1", "Omega/w0"),
@@ -231,12 +243,12 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         "p_max": p_max,
         "moved": int(moved),
         "inverted": int(upright[0].rest),
-        "own_p": pendulum.p,
-        "own_omega": pendulum.omega,
+        "own_p": bare.p,
+        "own_omega": bare.omega,
     }
-    SCHEMA.complete(dataset, model, values)
-    dataset.attrs["title"] = title_without(model, "p", "omega", "phase")
-    summarised(dataset, _summary(dataset), model, "curves are")
+    SCHEMA.complete(dataset, pendulum, values)
+    dataset.attrs["title"] = title_without(pendulum, "p", "omega", "phase")
+    summarised(dataset, _summary(dataset), pendulum, "curves are")
     return dataset
 
 
@@ -248,7 +260,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     *,
     inverted: bool,
     refine: bool,
-) -> tuple[Floats, NDArray[np.bool_], tuple[list[_Row], list[_Row], list[_Row]]]:
+) -> tuple[Floats, Mask, tuple[list[_Row], list[_Row], list[_Row]]]:
     """Return frequencies, where folds were sought, and rows: hanging, undamped, inverted rest."""
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
@@ -266,38 +278,15 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         # The end of the search bounds the last strip.
         return [(np.array([*r.p, p_max]), np.array([*r.multiplier, 0.0])) for r in rows]
 
-    looked = np.ones(asked.size, dtype=bool)
     with core_errors():
         frequencies, rows = asked, all_at(asked, folds=True)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
             frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
         found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
-        if refine and asked.size > 1:
-            again = partial(solve, one=pendulum, upright=False, folds=True)
-            known = np.isin(frequencies, asked)
-            looked = _folds_to_their_ends(frequencies, found, known, again)
+        again = partial(solve, one=pendulum, upright=False, folds=True)
+        looked = critical_curves.fold_ends(frequencies, found, np.isin(frequencies, asked), again)
     return frequencies, looked, (found, undamped, upright)
-
-
-def _folds_to_their_ends(
-    omega: Floats,
-    found: list[_Row],
-    looked: NDArray[np.bool_],
-    solve: Callable[[Floats], list[_Row]],
-) -> NDArray[np.bool_]:
-    """Bisect added frequencies for the ends of folds; return where folds were sought."""
-    looked = looked.copy()
-    while True:
-        places = np.flatnonzero(looked)
-        folded = np.array([found[k].fold is not None for k in places])
-        change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
-        middles = ((places[:-1] + places[1:]) // 2)[change]
-        if not middles.size:
-            return looked
-        for k, row in zip(middles, solve(omega[middles]), strict=True):
-            found[k] = row
-        looked[middles] = True
 
 
 def _variables(
@@ -330,32 +319,6 @@ def _variables(
             above = [stable for row in rows for stable in row.stable[1:]]
             variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
     return variables
-
-
-def _asymptotic(
-    found: list[_Row],
-    omega: Floats,
-    gamma: float,
-    p_max: float,
-) -> dict[str, Any]:
-    """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
-    curves, errors = [], []
-    for multiplier, formula in critical_curves.CURVES.values():
-        p = formula(omega, gamma)
-        p[p > p_max] = np.nan
-        error = np.full_like(p, np.nan)
-        for k, row in enumerate(found):
-            exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
-            if exact and np.isfinite(p[k]):
-                nearest = min(exact, key=lambda q: abs(q - p[k]))
-                error[k] = abs(p[k] - nearest) / nearest if nearest else np.nan
-        curves.append(p)
-        errors.append(error)
-    across = ("curve", "omega")
-    return {
-        "asymptotic": (across, np.array(curves), _OF_P),
-        "asymptotic_error": (across, np.array(errors), {"units": "1"}),
-    }
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
@@ -405,7 +368,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     return lines
 
 
-def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
+def _inverted(dataset: xr.Dataset, asked: Mask) -> list[str]:
     """Return a summary line on the range in which inverted rest is stable."""
     rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
     if not dataset.attrs["inverted"]:
@@ -425,3 +388,56 @@ def _inverted(dataset: xr.Dataset, asked: NDArray[np.bool_]) -> list[str]:
     on = " and on" if high == p_max else ""
     widest = f"in the widest strip from p = {low:.9g} to {high:.9g}{on}, at omega = {where:.6g}"
     return [f"{rest} is stable at {count} of omega, {widest}."]
+
+
+def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+    """Return K critical amplitudes with their 95 % bands over D draws.
+
+    At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
+    lowest, and matched by this number. Adds ``drawn_p`` (K, D), nan where a draw has no such
+    amplitude, ``p_low`` and ``p_high``, the 95 % interval over the draws, and ``exists``, the share
+    of the draws that have it; the same for inverted rest with the prefix ``inverted_``; ``drawn``
+    (D, parameter).
+    """
+    tables = _TABLES.values()
+    every = [{table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(run)]
+    found = dataset
+    for table, prefix in tables:
+        mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]
+        p = np.array(mine, dtype=float).reshape(-1, len(draws))
+        _, _, low, high = interval(p)
+        found = found.assign(
+            {
+                f"{prefix}drawn_p": ((table, "draw"), p),
+                f"{prefix}p_low": (table, low),
+                f"{prefix}p_high": (table, high),
+                f"{prefix}exists": (table, np.isfinite(p).mean(axis=1)),
+            }
+        )
+    return draws.complete(found, _lowest(found))
+
+
+def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], float]:
+    """Return critical amplitudes by frequency index, multiplier and number."""
+    seen: dict[tuple[int, int], int] = {}
+    numbered = {}
+    names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
+    for index, multiplier, p in result.rows(dataset, *names):
+        which = index, multiplier
+        seen[which] = seen.get(which, -1) + 1
+        numbered[*which, seen[which]] = p
+    return numbered
+
+
+def _lowest(found: xr.Dataset) -> list[str]:
+    p, low, high = (found[name].values for name in ("p", "p_low", "p_high"))
+    asked = found["asked"].values.astype(bool)[found["index"].values]
+    if not asked.any():
+        return []
+    k = int(np.argmin(np.where(asked, p, np.inf)))
+    omega = float(found["omega"].values[found["index"].values[k]])
+    line = (
+        f"The lowest critical amplitude, p = {p[k]:.6g} at omega = {omega:.6g}: 95 % of the "
+        f"draws in [{low[k]:.6g}, {high[k]:.6g}]."
+    )
+    return [line]

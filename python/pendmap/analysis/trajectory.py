@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
     Live = Callable[[Floats, Floats, Floats], object]
 
 
@@ -173,29 +173,28 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(float(result.theta[-1]), 3)
     0.446
     """
-    model = pendulum
-    pendulum, units = without_dimensions(model)
+    bare, units = without_dimensions(pendulum)
     check_callable("live", live, "three arrays, times, angles and velocities")
     numerics = Numerics(tol)
     theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
     until = check_number("until", until)
     lyapunov = check_flag("lyapunov", lyapunov)
-    if abs(pendulum.p) > _STRONGEST:
+    if abs(bare.p) > _STRONGEST:
         raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            f"p must be at most {_STRONGEST:g} times gravity, got {bare.p:g}: the number "
             "of steps grows with its root"
         )
     if until <= 0:
         raise InputError(f"until must be a time above 0, got {until:g}")
-    periods = until / model.period
+    periods = until / pendulum.period
+    start, end = (theta, units.bare(velocity, VELOCITY)), units.bare(until, TIME)
     if samples is None:
         samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
         if not lyapunov:  # the batches of an exponent depend on the number of samples
-            speed, end = units.bare(velocity, VELOCITY), units.bare(until, TIME)
-            samples = max(samples, _smooth(pendulum, speed, end))
+            samples = max(samples, _smooth(bare, start[1], end))
     samples = check_whole("samples", samples, 1, MOST_SAMPLES)
     if periods * samples > 100 * _MOST_SAMPLES:
-        most = 100 * _MOST_SAMPLES // samples * model.period
+        most = 100 * _MOST_SAMPLES // samples * pendulum.period
         raise InputError(
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
@@ -206,13 +205,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
 
     with core_errors():
-        start = (theta, units.bare(velocity, VELOCITY))
-        end = units.bare(until, TIME)
-        raw = _core.simulate(pendulum, start, end, numerics.tol, samples, lyapunov, live and shown)
+        raw = _core.simulate(bare, start, end, numerics.tol, samples, lyapunov, live and shown)
     time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
     event_time = units.given(raw.event_time, TIME)
     once = np.arange(0, time.size, samples)
-    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * pendulum.period:
+    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
         once = once[:-1]  # the end, between two samples
     angle = raw.theta[once]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
@@ -222,7 +219,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "velocity": variable("time", speed, units.of_velocity, units.derivative),
             "energy": (
                 "time",
-                energy(raw.theta, speed, model.attributes),
+                energy(raw.theta, speed, pendulum.attributes),
                 {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
             ),
             "section_theta": ("period", wrapped, {"units": "rad"}),
@@ -237,21 +234,20 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             "period": ("period", np.arange(wrapped.size)),
         },
     )
-    turns = math.trunc((float(raw.theta[-1]) - theta) / math.tau)
     values = {
         **numerics.provenance(),
         **_exponent(raw, time, units),
         "theta0": theta,
         "velocity0": velocity,
         "until": float(time[-1]) if raw.interrupted else until,
-        "turns": turns,
+        "turns": math.trunc((float(raw.theta[-1]) - theta) / math.tau),
         "stuck": int(raw.stuck),
         "lyapunov": int(lyapunov),
     }
     if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
-    SCHEMA.complete(dataset, model, values, raw)
-    summarised(dataset, [_summary(dataset, units)], model, "angle and velocity here are")
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    summarised(dataset, _summary(dataset, units), pendulum, "angle and velocity here are")
     return dataset
 
 
@@ -281,7 +277,7 @@ def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, fl
     }
 
 
-def _summary(dataset: xr.Dataset, units: Units) -> str:
+def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
     a = dataset.attrs
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     turns, lines = "", []
@@ -293,17 +289,14 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
         lines.append(f"INTERRUPTED before {asked}: the result ends where the computation stopped.")
     error = a["end_error"]
     at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
-    lines += [
-        (
-            f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad"
-            f"{turns}, velocity = {units.spoken(format(velocity, '.9g'))}."
-        ),
-        (
-            f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
-            f"after 5 periods{at_end} "
-            f"({a['steps_per_period']} steps a period)."
-        ),
-    ]
+    lines.append(
+        f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad{turns}, velocity = "
+        f"{units.spoken(format(velocity, '.9g'))}."
+    )
+    lines.append(
+        f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
+        f"after 5 periods{at_end} ({a['steps_per_period']} steps a period)."
+    )
     if not a["reached_error"] <= a["tol"]:
         lines.append(
             f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
@@ -330,7 +323,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> str:
             f"{with_error(value, error)} {units.per_time}. Transients are included; basins gives "
             "the exponents of the attractors."
         )
-    return "\n".join(lines)
+    return lines
 
 
 def advance(  # noqa: PLR0913
@@ -343,7 +336,7 @@ def advance(  # noqa: PLR0913
     steps_per_period: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Advance many starts by the same number of periods.
 
     Parameters

@@ -167,7 +167,7 @@ def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
     values = np.array([[one.gamma] for one in models])
     draws = Draws(("gamma",), values, models, 0)
     own = dict(zip(models, maps, strict=True))
-    return basins_over(maps[0], draws, lambda model, **_: own[model], None)
+    return basins_over(maps[0], draws, lambda model, **_: own[model])
 
 
 def test_doubt_from_fractal_boundaries_and_from_parameters_is_separate() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -16,7 +17,6 @@ import pendmap
 from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, render, viewer
 from pendmap.identification import identify_experiment
 from pendmap.identification.experiment import identified_model, provenance
-from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -147,7 +147,7 @@ def test_results_report_a_model_that_misses_its_record(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(style, "write", lambda figure, part: part.write_text(str(figure)))
+    monkeypatch.setattr(Figure, "savefig", lambda figure, part, **_: part.write_text(str(figure)))
     (tmp_path / "model.toml").write_text(DRIVEN, encoding="utf-8")
     draws = () if command in WITHOUT else ("--draws", "3")
     files = ("--out", "a.nc", "--plot", "a.png", "--rerun", "a.rrd")

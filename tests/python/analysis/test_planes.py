@@ -13,8 +13,7 @@ import xarray as xr
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig, render
-from pendmap.analysis.regimes import kind_of, regimes
-from pendmap.analysis.sweep import spread, undecided_cells
+from pendmap.analysis.sweep import kind_of, regimes, spread, undecided_cells
 from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 

@@ -96,6 +96,12 @@ def test_simulate_names_what_it_refuses(words: dict[str, Any], complaint: str) -
         )
 
 
+@pytest.mark.parametrize("start", [3, (1.0,), (1.0, 2.0, 3.0), ("a", 1.0)])
+def test_sweeps_start_from_an_angle_and_a_velocity(start: Any) -> None:  # noqa: ANN401
+    with pytest.raises(InputError, match="start must be"):
+        pendmap.bifurcation(Pendulum(), {"p": (0.5, 0.6, 2)}, start=start)
+
+
 @pytest.mark.parametrize("function", [pendmap.basins_of, pendmap.advance])
 @pytest.mark.parametrize("theta", ["pi", ["a", "b"], 1.0, [[1.0, 2.0]], [math.nan, 1.0], [1.0]])
 def test_lists_of_starts_are_refused(function: Any, theta: Any) -> None:  # noqa: ANN401

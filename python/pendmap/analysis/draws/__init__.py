@@ -1,9 +1,183 @@
-"""Models drawn from the covariance of fitted parameters, and results over all draws.
+"""Models drawn from the covariance of fitted parameters.
 
-``sample`` draws the models, ``match`` identifies attractors and orbits between models; the other
-modules, one for each analysis, compute statistics of its results over the draws.
+The modules, one for each analysis, compute statistics of its results over the draws.
 """
 
-from pendmap.analysis.draws.sample import Draws, drawn, part
+from __future__ import annotations
 
-__all__ = ["Draws", "drawn", "part"]
+import dataclasses
+import warnings
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.analysis.numerics import part
+from pendmap.analysis.result import Field
+from pendmap.analysis.sweep import with_values
+from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
+from pendmap.formatting import counted
+from pendmap.model.covariance import covariance_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable, Iterator
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from pendmap.analysis.numerics import Progress
+    from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
+
+    Run = Callable[..., xr.Dataset]
+    """Function that computes the result of a model and reports to the keyword ``progress``."""
+
+
+_TRIES: Final = 1000  # Largest number of successive draws outside the allowed values
+
+_LEVELS: Final = (0.025, 0.975)  # Probabilities at the ends of a 95 % interval
+_SURE: Final = 0.95  # Probability of an outcome from which a cell is sure
+
+
+@dataclasses.dataclass(frozen=True)
+class Draws:
+    """Models drawn from the covariance of a fitted model."""
+
+    names: tuple[str, ...]
+    values: Floats
+    """Parameters of each draw in the units of the model, shape (N, K)."""
+    models: tuple[Pendulum | Rig, ...]
+    seed: int
+    progress: Progress | None = None
+    """Progress of the results of the model itself and of all draws."""
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    @property
+    def first(self) -> Progress | None:
+        """Progress of the result of the model itself."""
+        return part(self.progress, 0, len(self) + 1)
+
+    def each(self, run: Run) -> Iterator[xr.Dataset]:
+        """Yield the result of each drawn model."""
+        for k, model in enumerate(self.models, 1):
+            yield run(model, progress=part(self.progress, k, len(self) + 1))
+
+    def complete(self, found: xr.Dataset, lines: Iterable[str]) -> xr.Dataset:
+        """Return a result with the drawn parameters, and with summary lines on the draws."""
+        names = ", ".join(self.names)
+        head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
+        found.attrs |= {"draws": len(self), "draws_seed": self.seed}
+        found.attrs["summary"] = "\n".join([found.attrs["summary"], head, *lines])
+        comment = {"comment": "parameters of each draw, in the units of the model"}
+        return found.assign(
+            drawn=(("draw", "parameter"), self.values, comment),
+            parameter=("parameter", np.array(self.names, dtype=str)),
+        )
+
+
+def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
+    """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
+
+    def read(dataset: xr.Dataset) -> dict[str, Any] | None:
+        a = dataset.attrs
+        if "draws" not in a:
+            return None
+        names = dataset["parameter"].values.tolist()
+        common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
+        return common | own(dataset)
+
+    return Field("draws", "", "models drawn from the covariance, and their results", read=read)
+
+
+def drawn(
+    model: Pendulum | Rig, count: object, seed: int, progress: Progress | None = None
+) -> Draws:
+    """Return models drawn from the Gaussian of a model's ``[covariance]``.
+
+    ``x = m + A z``, ``A A^T`` the covariance with the variance between runs, ``m`` the model's own
+    values, ``z`` standard normal. A draw is repeated if a damping or friction is below 0, the size
+    of a damping effect changes sign, or a value is outside a model's range: the Gaussian is
+    truncated there. The first draws do not depend on the number of draws. Raises InputError if the
+    model has no valid covariance, or hardly any draw is allowed.
+    """
+    number = check_whole("draws", count, 2, MOST_DRAWS)
+    known = covariance_of(model.notes)
+    if known is None:
+        raise InputError(
+            "draws: the model must have a [covariance], as the model files of identify and diagnose"
+            " have, got none"
+        )
+    there = {name: getattr(model, name) for name in model.numbers()}
+    for effect in model.effects:
+        there |= {f"{effect.name}.{name}": x for name, x in effect.parameters.items()}
+    for name in known.names:
+        if name not in there:
+            raise InputError(
+                f"covariance: {short_repr(name)} must be a parameter of the model, got none"
+            )
+    middle = np.array([there[name] for name in known.names], dtype=float)
+    root = known.root
+    brakes = (effect for effect in model.effects if effect.brakes)
+    sizes = {f"{effect.name}.{size}" for effect in brakes for size in effect.sizes}
+    signs = np.where([name in sizes for name in known.names], np.sign(middle), 0.0)
+    source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))
+    values, models = [], []
+    for _ in range(number):
+        for _ in range(_TRIES):
+            x = middle + root @ source.standard_normal(len(known.names))
+            if (x * signs < 0).any():
+                continue
+            try:
+                one = with_values(model, dict(zip(known.names, x.tolist(), strict=True)))
+            except InputError:
+                continue
+            break
+        else:
+            raise InputError(
+                f"draws: the [covariance] must leave room for allowed values, got none in {_TRIES}"
+                " draws"
+            )
+        values.append(x)
+        models.append(one)
+    return Draws(known.names, np.array(values), tuple(models), seed, progress)
+
+
+def interval(values: Floats) -> tuple[Floats, ...]:
+    """Return mean, standard deviation and ends of the 95 % interval of the finite values."""
+    if not values.size:  # numpy has no quantiles of empty arrays
+        none = np.full(values.shape[:-1], np.nan)
+        return none, none, none, none
+    known = np.where(np.isfinite(values), values, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # no value, or one: nan
+        low, high = np.nanquantile(known, _LEVELS, axis=-1)
+        return np.nanmean(known, axis=-1), np.nanstd(known, axis=-1, ddof=1), low, high
+
+
+def outcomes(
+    dims: tuple[Hashable, ...], probability: NDArray[Any], share: Floats
+) -> dict[str, Any]:
+    """Return the probability of each outcome in cells over ``dims``, and its shares of the draws.
+
+    Shapes are (outcome, M, N) and (outcome, D).
+    """
+    mean, _, low, high = interval(share)
+    one = {"units": "1"}
+    return {
+        "probability": (("outcome", *dims), probability, one),
+        "certainty": (dims, probability.max(axis=0), one),
+        "drawn_share": (("outcome", "draw"), share, one),
+        "share_mean": ("outcome", mean, one),
+        "share_low": ("outcome", low, one),
+        "share_high": ("outcome", high, one),
+    }
+
+
+def count_sure_cells(found: xr.Dataset, what: str) -> str:
+    """Set the attribute ``sure_cells``, the share of cells that are sure; return a summary line."""
+    share = found.attrs["sure_cells"] = float((found["certainty"].values >= _SURE).mean())
+    return (
+        f"{100 * share:.1f} % of the cells have {what} with a probability of {100 * _SURE:g} % or "
+        "more."
+    )

@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.draws.match import matched, names_of, plain, points_of
-from pendmap.analysis.draws.sample import interval, rows
+from pendmap.analysis.draws import count_sure_cells, drawn_field, outcomes
 from pendmap.analysis.fractality import BOX
+from pendmap.analysis.orbit_table import matched, plain, points_of
+from pendmap.analysis.result import rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,22 +31,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.draws.sample import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Draws, Run
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
-
-
-SURE: Final = 0.95  # Probability of an outcome from which a cell is sure
 
 _SHARES: Final = ("outcome", "share_mean", "share_low", "share_high", "exists")
 """Variables over the outcomes."""
+_DOUBT: Final = ("doubt_start", "doubt_parameters")  # Variables over boxes, and their means
 _UNKNOWN: Final = ("undecided", "failed")  # Outcomes of the labels 0 and -1
 
 
-def basins_over(
-    dataset: xr.Dataset, draws: Draws, run: Run, progress: Progress | None
-) -> xr.Dataset:
+def basins_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a basin map of M x N cells with statistics of the maps of D draws.
 
     Adds, over ``outcome``, all outcomes of starts by name: ``probability`` (outcome, M, N),
@@ -56,27 +52,23 @@ def basins_over(
     (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty of 95 % or
     more.
     """
-    ends, start, known = _counted(dataset, draws.each(run, progress))
-    variables = _variables(dataset["label"], ends, start, known, len(draws))
-    found = dataset.assign(variables).assign(draws.variables)
-    start, by = (found[f"doubt_{name}"].values for name in ("start", "parameters"))
-    found.attrs |= {
-        "sure_cells": float((found["certainty"].values >= SURE).mean()),
-        "doubt_start": float(start.mean()),
-        "doubt_parameters": float(by.mean()),
-    }
-    draws.complete(found, _summary(found))
-    return found
+    ends, start, known = _counted(dataset, draws.each(run))
+    found = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
+    for name in _DOUBT:
+        found.attrs[name] = float(found[name].values.mean())
+    return draws.complete(found, _summary(found))
 
 
-def fields(dataset: xr.Dataset) -> dict[str, Any]:
+@drawn_field
+def drawn_basins(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a basin map for the JSON object."""
-    outcomes = [
-        {"name": str(name), "fraction": mean, "ci95": [low, high], "exists": exists}
+    attractors = [
+        {"name": name, "fraction": mean, "ci95": [low, high], "exists": exists}
         for name, mean, low, high, exists in rows(dataset, *_SHARES)
     ]
-    doubt = ("sure_cells", "doubt_start", "doubt_parameters")
-    return {"attractors": outcomes} | {name: dataset.attrs[name] for name in doubt}
+    return {"attractors": attractors} | {
+        name: dataset.attrs[name] for name in ("sure_cells", *_DOUBT)
+    }
 
 
 @dataclasses.dataclass
@@ -103,12 +95,12 @@ def _counted(
     def new(points: Floats) -> _End:
         return _End(points, np.zeros(own.shape, np.uint16), none.copy())
 
-    names, points = names_of(dataset, "attractor"), points_of(dataset, "attractor")
+    names, points = dataset["attractor"].values.tolist(), points_of(dataset, "attractor")
     ends = {name: new(mine) for name, mine in zip(names, points, strict=True)}
     start, known = none.copy(), none.astype(np.int64)
     for d, one in enumerate(drawn):
         label = one["label"].values
-        names, points = names_of(one, "attractor"), points_of(one, "attractor")
+        names, points = one["attractor"].values.tolist(), points_of(one, "attractor")
         places = matched(list(ends), [end.points for end in ends.values()], names, points)
         mine = [list(ends)[place] if place >= 0 else "" for place in places]
         for k, name in enumerate(names):
@@ -144,31 +136,25 @@ def _variables(
     every = [ends[name] for name in names]
     probability = np.stack([end.cells for end in every]).astype(np.float32) / draws
     share = np.array([[end.shares.get(d, 0.0) for d in range(draws)] for end in every])
-    mean, _, low, high = interval(share)
     exists = np.array([len(end.shares) / draws for end in every])
     known = np.maximum(known, 1)
     total = sum((_entropy(end.boxes / known) for end in ends.values()), 0.0 * start)
     start = start / known
     boxes = _in_boxes(own, own.values > 0)
     over_boxes = tuple(f"box_{name}" for name in dims)
-    one, nat = {"units": "1"}, {"units": "nat"}
+    nat = {"units": "nat"}
     return {
         "outcome": ("outcome", np.array(names, dtype=str)),
-        "probability": (("outcome", *dims), probability, one),
-        "certainty": (dims, probability.max(axis=0), one),
+        **outcomes(dims, probability, share),
         "label_entropy": (dims, _entropy(probability).sum(axis=0, dtype=np.float32), nat),
-        "drawn_share": (("outcome", "draw"), share, one),
         "exists": ("outcome", exists, {"comment": "share of the draws that have it"}),
-        "share_mean": ("outcome", mean, one),
-        "share_low": ("outcome", low, one),
-        "share_high": ("outcome", high, one),
         "doubt_start": (over_boxes, start, nat),
         "doubt_parameters": (over_boxes, np.maximum(total - start, 0.0), nat),
         **{f"box_{name}": (f"box_{name}", boxes[name].values) for name in dims},
     }
 
 
-def _in_boxes(own: xr.DataArray, cells: NDArray[np.bool_]) -> xr.DataArray:
+def _in_boxes(own: xr.DataArray, cells: Mask) -> xr.DataArray:
     """Return the number of true cells in each whole box, at the boxes' centres."""
     window = {name: min(BOX, size) for name, size in own.sizes.items()}
     return own.copy(data=cells).coarsen(window, boundary="trim").sum()
@@ -187,10 +173,7 @@ def _summary(found: xr.Dataset) -> list[str]:
             f"{name}: {100 * mean:.2f} % of the starts, 95 % of the draws in "
             f"[{100 * low:.2f}, {100 * high:.2f}] %{there}."
         )
-    lines.append(
-        f"{100 * a['sure_cells']:.1f} % of the cells have an end with a probability of "
-        f"{100 * SURE:g} % or more."
-    )
+    lines.append(count_sure_cells(found, "an end"))
     both = a["doubt_start"] + a["doubt_parameters"]
     lines.append(
         f"Entropy of the end in a box of {BOX} x {BOX} cells: {both:.3f} nat = "
