@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,7 +18,7 @@ from pendmap.cli.options import (
     simd_option,
     threads_option,
 )
-from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.show import Outputs, progress_bar, table, write_all
 from pendmap.cli.types import FILE, NUMBER, Whole
 from pendmap.errors import instruction_set
 
@@ -58,8 +59,7 @@ def command(  # noqa: PLR0913 (an option each)
     that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     from pendmap.comparison import Ensemble, compare
-    from pendmap.comparison.free import as_json as fields
-    from pendmap.comparison.free import as_text, tables
+    from pendmap.comparison.free import as_json, as_text, tables
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubt_lines
 
@@ -70,17 +70,11 @@ def command(  # noqa: PLR0913 (an option each)
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
-    if outputs.as_json:
-        more = {"model": str(model), "simd": instruction_set()}
-        write_json(fields(comparison) | more)
-    elif not outputs.quiet:
-        doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-        for line in doubts:
-            click.echo(line)
-        for table in tables(comparison):
-            write_table(*table)
-        for line in as_text(comparison):
-            if line not in doubts:
-                click.echo(line)
-        written.say()
-    written.check()
+    more = {"model": str(model), "simd": instruction_set()}
+    doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
+    lines = itertools.chain(
+        doubts,
+        (table(*each) for each in tables(comparison)),
+        (line for line in as_text(comparison) if line not in doubts),
+    )
+    outputs.finish(written, lambda: as_json(comparison) | more, lines)

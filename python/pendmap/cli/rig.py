@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import functools
-import json
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.options import json_option, option
-from pendmap.cli.show import write_all
+from pendmap.cli.show import write_all, write_json
 from pendmap.cli.types import FILE, NUMBER, PICTURES, OutputFile
 from pendmap.formatting import counted
 
@@ -95,7 +94,7 @@ def command(  # noqa: PLR0913 (an option each)
     if as_json:
         places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
         places |= {"plot": plot} if plot is not None and str(plot) in written else {}
-        click.echo(json.dumps({name: str(path) for name, path in places.items()}))
+        write_json({name: str(path) for name, path in places.items()})
     elif not quiet:
         if whole:
             seconds = sum(run.plan.duration for run in experiment.runs)
@@ -148,7 +147,7 @@ def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:
     if as_json:
-        click.echo(json.dumps({"effects": effects}))
+        write_json({"effects": effects})
         return
     for effect in effects:
         click.echo(f"{effect['name']:<26} {effect['formula']}")

@@ -15,7 +15,7 @@ import click
 
 from pendmap.cli.options import RESULTS
 from pendmap.cli.types import default_file
-from pendmap.errors import InputError, NotWrittenError, one_line
+from pendmap.errors import InputError, NotWrittenError, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import columns
 
@@ -89,7 +89,10 @@ class Outputs:
         places = {"--out": [outputs.out], "--plot": [outputs.plot], "--rerun": [outputs.rerun]}
         keep_inputs(reads, places | {"--report": _report_files(outputs.report)})
         if outputs.view:
-            check_view()
+            from pendmap import viewer
+
+            with named("--view"):
+                viewer.check_display()
         return outputs
 
     def check_room(self, cells: int) -> None:
@@ -131,26 +134,22 @@ class Outputs:
 
             yield functools.partial(getattr(viewer, record), result), self.rerun
 
-    def open_viewer(self) -> None:
-        """Open the viewer on the recording if --view is given."""
-        if not self.view or self.rerun is None:
-            return
-        from pendmap import viewer
+    def finish(
+        self, written: Written, fields: Callable[[], dict[str, Any]], lines: Iterable[str]
+    ) -> None:
+        """Print JSON or lines of text; raise an error if a file is missing; open the viewer."""
+        if self.as_json:
+            write_json(fields())
+        elif not self.quiet:
+            for line in lines:
+                click.echo(line)
+            written.say()
+        written.check()
+        recording = written.name(self.rerun) if self.view else None
+        if recording is not None:
+            from pendmap import viewer
 
-        try:
-            viewer.open_viewer(self.rerun)
-        except viewer.ViewerError as error:
-            raise click.ClickException(str(error)) from error
-
-
-def check_view() -> None:
-    """Refuse --view before anything is computed if no window can open."""
-    from pendmap import viewer
-
-    try:
-        viewer.check_display()
-    except viewer.ViewerError as error:
-        raise click.UsageError(f"--view: {error}") from error
+            viewer.open_viewer(recording)
 
 
 def _report_files(report: Path | None) -> list[Path]:
@@ -182,21 +181,11 @@ def keep_inputs(
 
 def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
     """Write the files asked for, then JSON or the summary to stdout."""
+    from pendmap.files.dataset import save
 
-    def save(path: Path) -> Path:
-        from pendmap.files import dataset as stored
-
-        return stored.save(dataset, path)
-
-    written = write_all(outputs.files(dataset, save))
-    if outputs.as_json:
-        write_json(schema.json(dataset))
-    elif not outputs.quiet:
-        click.echo(dataset.attrs["title"])
-        click.echo(dataset.attrs["summary"])
-        written.say()
-    written.check()
-    outputs.open_viewer()
+    written = write_all(outputs.files(dataset, functools.partial(save, dataset)))
+    lines = (dataset.attrs[name] for name in ("title", "summary"))
+    outputs.finish(written, lambda: schema.json(dataset), lines)
 
 
 def write_json(fields: dict[str, Any]) -> None:
@@ -254,10 +243,10 @@ def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Wri
     return written
 
 
-def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write a table with a bold header and aligned columns, whatever the terminal's width."""
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with a bold header and aligned columns, whatever the terminal's width."""
     first, *others = columns(head, rows).split("\n")
-    click.echo("\n".join([click.style(first, bold=True), *others]))
+    return "\n".join([click.style(first, bold=True), *others])
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -13,13 +12,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.errors import InputError
-from pendmap.files import whole_file
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import Look
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable
 
     from pendmap.charts.marks import Floats
 
@@ -37,28 +34,6 @@ class Series:
     colour: tuple[int, int, int]
     width: float = 0.0
     size: float = 3.0
-
-
-def write(  # noqa: PLR0913, PLR0917 (where, what, and how it is shown)
-    path: str | os.PathLike[str],
-    source: str,
-    content: str,
-    known: Mapping[str, float | str],
-    page: str,
-    layout: rrb.Blueprint,
-    log: Callable[[rr.RecordingStream], None],
-) -> Path:
-    """Write a recording with its name, properties (including ``kind``) and page of text."""
-    kind = known["kind"]
-    with whole_file(path, (".rrd",)) as part, frame.strict():
-        # A layout holds for all recordings of an application, so this one has its own application.
-        recording = frame.identified(content, f"pendmap {kind} {content[:6]}")
-        with frame.written(recording, layout, part):
-            recording.send_recording_name(f"{kind} of {source}")
-            recording.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
-            frame.text(recording, "summary", page)
-            log(recording)
-    return Path(path)
 
 
 def content_of(found: object, arrays: Iterable[Floats]) -> str:
