@@ -12,14 +12,12 @@ from pendmap.cli.options import (
     json_option,
     option,
     plot_option,
-    quiet_option,
-    rate_option,
+    reading_options,
     seed_option,
-    simd_option,
     threads_option,
 )
-from pendmap.cli.show import Outputs, progress_bar, table, write_all
-from pendmap.cli.types import FILE, NUMBER, Whole
+from pendmap.cli.show import Outputs, table, write_all
+from pendmap.cli.types import FILE, NUMBER, whole
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -30,14 +28,12 @@ if TYPE_CHECKING:
 @click.argument("model", type=FILE, metavar="MODEL")
 @click.argument("path", type=FILE, metavar="EXPERIMENT")
 @plot_option
-@option("--members", Whole(20, 100_000), "Ensemble members for each forced run.", 400)
+@option("--members", whole(20, 100_000), "Ensemble members for each forced run.", 400)
 @option("--spread", NUMBER, "Their spread about the measured start, rad, and over w0.", 0.01)
 @seed_option("Draws them.")
 @threads_option
 @json_option("; alone, no files")
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
@@ -66,7 +62,7 @@ def command(  # noqa: PLR0913 (an option each)
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
-    with progress_bar("compare", shown=outputs.shows_progress) as progress:
+    with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)

@@ -16,14 +16,12 @@ from pendmap.cli.options import (
     json_option,
     option,
     plot_option,
-    quiet_option,
-    rate_option,
+    reading_options,
     rerun_option,
-    simd_option,
     view_option,
 )
-from pendmap.cli.show import Outputs, progress_bar, table, write_all
-from pendmap.cli.types import FILE, REPORT, OutputFile, Whole
+from pendmap.cli.show import Outputs, table, write_all
+from pendmap.cli.types import FILE, REPORT, output_file, whole
 from pendmap.errors import instruction_set, named
 
 if TYPE_CHECKING:
@@ -38,7 +36,7 @@ if TYPE_CHECKING:
     "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
     metavar="FILE",
 )
-@option("--max-effects", Whole(0, 6), "Effects added at most, 0 to 6.", 3)
+@option("--max-effects", whole(0, 6), "Effects added at most, 0 to 6.", 3)
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
@@ -48,7 +46,7 @@ if TYPE_CHECKING:
     "User-defined candidates in addition to the library's: [[formula]] of a .toml.",
     metavar="FILE",
 )
-@option("--out", OutputFile([".toml"]), "New model: .toml.  [default: diagnose.toml]")
+@option("--out", output_file(".toml"), "New model: .toml.  [default: diagnose.toml]")
 @plot_option
 @option(
     "--report",
@@ -59,9 +57,7 @@ if TYPE_CHECKING:
 @rerun_option
 @view_option
 @json_option("; alone, no file but the model")
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
@@ -101,10 +97,9 @@ def command(  # noqa: PLR0913 (an option each)
     reads = [*files_of(path), model_path, effects_path]
     outputs = Outputs.take(given, "diagnose", ".toml", reads)
     model = None if model_path is None else rig_from(model_path)
-    shown = outputs.shows_progress
-    with progress_bar("read", shown=shown):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    with progress_bar("diagnose", shown=shown) as progress:
+    with outputs.progress("diagnose") as progress:
         found = diagnose(
             experiment,
             model=model,
@@ -113,7 +108,7 @@ def command(  # noqa: PLR0913 (an option each)
             effects=own,
             progress=progress,
         )
-    with progress_bar("write", shown=shown):
+    with outputs.progress("write"):
         line = "pendmap " + shlex.join(sys.argv[1:])
         save = functools.partial(save_model, diagnosed_model(found, line))
         files = outputs.files(found, save, "draw_discrepancy", "record_discrepancy")

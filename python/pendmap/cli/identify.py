@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import output_options, quiet_option, rate_option, simd_option
-from pendmap.cli.show import Outputs, Written, progress_bar, table, write_all
+from pendmap.cli.options import output_options, reading_options
+from pendmap.cli.show import Outputs, Written, table, write_all
 from pendmap.cli.types import FILE
 from pendmap.errors import InputError, instruction_set
 
@@ -36,9 +36,7 @@ SUFFIX = ".toml"
     metavar="NAME",
     help="Fit this effect of the library too; may be repeated.",
 )
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 @output_options((SUFFIX,), "Model")
 def command(
     *,
@@ -61,9 +59,9 @@ def command(
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
-    with progress_bar("read", shown=outputs.shows_progress):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    with progress_bar("identify", shown=outputs.shows_progress) as progress:
+    with outputs.progress("identify") as progress:
         report = identify_experiment(
             experiment, methods=methods or None, effects=effects, progress=progress
         )
@@ -77,7 +75,7 @@ def command(
     except InputError:
         finish(Written())
         raise
-    with progress_bar("write", shown=outputs.shows_progress):
+    with outputs.progress("write"):
         save = functools.partial(save_model, model)
         files = outputs.files(report, save, "draw_identification", "record_identification")
         written = write_all(files, keep=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
-from pendmap.cli.show import Outputs, progress_bar, write_all
+from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.types import FILE
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa
     from pendmap.records.summary import as_json, as_text
 
     outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
-    with progress_bar("read", shown=outputs.shows_progress):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     written = write_all(outputs.files(experiment, None, "draw_record"))
     outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

@@ -10,7 +10,7 @@ import click
 
 from pendmap.cli.options import json_option, option, seed_option, simd_option
 from pendmap.cli.show import table, write_all, write_json
-from pendmap.cli.types import PICTURES, OutputFile, default_file
+from pendmap.cli.types import PICTURES, default_file, output_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 )
 @option(
     "--plot",
-    OutputFile(PICTURES),
+    output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
 )
 @seed_option("Of the rig's noise.")

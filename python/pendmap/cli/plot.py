@@ -9,7 +9,7 @@ import click
 
 from pendmap.cli.options import option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import FILE, PICTURES, OutputFile, default_file
+from pendmap.cli.types import FILE, PICTURES, default_file, output_file
 from pendmap.errors import InputError, named
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("file", type=FILE)
 @option(
     "--out --plot out",
-    OutputFile(PICTURES),
+    output_file(*PICTURES),
     "Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
 @click.option(

@@ -9,7 +9,7 @@ import click
 
 from pendmap.cli.options import json_option, option
 from pendmap.cli.show import write_all, write_json
-from pendmap.cli.types import FILE, NUMBER, PICTURES, OutputFile
+from pendmap.cli.types import FILE, NUMBER, PICTURES, output_file
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 @option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]")
 @option("--c-over-m", NUMBER, "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]")
 @option("--tr friction", NUMBER, "Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]")
-@option("--plot", OutputFile(PICTURES), "Figure of the records: .png .svg .pdf.")
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.")
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @json_option()

@@ -29,30 +29,6 @@ if TYPE_CHECKING:
     Write = Callable[[Path], Path | str]
 
 
-@contextlib.contextmanager
-def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a progress bar with the time left on stderr; yield its callback, or None."""
-    if not shown:
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=None)
-
-        def report(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total or None)
-
-        yield report
-
-
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Output files and options of a command."""
@@ -110,6 +86,29 @@ class Outputs:
     def shows_progress(self) -> bool:
         """Whether stderr is a terminal and --quiet is not given."""
         return sys.stderr.isatty() and not self.quiet
+
+    @contextlib.contextmanager
+    def progress(self, name: str) -> Iterator[Callable[[int, int], None] | None]:
+        """Show a progress bar with the time left on stderr; yield its callback, or None."""
+        if not self.shows_progress:
+            yield None
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(name, total=None)
+
+            def report(done: int, total: int) -> None:
+                bar.update(task, completed=done, total=total or None)
+
+            yield report
 
     def files(
         self,

@@ -9,7 +9,7 @@ import click
 from pendmap.cli.model_options import begin, model_options
 from pendmap.cli.options import option, output_options, simd_option, start_options
 from pendmap.cli.show import show
-from pendmap.cli.types import NUMBER, Whole
+from pendmap.cli.types import NUMBER, whole
 from pendmap.errors import MOST_SAMPLES, named
 
 _VIEWER = "127.0.0.1:9876"
@@ -20,7 +20,7 @@ _VIEWER = "127.0.0.1:9876"
 @start_options
 @option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0)
 @option("--tol", NUMBER, "Error after 5 periods.", 1e-9)
-@option("--samples", Whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
+@option("--samples", whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option(
     "--live",

@@ -43,12 +43,9 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
         )
         for one in shown
     ]
-    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
-        tabs.append(
-            _around_attractors(dataset, listed).view(
-                ROOTS["labels"], "Its attractor, once a period"
-            )
-        )
+    alone = _around_attractors(dataset, listed)
+    if alone is not None:
+        tabs.append(alone.view(ROOTS["labels"], "Its attractor, once a period"))
     aside = rrb.Vertical(
         rrb.TextDocumentView(origin="/legend", name="Legend"),
         rrb.TextDocumentView(origin="/summary", name="Summary"),
@@ -72,8 +69,8 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
             _scalar(stream, dataset, around, one)
         if one == "labels" or not layering.finite_time(dataset):
             _attractors(stream, ROOTS[one], dataset, around, named=one == "labels")
-    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
-        alone = _around_attractors(dataset, listed)
+    alone = _around_attractors(dataset, listed)
+    if alone is not None:
         alone.log(stream, ROOTS["labels"])
         _attractors(stream, ROOTS["labels"], dataset, alone, named=False)
 
@@ -83,13 +80,13 @@ def _frame(dataset: xr.Dataset) -> frame.Frame:
     return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
 
 
-def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame:
-    """Return a frame that contains every attractor's points, for a plane without a map."""
-    velocity = np.concatenate([entry.points[:, 1] for entry in listed])
-    low, high = float(velocity.min()), float(velocity.max())
-    pad = max(0.06 * (high - low), 0.05)
-    theta = plane.angles(dataset, np.concatenate([entry.points[:, 0] for entry in listed]))
-    return frame.Frame.phase(theta, (low - pad, high + pad), Units.of(dataset.attrs))
+def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame | None:
+    """Return a frame that contains every attractor's points, for a plane without a map of them."""
+    points = np.concatenate([np.empty((0, 2)), *(entry.points for entry in listed)])
+    if not (layering.finite_time(dataset) and len(points)):
+        return None
+    theta, velocity = plane.angles(dataset, points[:, 0]), plane.padded(points[:, 1])
+    return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:

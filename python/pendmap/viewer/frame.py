@@ -269,7 +269,7 @@ def write(
     stream.log(path, points, static=True)
 
 
-def legend(
+def legend(  # noqa: PLR0913 (where, what, how)
     stream: rr.RecordingStream,
     path: str,
     places: Sequence[tuple[float, float]],
