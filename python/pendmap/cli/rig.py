@@ -13,7 +13,7 @@ from pendmap.cli.types import FILE, NUMBER, PICTURES, output_file
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     from pendmap import virtual_rig
@@ -89,39 +89,30 @@ def command(  # noqa: PLR0913 (an option each)
     request = virtual_rig.Request(name, **given)
     where = virtual_rig.places(out, replace=replace)
     experiment = virtual_rig.make(request)
-    written = write_all(_files(experiment, where, plot))
-    whole = _names(where) in written
+    both = f"{where.experiment}, {where.truth}"
+
+    def write(_: Path) -> str:
+        virtual_rig.write(experiment, where)
+        return both
+
+    files: list[tuple[Callable[[Path], Path | str], Path]] = [(write, where.experiment)]
+    if plot is not None:
+        files.append((functools.partial(_draw, experiment, where.experiment.name), plot))
+    written = write_all(files)
+    whole, drawn = both in written, written.name(plot)
     if as_json:
         places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
-        places |= {"plot": plot} if plot is not None and str(plot) in written else {}
-        write_json({name: str(path) for name, path in places.items()})
+        named = {name: str(path) for name, path in places.items()}
+        write_json(named | ({"plot": drawn} if drawn else {}))
     elif not quiet:
         if whole:
             seconds = sum(run.plan.duration for run in experiment.runs)
             runs = counted(len(experiment.runs), "run")
             click.echo(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
             click.echo(f"The truth: {where.truth}")
-        if plot is not None and str(plot) in written:
-            click.echo(f"The records: {plot}")
+        if drawn:
+            click.echo(f"The records: {drawn}")
     written.check()
-
-
-def _files(
-    experiment: virtual_rig.Experiment, where: virtual_rig.Places, plot: Path | None
-) -> Iterator[tuple[Callable[[Path], Path | str], Path]]:
-    from pendmap import virtual_rig
-
-    def both(_: Path) -> str:
-        virtual_rig.write(experiment, where)
-        return _names(where)
-
-    yield both, where.experiment
-    if plot is not None:
-        yield functools.partial(_draw, experiment, where.experiment.name), plot
-
-
-def _names(where: virtual_rig.Places) -> str:
-    return f"{where.experiment}, {where.truth}"
 
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:

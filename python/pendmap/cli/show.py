@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import importlib
 import json
 import math
 import sys
@@ -120,18 +121,14 @@ class Outputs:
         """Yield writer and path of each file; import matplotlib and Rerun only when needed."""
         if self.out is not None and save is not None:
             yield save, self.out
-        if self.plot is not None:
-            from pendmap import render
-
-            yield functools.partial(getattr(render, draw), result), self.plot
-        if self.report is not None:
-            from pendmap import render
-
-            yield functools.partial(render.write_report, result), self.report
-        if self.rerun is not None:
-            from pendmap import viewer
-
-            yield functools.partial(getattr(viewer, record), result), self.rerun
+        for path, module, write in (
+            (self.plot, "render", draw),
+            (self.report, "render", "write_report"),
+            (self.rerun, "viewer", record),
+        ):
+            if path is not None:
+                home = importlib.import_module(f"pendmap.{module}")
+                yield functools.partial(getattr(home, write), result), path
 
     def finish(
         self, written: Written, fields: Callable[[], dict[str, Any]], lines: Iterable[str]

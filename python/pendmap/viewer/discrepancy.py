@@ -185,11 +185,8 @@ def _views(root: str, one: Beside, larger: float) -> rrb.Container:
         visual_bounds=rrb.VisualBounds2D(x_range=[-APART / 2, 2.5 * APART], y_range=[-1.15, 1.5]),
     )
     below = [
-        rrb.TimeSeriesView(origin=f"/{root}/{leaf}", name=name, plot_legend=runs.LEGEND)
-        for leaf, name in (
-            ("angle", f"{names.ANGLE}, {one.name}"),
-            ("residual", "Record less model (mrad)"),
-        )
+        runs.view(f"{root}/angle", f"{names.ANGLE}, {one.name}"),
+        runs.view(f"{root}/residual", "Record less model (mrad)"),
     ]
     return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4], name=one.name)
 

@@ -174,32 +174,15 @@ def _views(root: str, one: Comparison, w0: float) -> rrb.Container:
         end=rrb.TimeRangeBoundary.cursor_relative(seconds=around),
     )
     right: list[rrb.View] = [
-        rrb.TimeSeriesView(
-            origin=f"/{root}/angle",
-            name=f"{names.ANGLE}, {one.name}",
-            axis_x=_whole(one),
-            plot_legend=runs.LEGEND,
-        ),
-        rrb.TimeSeriesView(
-            origin=f"/{root}/angle",
-            name=f"{names.ANGLE}, near the cursor",
-            time_ranges=[close],
-            plot_legend=runs.LEGEND,
-        ),
+        runs.view(f"{root}/angle", f"{names.ANGLE}, {one.name}", axis_x=_whole(one)),
+        runs.view(f"{root}/angle", f"{names.ANGLE}, near the cursor", time_ranges=[close]),
     ]
     if np.isfinite(one.residual).any():
         # The axis contains the residuals used and the band of the noise.
         least = max(1.5 * runs.BAND * one.sigma, 1e-12)
         reach = 1.05 * runs.MILLI * max(float(np.nanmax(np.abs(one.residual))), least)
-        right.append(
-            rrb.TimeSeriesView(
-                origin=f"/{root}/residual",
-                name="Record less model (mrad)",
-                axis_x=_whole(one),
-                axis_y=rrb.ScalarAxis(range=(-reach, reach)),
-                plot_legend=runs.LEGEND,
-            )
-        )
+        axes = {"axis_x": _whole(one), "axis_y": rrb.ScalarAxis(range=(-reach, reach))}
+        right.append(runs.view(f"{root}/residual", "Record less model (mrad)", **axes))
     return rrb.Horizontal(
         rrb.Vertical(*left), rrb.Vertical(*right), column_shares=[3, 4], name=one.name
     )

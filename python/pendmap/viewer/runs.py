@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
@@ -51,6 +51,11 @@ def refuse_late(name: object, times: Iterable[Floats]) -> None:
         raise InputError(
             f"{name}: time is {latest:g} s: a recording holds up to {columns.LATEST:g} s"
         )
+
+
+def view(path: str, name: str, **axes: Any) -> rrb.TimeSeriesView:  # noqa: ANN401 (of the view)
+    """Return the view of the time series under a path."""
+    return rrb.TimeSeriesView(origin=f"/{path}", name=name, plot_legend=LEGEND, **axes)
 
 
 def series(

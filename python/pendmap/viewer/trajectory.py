@@ -174,12 +174,8 @@ def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) ->
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
     """Log angle, velocity and energy against time, by their extremes in each of ``bins`` bins."""
     units, (time, theta, velocity) = Units.of(attrs), motion
-    for name, values in (
-        ("theta", theta),
-        ("omega", velocity),
-        ("energy", energy(theta, velocity, attrs)),
-    ):
-        said, colour = _STATE[name]
+    every = (theta, velocity, energy(theta, velocity, attrs))
+    for (name, (said, colour)), values in zip(_STATE.items(), every, strict=True):
         path = f"state/{name}"
         style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
         stream.log(path, style, static=True)
