@@ -85,8 +85,8 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(figures.draw, key, seed=seed), path
         if key == figures.TABLE:
-            write = functools.partial(figures.write_table, figures.report(seed))
-            yield write, path.with_suffix(".csv")
+            csv = path.with_suffix(".csv")
+            yield lambda to: figures.write_table(figures.report(seed), to), csv
 
 
 def _name(key: str) -> str:
