@@ -37,8 +37,22 @@ class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the calle
     """A fit diverged: its trajectory overflowed, or its values are outside a model's range."""
 
 
+class ViewerError(RuntimeError):
+    """The viewer cannot be started, or no longer answers."""
+
+
 class NotWrittenError(OSError):
     """Computed results could not be written; the message names them and the files written."""
+
+
+@contextlib.contextmanager
+def named(where: str) -> Iterator[None]:
+    """Prefix messages on input and on the viewer with a file or an option."""
+    try:
+        yield
+    except (InputError, ViewerError) as error:
+        kind = InputError if isinstance(error, InputError) else ViewerError
+        raise kind(f"{where}: {error}") from error
 
 
 @contextlib.contextmanager

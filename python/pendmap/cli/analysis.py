@@ -11,7 +11,7 @@ import click
 from pendmap import ANALYSES
 from pendmap.cli.model_options import begin, model_options
 from pendmap.cli.options import added, output_options, progress_options
-from pendmap.cli.show import progress_bar, show
+from pendmap.cli.show import show
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ def analysis_command(
             pendulum, outputs = begin(given, name)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
-            with progress_bar(name, shown=outputs.shows_progress) as progress:
+            with outputs.progress(name) as progress:
                 dataset = getattr(module, function)(pendulum, progress=progress, **arguments)
             show(dataset, outputs, module.SCHEMA)
 

@@ -9,7 +9,7 @@ import click
 from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
-from pendmap.cli.types import AXIS, Whole
+from pendmap.cli.types import AXIS, whole
 from pendmap.errors import MOST_CELLS, MOST_PERIODS
 
 if TYPE_CHECKING:
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     option(
         "--velocity", AXIS, "Initial velocities, in SI rad/s.  [default: -3:3:1000, in SI times w0]"
     ),
-    option("--grid", Whole(1, MOST_CELLS), "Cells on each side of the window."),
+    option("--grid", whole(1, MOST_CELLS), "Cells on each side of the window."),
     tol_option,
     max_periods_option(
         "Bound after which a start is undecided.  [default: 4000; more where damping"
         " is small, less if chaos coexists]"
     ),
-    option("--layer-periods", Whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
+    option("--layer-periods", whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),
     draws_option,
 )

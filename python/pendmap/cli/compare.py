@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,14 +12,12 @@ from pendmap.cli.options import (
     json_option,
     option,
     plot_option,
-    quiet_option,
-    rate_option,
+    reading_options,
     seed_option,
-    simd_option,
     threads_option,
 )
-from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import FILE, NUMBER, Whole
+from pendmap.cli.show import Outputs, table, write_all
+from pendmap.cli.types import FILE, NUMBER, whole
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -29,14 +28,12 @@ if TYPE_CHECKING:
 @click.argument("model", type=FILE, metavar="MODEL")
 @click.argument("path", type=FILE, metavar="EXPERIMENT")
 @plot_option
-@option("--members", Whole(20, 100_000), "Ensemble members for each forced run.", 400)
+@option("--members", whole(20, 100_000), "Ensemble members for each forced run.", 400)
 @option("--spread", NUMBER, "Their spread about the measured start, rad, and over w0.", 0.01)
 @seed_option("Draws them.")
 @threads_option
 @json_option("; alone, no files")
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
@@ -58,29 +55,22 @@ def command(  # noqa: PLR0913 (an option each)
     that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     from pendmap.comparison import Ensemble, compare
-    from pendmap.comparison.free import as_json as fields
-    from pendmap.comparison.free import as_text, tables
+    from pendmap.comparison.free import as_json, as_text, tables
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubt_lines
 
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
     ensemble = Ensemble(members, spread, seed)
-    with progress_bar("compare", shown=outputs.shows_progress) as progress:
+    with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
-    if outputs.as_json:
-        more = {"model": str(model), "simd": instruction_set()}
-        write_json(fields(comparison) | more)
-    elif not outputs.quiet:
-        doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-        for line in doubts:
-            click.echo(line)
-        for table in tables(comparison):
-            write_table(*table)
-        for line in as_text(comparison):
-            if line not in doubts:
-                click.echo(line)
-        written.say()
-    written.check()
+    more = {"model": str(model), "simd": instruction_set()}
+    doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
+    lines = itertools.chain(
+        doubts,
+        (table(*each) for each in tables(comparison)),
+        (line for line in as_text(comparison) if line not in doubts),
+    )
+    outputs.finish(written, lambda: as_json(comparison) | more, lines)

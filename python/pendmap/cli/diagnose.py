@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
+import itertools
 import os
 import shlex
 import sys
@@ -16,18 +16,15 @@ from pendmap.cli.options import (
     json_option,
     option,
     plot_option,
-    quiet_option,
-    rate_option,
+    reading_options,
     rerun_option,
-    simd_option,
     view_option,
 )
-from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
-from pendmap.cli.types import FILE, REPORT, OutputFile, Whole
-from pendmap.errors import InputError, instruction_set
+from pendmap.cli.show import Outputs, table, write_all
+from pendmap.cli.types import FILE, REPORT, output_file, whole
+from pendmap.errors import instruction_set, named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
     "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
     metavar="FILE",
 )
-@option("--max-effects", Whole(0, 6), "Effects added at most, 0 to 6.", 3)
+@option("--max-effects", whole(0, 6), "Effects added at most, 0 to 6.", 3)
 @click.option(
     "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
 )
@@ -49,7 +46,7 @@ if TYPE_CHECKING:
     "User-defined candidates in addition to the library's: [[formula]] of a .toml.",
     metavar="FILE",
 )
-@option("--out", OutputFile([".toml"]), "New model: .toml.  [default: diagnose.toml]")
+@option("--out", output_file(".toml"), "New model: .toml.  [default: diagnose.toml]")
 @plot_option
 @option(
     "--report",
@@ -60,9 +57,7 @@ if TYPE_CHECKING:
 @rerun_option
 @view_option
 @json_option("; alone, no file but the model")
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
@@ -85,25 +80,26 @@ def command(  # noqa: PLR0913 (an option each)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.diagnosis import diagnose, diagnosed_model
     from pendmap.diagnosis.candidates import checked_own
+    from pendmap.diagnosis.result import as_text, ranking_table
+    from pendmap.diagnosis.summary import as_json
     from pendmap.model import load_formulas, save_model
     from pendmap.model.effects import definition
     from pendmap.records import files_of, read_experiment
 
     own = [] if effects_path is None else load_formulas(effects_path)
-    with _named(str(effects_path)):
+    with named(str(effects_path)):
         checked_own(own)
-    with _named("--without"):
-        named = {formula.name for formula in own}
+    with named("--without"):
+        own_names = {formula.name for formula in own}
         for name in without:
-            if name not in named:
+            if name not in own_names:
                 definition(name)
     reads = [*files_of(path), model_path, effects_path]
     outputs = Outputs.take(given, "diagnose", ".toml", reads)
     model = None if model_path is None else rig_from(model_path)
-    shown = outputs.shows_progress
-    with progress_bar("read", shown=shown):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    with progress_bar("diagnose", shown=shown) as progress:
+    with outputs.progress("diagnose") as progress:
         found = diagnose(
             experiment,
             model=model,
@@ -112,32 +108,11 @@ def command(  # noqa: PLR0913 (an option each)
             effects=own,
             progress=progress,
         )
-    with progress_bar("write", shown=shown):
+    with outputs.progress("write"):
         line = "pendmap " + shlex.join(sys.argv[1:])
         save = functools.partial(save_model, diagnosed_model(found, line))
         files = outputs.files(found, save, "draw_discrepancy", "record_discrepancy")
         written = write_all(files, keep=True)
-    if outputs.as_json:
-        from pendmap.diagnosis.summary import as_json as fields
-
-        more = {"model": written.name(outputs.out), "simd": instruction_set()}
-        write_json(fields(found) | more)
-    elif not outputs.quiet:
-        from pendmap.diagnosis.result import as_text, ranking_table
-
-        for text in as_text(found):
-            click.echo(text)
-        click.echo()
-        write_table(*ranking_table(found))
-        written.say()
-    written.check()
-    outputs.open_viewer()
-
-
-@contextlib.contextmanager
-def _named(where: str) -> Iterator[None]:
-    """Prefix the message of an InputError with a file or option."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    more = {"model": written.name(outputs.out), "simd": instruction_set()}
+    lines = itertools.chain(as_text(found), ["", table(*ranking_table(found))])
+    outputs.finish(written, lambda: as_json(found) | more, lines)

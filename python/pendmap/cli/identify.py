@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import output_options, quiet_option, rate_option, simd_option
-from pendmap.cli.show import Outputs, progress_bar, write_all, write_json, write_table
+from pendmap.cli.options import output_options, reading_options
+from pendmap.cli.show import Outputs, Written, table, write_all
 from pendmap.cli.types import FILE
-from pendmap.errors import instruction_set
+from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from pendmap.identification import IdentificationReport
@@ -35,9 +36,7 @@ SUFFIX = ".toml"
     metavar="NAME",
     help="Fit this effect of the library too; may be repeated.",
 )
-@rate_option
-@simd_option
-@quiet_option
+@reading_options
 @output_options((SUFFIX,), "Model")
 def command(
     *,
@@ -54,51 +53,42 @@ def command(
     brackets: standard errors in the last digits. Writes identify.toml, a model for --model of every
     other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
     """
-    from pendmap.errors import InputError
     from pendmap.identification import identified_model, identify_experiment
+    from pendmap.identification.report import as_json
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
-    with progress_bar("read", shown=outputs.shows_progress):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    with progress_bar("identify", shown=outputs.shows_progress) as progress:
+    with outputs.progress("identify") as progress:
         report = identify_experiment(
             experiment, methods=methods or None, effects=effects, progress=progress
         )
+
+    def finish(written: Written) -> None:
+        more = {"model": written.name(outputs.out), "simd": instruction_set()}
+        outputs.finish(written, lambda: as_json(report) | more, _lines(report))
+
     try:
         model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
     except InputError:
-        _show(report, outputs)
+        finish(Written())
         raise
-    with progress_bar("write", shown=outputs.shows_progress):
+    with outputs.progress("write"):
         save = functools.partial(save_model, model)
         files = outputs.files(report, save, "draw_identification", "record_identification")
         written = write_all(files, keep=True)
-    _show(report, outputs, written.name(outputs.out))
-    if not outputs.as_json and not outputs.quiet:
-        written.say()
-    written.check()
-    outputs.open_viewer()
+    finish(written)
 
 
-def _show(report: IdentificationReport, outputs: Outputs, model: str | None = None) -> None:
-    if outputs.as_json:
-        from pendmap.identification.report import as_json
-
-        fields = as_json(report) | {"model": model, "simd": instruction_set()}
-        write_json(fields)
-        return
-    if outputs.quiet:
-        return
+def _lines(report: IdentificationReport) -> Iterator[str]:
+    """Yield the doubts, the tables, and what is said of the estimates."""
     from pendmap.identification.report import as_text, foremost, methods_table, table1_table
 
     doubts = [f"Warning: {text}" for text in foremost(report)]
-    for line in doubts:
-        click.echo(line)
+    yield from doubts
     for head, rows in (methods_table(report), table1_table(report)):
         if rows:
-            write_table(head, rows)
-    for line in as_text(report):
-        if line not in doubts:
-            click.echo(line)
+            yield table(head, rows)
+    yield from (line for line in as_text(report) if line not in doubts)

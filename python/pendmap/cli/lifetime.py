@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
-from pendmap.cli.types import Whole
+from pendmap.cli.types import whole
 from pendmap.errors import MOST_PERIODS
 
 if TYPE_CHECKING:
@@ -21,13 +21,13 @@ _STARTS = (100, 10_000_000)
     "lifetime",
     option(
         "--starts",
-        Whole(*_STARTS),
+        whole(*_STARTS),
         "How many are drawn, from -pi to pi and velocities -3 to 3, in SI times w0.",
         40_000,
     ),
     option(
         "--from-period",
-        Whole(0, MOST_PERIODS),
+        whole(0, MOST_PERIODS),
         "Where the exponential tail begins.  [default: estimated from the data]",
     ),
     max_periods_option(

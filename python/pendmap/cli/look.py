@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
-from pendmap.cli.show import Outputs, progress_bar, write_all, write_json
+from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.types import FILE
 
 if TYPE_CHECKING:
@@ -29,16 +29,10 @@ def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa
     reading and reported. The files are not changed.
     """
     from pendmap.records import files_of, read_experiment
-    from pendmap.records.summary import as_json as fields
-    from pendmap.records.summary import as_text
+    from pendmap.records.summary import as_json, as_text
 
     outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
-    with progress_bar("read", shown=outputs.shows_progress):
+    with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     written = write_all(outputs.files(experiment, None, "draw_record"))
-    if outputs.as_json:
-        write_json(fields(experiment))
-    elif not outputs.quiet:
-        click.echo(as_text(experiment))
-        written.say()
-    written.check()
+    outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap import ANALYSES
-from pendmap.errors import FitDiverged, InputError, NotWrittenError, one_line
+from pendmap.errors import FitDiverged, InputError, NotWrittenError, ViewerError, one_line
 from pendmap.files import COMPLETE, STOPS
 
 if TYPE_CHECKING:
@@ -194,34 +194,32 @@ def _interrupted() -> int:
     return INTERRUPTED
 
 
-def _failed(error: BaseException) -> int:  # noqa: PLR0911 (one for each way to end)
+def _failed(error: BaseException) -> int:
+    code, message = BAD_INPUT, str(error)
     match error:
         case click.exceptions.NoArgsIsHelpError():
             click.echo(error.format_message(), err=True)
-            return BAD_INPUT
-        case click.ClickException():
-            return _refuse(error.format_message())
-        case FitDiverged() | InputError():
-            return _refuse(str(error))
+            return code
         case _ReaderGone():
             # No message, and none from the interpreter at exit.
             _silence()
             return 128 + signal.SIGPIPE
+        case click.ClickException():
+            message = error.format_message()
+        case FitDiverged() | InputError() | ViewerError():
+            pass
         case MemoryError():
-            return _refuse(f"not enough memory: {str(error) or 'choose a smaller grid'}")
+            message = f"not enough memory: {message or 'choose a smaller grid'}"
         case NotWrittenError():
-            _say(str(error))
-            return FAILED
+            code = FAILED
         case OSError():
             where = f"{error.filename}: " if error.filename else ""
-            _say(f"{where}{error.strerror or error}")
-            return FAILED if error.errno in _FULL else BAD_INPUT
-    raise error
-
-
-def _refuse(message: str) -> int:
+            message = f"{where}{error.strerror or error}"
+            code = FAILED if error.errno in _FULL else BAD_INPUT
+        case _:
+            raise error
     _say(message)
-    return BAD_INPUT
+    return code
 
 
 def _say(message: str) -> None:

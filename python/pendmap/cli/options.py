@@ -11,8 +11,8 @@ from pendmap.cli.types import (
     INSTRUCTION_SET,
     NUMBER,
     PICTURES,
-    OutputFile,
-    Whole,
+    output_file,
+    whole,
 )
 from pendmap.errors import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
 
@@ -45,35 +45,31 @@ def option(
     return click.option(*names.split(), type=kind, default=default, help=text, **more)
 
 
-def simd_option(function: Command) -> Command:
-    """Add the option of the instruction set, which applies until the command ends."""
-
-    def use(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
-        if value is None:
-            return
-        before = os.environ.get(_SIMD)
-        os.environ[_SIMD] = value
-        if before is None:
-            ctx.call_on_close(lambda: os.environ.pop(_SIMD))
-        else:
-            ctx.call_on_close(lambda: os.environ.update({_SIMD: before}))
-
-    add = click.option(
-        "--simd",
-        type=INSTRUCTION_SET,
-        callback=use,
-        expose_value=False,
-        help="Instruction set: avx512, avx2, sse or portable.  [default: the quickest here]",
-    )
-    return add(function)
+def _use_simd(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
+    """Use an instruction set until the command ends."""
+    if value is None:
+        return
+    before = os.environ.get(_SIMD)
+    os.environ[_SIMD] = value
+    if before is None:
+        ctx.call_on_close(lambda: os.environ.pop(_SIMD))
+    else:
+        ctx.call_on_close(lambda: os.environ.update({_SIMD: before}))
 
 
+simd_option = option(
+    "--simd",
+    INSTRUCTION_SET,
+    "Instruction set: avx512, avx2, sse or portable.  [default: the quickest here]",
+    callback=_use_simd,
+    expose_value=False,
+)
 tol_option = option("--tol", NUMBER, "Error after 5 periods.", 1e-6)
-threads_option = option("--threads", Whole(1, MOST_THREADS), "Threads.  [default: one a processor]")
+threads_option = option("--threads", whole(1, MOST_THREADS), "Threads.  [default: one a processor]")
 quiet_option = click.option("--quiet", is_flag=True, help="No progress, no summary.")
 draws_option = option(
     "--draws",
-    Whole(2, MOST_DRAWS),
+    whole(2, MOST_DRAWS),
     "Number of models drawn from the [covariance] of --model: uncertainty of the result.",
 )
 rate_option = option(
@@ -82,8 +78,8 @@ rate_option = option(
     "Readings a second, for files without a column of times.",
     metavar="HZ",
 )
-plot_option = option("--plot", OutputFile(PICTURES), "Figure: .png .svg .pdf.")
-rerun_option = option("--rerun", OutputFile([".rrd"]), "Rerun recording: .rrd.")
+plot_option = option("--plot", output_file(*PICTURES), "Figure: .png .svg .pdf.")
+rerun_option = option("--rerun", output_file(".rrd"), "Rerun recording: .rrd.")
 view_option = click.option(
     "--view", is_flag=True, help="Write the recording and open the viewer on it."
 )
@@ -97,12 +93,12 @@ def json_option(further: str = "") -> Decorator:
 
 def seed_option(what: str) -> Decorator:
     """Return the option --seed with the help ``what``."""
-    return click.option("--seed", type=Whole(0, MOST_SEED), default=0, help=f"{what}  [default: 0]")
+    return option("--seed", whole(0, MOST_SEED), what, 0)
 
 
 def max_periods_option(what: str) -> Decorator:
     """Return the option --max-periods with the help ``what``."""
-    return click.option("--max-periods", type=Whole(1, MOST_PERIODS), help=what)
+    return option("--max-periods", whole(1, MOST_PERIODS), what)
 
 
 def added(*options: Decorator) -> Decorator:
@@ -117,12 +113,13 @@ def added(*options: Decorator) -> Decorator:
 
 
 progress_options = added(threads_option, simd_option, quiet_option)
+reading_options = added(rate_option, simd_option, quiet_option)
 start_options = added(
     option("--theta", NUMBER, "Angle at the start, rad.", 1.0),
     option("--velocity", NUMBER, "Velocity at the start, in SI rad/s.", 0.0),
 )
 search_options = added(
-    option("--starts", Whole(1, MOST_CELLS), "Starts each.", 9),
+    option("--starts", whole(1, MOST_CELLS), "Starts each.", 9),
     tol_option,
     max_periods_option("Bound after which a start is watched.  [default: depends on damping]"),
     seed_option("Shifts the starts, and draws the models of --draws."),
@@ -133,5 +130,5 @@ search_options = added(
 def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") -> Decorator:
     """Return --out with these suffixes, --plot, --rerun, --view and --json."""
     kinds = " or ".join(suffixes)
-    out = click.option("--out", type=OutputFile(suffixes), help=f"{what}: {kinds}.")
+    out = option("--out", output_file(*suffixes), f"{what}: {kinds}.")
     return added(out, plot_option, rerun_option, view_option, json_option("; alone, no files"))

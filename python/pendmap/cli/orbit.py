@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.options import draws_option, option, seed_option
-from pendmap.cli.types import AXIS, Whole
+from pendmap.cli.types import AXIS, whole
 from pendmap.errors import MOST_CELLS
 
 if TYPE_CHECKING:
@@ -17,13 +17,13 @@ _LONGEST = 64
 
 @analysis_command(
     "orbit",
-    option("--n", Whole(1, _LONGEST), "Smallest period, in drive's.", 1),
-    option("--w", Whole(-MOST_CELLS, MOST_CELLS), "Net turns over it, forward positive.", 0),
+    option("--n", whole(1, _LONGEST), "Smallest period, in drive's.", 1),
+    option("--w", whole(-MOST_CELLS, MOST_CELLS), "Net turns over it, forward positive.", 0),
     option("--theta", AXIS, "Angles of the box, rad.  [default: -pi:pi:200]"),
     option(
         "--velocity", AXIS, "Velocities of the box, in SI rad/s.  [default: depends on n, w and p]"
     ),
-    option("--grid", Whole(1, MOST_CELLS), "Cells on each side of the box."),
+    option("--grid", whole(1, MOST_CELLS), "Cells on each side of the box."),
     draws_option,
     seed_option("Draws the models."),
 )

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import functools
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from pendmap.cli.options import json_option, option, seed_option, simd_option
-from pendmap.cli.show import write_all
-from pendmap.cli.types import PICTURES, OutputFile, default_file
+from pendmap.cli.show import table, write_all, write_json
+from pendmap.cli.types import PICTURES, default_file, output_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-
-    from pendmap.identification import IdentificationReport
 
 
 @click.command("paper")
@@ -29,7 +26,7 @@ if TYPE_CHECKING:
 )
 @option(
     "--plot",
-    OutputFile(PICTURES),
+    output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
 )
 @seed_option("Of the rig's noise.")
@@ -53,6 +50,7 @@ def command(  # noqa: PLR0913 (an option each)
     errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
     Writes figure_1.png to figure_9.png and table_1.csv, as requested.
     """
+    from pendmap.identification.report import methods_table, table1_table
     from pendmap.paper import figures
 
     keys = figures.wanted(" ".join(figure))
@@ -67,10 +65,12 @@ def command(  # noqa: PLR0913 (an option each)
         default_file(folder / _name(key))
     written = write_all(_files(keys, folder, plot, seed))
     if as_json:
-        click.echo(json.dumps({"files": written}))
+        write_json({"files": written})
     elif not quiet:
         if any(Path(name).suffix == ".csv" for name in written):
-            _say(figures.report(seed))
+            found = figures.report(seed)
+            for each in (methods_table(found), table1_table(found), figures.printed_table()):
+                click.echo(table(*each))
         written.say()
     written.check()
 
@@ -85,18 +85,8 @@ def _files(
         if path.suffix != ".csv":
             yield functools.partial(figures.draw, key, seed=seed), path
         if key == figures.TABLE:
-            table = path.with_suffix(".csv")
-            yield lambda to: figures.write_table(figures.report(seed), to), table
-
-
-def _say(found: IdentificationReport) -> None:
-    """Print the results of each method, the errors of its simulation, and the paper's table."""
-    from pendmap.cli.show import write_table
-    from pendmap.identification.report import methods_table, table1_table
-    from pendmap.paper import figures
-
-    for head, rows in (methods_table(found), table1_table(found), figures.printed_table()):
-        write_table(head, rows)
+            csv = path.with_suffix(".csv")
+            yield lambda to: figures.write_table(figures.report(seed), to), csv
 
 
 def _name(key: str) -> str:

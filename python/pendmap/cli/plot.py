@@ -9,8 +9,8 @@ import click
 
 from pendmap.cli.options import option
 from pendmap.cli.show import write_all
-from pendmap.cli.types import FILE, PICTURES, OutputFile, default_file
-from pendmap.errors import InputError
+from pendmap.cli.types import FILE, PICTURES, default_file, output_file
+from pendmap.errors import InputError, named
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("file", type=FILE)
 @option(
     "--out --plot out",
-    OutputFile(PICTURES),
+    output_file(*PICTURES),
     "Figure to write: .png .svg .pdf.  [default: FILE with .png]",
 )
 @click.option(
@@ -56,18 +56,16 @@ def command(  # noqa: PLR0913 (the options above)
     draw = functools.partial(
         render.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
     )
-    try:
-        written = write_all([(draw, target)])
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except MemoryError:
-        raise
-    except Exception as error:
-        # The content of the file is not checked: invalid values may raise any error.
-        raise InputError(
-            f"{file}: cannot be drawn: its content is not a result's: "
-            f"{type(error).__name__}: {error}"
-        ) from error
+    with named(str(file)):
+        try:
+            written = write_all([(draw, target)])
+        except (InputError, MemoryError):
+            raise
+        except Exception as error:
+            # The content of the file is not checked: invalid values may raise any error.
+            raise InputError(
+                f"cannot be drawn: its content is not a result's: {type(error).__name__}: {error}"
+            ) from error
     if written and not quiet:
         written.say()
     written.check()

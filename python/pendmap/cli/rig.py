@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import functools
-import json
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.options import json_option, option
-from pendmap.cli.show import write_all
-from pendmap.cli.types import FILE, NUMBER, PICTURES, OutputFile
+from pendmap.cli.show import write_all, write_json
+from pendmap.cli.types import FILE, NUMBER, PICTURES, output_file
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     from pendmap import virtual_rig
@@ -57,7 +56,7 @@ if TYPE_CHECKING:
 @option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]")
 @option("--c-over-m", NUMBER, "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]")
 @option("--tr friction", NUMBER, "Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]")
-@option("--plot", OutputFile(PICTURES), "Figure of the records: .png .svg .pdf.")
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.")
 @click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
 @click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
 @json_option()
@@ -90,39 +89,30 @@ def command(  # noqa: PLR0913 (an option each)
     request = virtual_rig.Request(name, **given)
     where = virtual_rig.places(out, replace=replace)
     experiment = virtual_rig.make(request)
-    written = write_all(_files(experiment, where, plot))
-    whole = _names(where) in written
+    both = f"{where.experiment}, {where.truth}"
+
+    def write(_: Path) -> str:
+        virtual_rig.write(experiment, where)
+        return both
+
+    files: list[tuple[Callable[[Path], Path | str], Path]] = [(write, where.experiment)]
+    if plot is not None:
+        files.append((functools.partial(_draw, experiment, where.experiment.name), plot))
+    written = write_all(files)
+    whole, drawn = both in written, written.name(plot)
     if as_json:
         places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
-        places |= {"plot": plot} if plot is not None and str(plot) in written else {}
-        click.echo(json.dumps({name: str(path) for name, path in places.items()}))
+        named = {name: str(path) for name, path in places.items()}
+        write_json(named | ({"plot": drawn} if drawn else {}))
     elif not quiet:
         if whole:
             seconds = sum(run.plan.duration for run in experiment.runs)
             runs = counted(len(experiment.runs), "run")
             click.echo(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
             click.echo(f"The truth: {where.truth}")
-        if plot is not None and str(plot) in written:
-            click.echo(f"The records: {plot}")
+        if drawn:
+            click.echo(f"The records: {drawn}")
     written.check()
-
-
-def _files(
-    experiment: virtual_rig.Experiment, where: virtual_rig.Places, plot: Path | None
-) -> Iterator[tuple[Callable[[Path], Path | str], Path]]:
-    from pendmap import virtual_rig
-
-    def both(_: Path) -> str:
-        virtual_rig.write(experiment, where)
-        return _names(where)
-
-    yield both, where.experiment
-    if plot is not None:
-        yield functools.partial(_draw, experiment, where.experiment.name), plot
-
-
-def _names(where: virtual_rig.Places) -> str:
-    return f"{where.experiment}, {where.truth}"
 
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
@@ -148,7 +138,7 @@ def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:
     if as_json:
-        click.echo(json.dumps({"effects": effects}))
+        write_json({"effects": effects})
         return
     for effect in effects:
         click.echo(f"{effect['name']:<26} {effect['formula']}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import importlib
 import json
 import math
 import sys
@@ -15,7 +16,7 @@ import click
 
 from pendmap.cli.options import RESULTS
 from pendmap.cli.types import default_file
-from pendmap.errors import InputError, NotWrittenError, one_line
+from pendmap.errors import InputError, NotWrittenError, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import columns
 
@@ -27,30 +28,6 @@ if TYPE_CHECKING:
     from pendmap.analysis.result import Schema
 
     Write = Callable[[Path], Path | str]
-
-
-@contextlib.contextmanager
-def progress_bar(name: str, *, shown: bool) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a progress bar with the time left on stderr; yield its callback, or None."""
-    if not shown:
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=None)
-
-        def report(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total or None)
-
-        yield report
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +66,10 @@ class Outputs:
         places = {"--out": [outputs.out], "--plot": [outputs.plot], "--rerun": [outputs.rerun]}
         keep_inputs(reads, places | {"--report": _report_files(outputs.report)})
         if outputs.view:
-            check_view()
+            from pendmap import viewer
+
+            with named("--view"):
+                viewer.check_display()
         return outputs
 
     def check_room(self, cells: int) -> None:
@@ -108,6 +88,29 @@ class Outputs:
         """Whether stderr is a terminal and --quiet is not given."""
         return sys.stderr.isatty() and not self.quiet
 
+    @contextlib.contextmanager
+    def progress(self, name: str) -> Iterator[Callable[[int, int], None] | None]:
+        """Show a progress bar with the time left on stderr; yield its callback, or None."""
+        if not self.shows_progress:
+            yield None
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(name, total=None)
+
+            def report(done: int, total: int) -> None:
+                bar.update(task, completed=done, total=total or None)
+
+            yield report
+
     def files(
         self,
         result: Any,  # noqa: ANN401 (a dataset or a report)
@@ -118,39 +121,31 @@ class Outputs:
         """Yield writer and path of each file; import matplotlib and Rerun only when needed."""
         if self.out is not None and save is not None:
             yield save, self.out
-        if self.plot is not None:
-            from pendmap import render
+        for path, module, write in (
+            (self.plot, "render", draw),
+            (self.report, "render", "write_report"),
+            (self.rerun, "viewer", record),
+        ):
+            if path is not None:
+                home = importlib.import_module(f"pendmap.{module}")
+                yield functools.partial(getattr(home, write), result), path
 
-            yield functools.partial(getattr(render, draw), result), self.plot
-        if self.report is not None:
-            from pendmap import render
-
-            yield functools.partial(render.write_report, result), self.report
-        if self.rerun is not None:
+    def finish(
+        self, written: Written, fields: Callable[[], dict[str, Any]], lines: Iterable[str]
+    ) -> None:
+        """Print JSON or lines of text; raise an error if a file is missing; open the viewer."""
+        if self.as_json:
+            write_json(fields())
+        elif not self.quiet:
+            for line in lines:
+                click.echo(line)
+            written.say()
+        written.check()
+        recording = written.name(self.rerun) if self.view else None
+        if recording is not None:
             from pendmap import viewer
 
-            yield functools.partial(getattr(viewer, record), result), self.rerun
-
-    def open_viewer(self) -> None:
-        """Open the viewer on the recording if --view is given."""
-        if not self.view or self.rerun is None:
-            return
-        from pendmap import viewer
-
-        try:
-            viewer.open_viewer(self.rerun)
-        except viewer.ViewerError as error:
-            raise click.ClickException(str(error)) from error
-
-
-def check_view() -> None:
-    """Refuse --view before anything is computed if no window can open."""
-    from pendmap import viewer
-
-    try:
-        viewer.check_display()
-    except viewer.ViewerError as error:
-        raise click.UsageError(f"--view: {error}") from error
+            viewer.open_viewer(recording)
 
 
 def _report_files(report: Path | None) -> list[Path]:
@@ -182,21 +177,11 @@ def keep_inputs(
 
 def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
     """Write the files asked for, then JSON or the summary to stdout."""
+    from pendmap.files.dataset import save
 
-    def save(path: Path) -> Path:
-        from pendmap.files import dataset as stored
-
-        return stored.save(dataset, path)
-
-    written = write_all(outputs.files(dataset, save))
-    if outputs.as_json:
-        write_json(schema.json(dataset))
-    elif not outputs.quiet:
-        click.echo(dataset.attrs["title"])
-        click.echo(dataset.attrs["summary"])
-        written.say()
-    written.check()
-    outputs.open_viewer()
+    written = write_all(outputs.files(dataset, functools.partial(save, dataset)))
+    lines = (dataset.attrs[name] for name in ("title", "summary"))
+    outputs.finish(written, lambda: schema.json(dataset), lines)
 
 
 def write_json(fields: dict[str, Any]) -> None:
@@ -254,10 +239,10 @@ def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Wri
     return written
 
 
-def write_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write a table with a bold header and aligned columns, whatever the terminal's width."""
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with a bold header and aligned columns, whatever the terminal's width."""
     first, *others = columns(head, rows).split("\n")
-    click.echo("\n".join([click.style(first, bold=True), *others]))
+    return "\n".join([click.style(first, bold=True), *others])
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from pendmap.cli.model_options import begin, model_options
 from pendmap.cli.options import option, output_options, simd_option, start_options
 from pendmap.cli.show import show
-from pendmap.cli.types import NUMBER, Whole
-from pendmap.errors import MOST_SAMPLES, InputError
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pendmap.model import Pendulum, Rig
-    from pendmap.viewer import Live
-
+from pendmap.cli.types import NUMBER, whole
+from pendmap.errors import MOST_SAMPLES, named
 
 _VIEWER = "127.0.0.1:9876"
 
@@ -27,7 +20,7 @@ _VIEWER = "127.0.0.1:9876"
 @start_options
 @option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0)
 @option("--tol", NUMBER, "Error after 5 periods.", 1e-9)
-@option("--samples", Whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
+@option("--samples", whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
 @click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
 @click.option(
     "--live",
@@ -50,35 +43,21 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     address = given.pop("live")
     model, outputs = begin(given, "simulate")
     start = (given.pop("theta"), given.pop("velocity"))
-    live = None if address is None else _sender(model, start, address)
+    live = None
+    if address is not None:  # connected before anything is computed
+        from pendmap import viewer
+
+        with named("--live"):
+            live = viewer.Live(model, start, address)
 
     from pendmap.analysis.trajectory import SCHEMA, simulate
 
     dataset = simulate(model, *start, given.pop("until"), live=live, **given)
-    gone = None if live is None else _finished(live, dataset)
-    show(dataset, outputs, SCHEMA)
-    if gone is not None:
-        raise click.ClickException(f"--live: {gone}")
+    try:
+        if live is not None:
+            with named("--live"):
+                live.finish(dataset)
+    finally:  # without the viewer files are written too
+        show(dataset, outputs, SCHEMA)
     if dataset.attrs.get("interrupted"):
         raise KeyboardInterrupt
-
-
-def _sender(model: Pendulum | Rig, start: tuple[float, float], address: str) -> Live:
-    """Return a connection to the viewer, made before anything is computed."""
-    from pendmap import viewer
-
-    try:
-        return viewer.Live(model, start, address)
-    except (viewer.ViewerError, InputError) as error:
-        raise click.UsageError(f"--live: {error}") from error
-
-
-def _finished(live: Live, dataset: xr.Dataset) -> Exception | None:
-    """Send the last samples; return an error, to be raised after the files are written."""
-    from pendmap import viewer
-
-    try:
-        live.finish(dataset)
-    except viewer.ViewerError as error:
-        return error
-    return None

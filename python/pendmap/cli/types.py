@@ -15,7 +15,7 @@ from pendmap.errors import MOST_CELLS, InputError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
 T = TypeVar("T")
 
@@ -59,22 +59,20 @@ def _number(text: str) -> float:
     return number
 
 
-class Whole(OptionType[int]):
-    """A whole number between two bounds, both included."""
+def whole(least: int, most: int) -> OptionType[int]:
+    """Return the type of whole numbers between two bounds, both included."""
 
-    def __init__(self, least: int, most: int) -> None:
-        super().__init__("integer", functools.partial(_whole, least, most))
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if not least <= number <= most:
+            wanted = f"must be a whole number from {least} to {most}"
+            raise InputError(f"{wanted}, got {short_repr(text)}")
+        return number
 
-
-def _whole(least: int, most: int, text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        number = least - 1
-    if not least <= number <= most:
-        wanted = f"must be a whole number from {least} to {most}"
-        raise InputError(f"{wanted}, got {short_repr(text)}")
-    return number
+    return OptionType("integer", read)
 
 
 class AxisText(NamedTuple):
@@ -85,23 +83,14 @@ class AxisText(NamedTuple):
     cells: int
 
 
-def _axis(text: str) -> AxisText:
-    """Read N cells between two bounds."""
-    axis = _bounded(text, "N cells between A and B, like -pi:pi:1000", "cells")
-    if axis.low == axis.high:
-        raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
-    return axis
-
-
-def _range(text: str) -> AxisText:
-    """Read N values from one bound to the other, or one value with both bounds."""
-    axis = _bounded(text, "N values from A to B, both included, like 0.5:2:100", "values")
-    if axis.low == axis.high and axis.cells > 1:
-        raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
-    return axis
-
-
-def _bounded(text: str, meaning: str, counts: str) -> AxisText:
+def _axis(
+    text: str,
+    meaning: str = "N cells between A and B, like -pi:pi:1000",
+    counts: str = "cells",
+    *,
+    single: bool = False,
+) -> AxisText:
+    """Read N cells between two bounds; a ``single`` value may have two equal ones."""
     wanted = f"must be A:B:N, {meaning}, got {text!r}"
     parts = text.split(":")
     if len(parts) != 3:  # noqa: PLR2004
@@ -110,11 +99,18 @@ def _bounded(text: str, meaning: str, counts: str) -> AxisText:
         low, high, count = _value(parts[0]), _value(parts[1]), int(parts[2])
     except (ValueError, ZeroDivisionError):
         raise InputError(wanted) from None
-    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+    rising = low < high or (single and low == high and count <= 1)
+    if not (math.isfinite(low) and math.isfinite(high) and rising):
         raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
     if not 1 <= count <= MOST_CELLS:
         raise InputError(f"must have 1 to {MOST_CELLS} {counts}, got {count}: {text!r}")
     return AxisText(low, high, count)
+
+
+def _range(text: str) -> AxisText:
+    """Read N values from one bound to the other, or one value with both bounds."""
+    meaning = "N values from A to B, both included, like 0.5:2:100"
+    return _axis(text, meaning, "values", single=True)
 
 
 def _values(text: str) -> list[float]:
@@ -138,11 +134,9 @@ def _instruction_set(text: str) -> str:
     return text
 
 
-class OutputFile(OptionType[Path]):
-    """A file to write: its suffix and folder are checked before anything is computed."""
-
-    def __init__(self, suffixes: Sequence[str]) -> None:
-        super().__init__("file", functools.partial(_output, tuple(suffixes)))
+def output_file(*suffixes: str) -> OptionType[Path]:
+    """Return the type of files to write, whose suffix and folder are checked first of all."""
+    return OptionType("file", functools.partial(_output, suffixes))
 
 
 def _output(suffixes: tuple[str, ...], text: str) -> Path:
@@ -168,7 +162,7 @@ def _output(suffixes: tuple[str, ...], text: str) -> Path:
 
 def default_file(name: str | Path) -> Path:
     """Return the path of a file that no option names; refuse it if it cannot be written."""
-    return OutputFile([Path(name).suffix]).convert(str(name), None, None)
+    return output_file(Path(name).suffix).convert(str(name), None, None)
 
 
 def _report(text: str) -> Path:

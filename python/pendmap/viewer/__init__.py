@@ -9,29 +9,24 @@ from __future__ import annotations
 
 import functools
 import importlib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pendmap.charts import registry
-from pendmap.files import whole_file
-from pendmap.viewer import (
-    basins,
-    chart,
-    frame,
-    trajectory,
-)
+from pendmap.errors import ViewerError
+from pendmap.viewer import basins, chart, frame, trajectory
+from pendmap.viewer.frame import SUFFIXES
 from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
 from pendmap.viewer.window import (
     NoDisplayError,
     NotARecordingError,
     RecordingNotFoundError,
-    ViewerError,
     check_display,
     open_viewer,
 )
 
 if TYPE_CHECKING:
     import os
+    from pathlib import Path
 
     import xarray as xr
 
@@ -54,11 +49,6 @@ __all__ = [
     "record_discrepancy",
     "record_identification",
 ]
-
-SUFFIXES = (".rrd",)  # File suffix of a recording
-
-CELLS = 4096
-"""Most rows and columns of an image; not all graphics processors take larger ones."""
 
 _KINDS = {
     "basins": (basins.blueprint, basins.log),
@@ -127,13 +117,13 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         layout, log = _KINDS[kind]
         view = layout(dataset)
     else:
-        made = registry.build(dataset, cells=CELLS)
+        made = registry.build(dataset, cells=basins.CELLS)
         view, log = chart.blueprint(made), functools.partial(chart.log, chart=made)
-    with (
-        whole_file(path, SUFFIXES) as part,
-        frame.strict(),
-        frame.written(frame.recording(dataset), view, part) as recording,
-    ):
-        frame.describe(recording, dataset)
-        log(recording, dataset)
-    return Path(path)
+    return frame.save(
+        path,
+        view,
+        lambda stream: log(stream, dataset),
+        name=": ".join(str(dataset.attrs[k]) for k in ("kind", "title") if k in dataset.attrs),
+        content=frame.identifier(dataset),
+        known=frame.properties(dataset),
+    )

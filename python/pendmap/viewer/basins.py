@@ -44,12 +44,9 @@ def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
         )
         for one in shown
     ]
-    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
-        tabs.append(
-            _around_attractors(dataset, listed).view(
-                ROOTS["labels"], "Its attractor, once a period"
-            )
-        )
+    alone = _around_attractors(dataset, listed)
+    if alone is not None:
+        tabs.append(alone.view(ROOTS["labels"], "Its attractor, once a period"))
     aside = rrb.Vertical(
         rrb.TextDocumentView(origin="/legend", name="Legend"),
         rrb.TextDocumentView(origin="/summary", name="Summary"),
@@ -73,8 +70,8 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
             _scalar(stream, dataset, around, one)
         if one == "labels" or not layering.finite_time(dataset):
             _attractors(stream, ROOTS[one], dataset, around, named=one == "labels")
-    if layering.finite_time(dataset) and any(len(entry.points) for entry in listed):
-        alone = _around_attractors(dataset, listed)
+    alone = _around_attractors(dataset, listed)
+    if alone is not None:
         alone.log(stream, ROOTS["labels"])
         _attractors(stream, ROOTS["labels"], dataset, alone, named=False)
 
@@ -84,13 +81,13 @@ def _frame(dataset: xr.Dataset) -> frame.Frame:
     return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
 
 
-def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame:
-    """Return a frame that contains every attractor's points, for a plane without a map."""
-    velocity = np.concatenate([entry.points[:, 1] for entry in listed])
-    low, high = float(velocity.min()), float(velocity.max())
-    pad = max(0.06 * (high - low), 0.05)
-    theta = plane.angles(dataset, np.concatenate([entry.points[:, 0] for entry in listed]))
-    return frame.Frame.phase(theta, (low - pad, high + pad), Units.of(dataset.attrs))
+def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame | None:
+    """Return a frame that contains every attractor's points, for a plane without a map of them."""
+    points = np.concatenate([np.empty((0, 2)), *(entry.points for entry in listed)])
+    if not (layering.finite_time(dataset) and len(points)):
+        return None
+    theta, velocity = plane.angles(dataset, points[:, 0]), plane.padded(points[:, 1])
+    return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:
@@ -121,13 +118,20 @@ def _classes(dataset: xr.Dataset, shift: int) -> list[Any]:
 
 
 def _labels(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame) -> None:
-    """Log the labels, shifted by 1: 0 failed, 1 undecided, 2 the first attractor."""
+    """Log the labels, shifted by 1 (0 failed, 1 undecided, 2 the first attractor), and a legend."""
     label = plane.pixels(dataset, dataset["label"], CELLS)
     kind = np.uint8 if len(legend.colours(dataset)) <= np.iinfo(np.uint8).max else np.uint16
     shifted = np.add(label, 1, dtype=np.int16).astype(kind)
     stream.log(ROOTS["labels"], rr.AnnotationContext(_classes(dataset, 1)), static=True)
     _image(stream, around, "labels", rr.SegmentationImage(shifted, opacity=1.0), label.shape)
-    _swatches(stream, legend.entries(dataset), around)
+    listed = legend.entries(dataset)
+    at = [
+        (125.0 + 250.0 * (k % 4), around.height + 170.0 + 110.0 * (k // 4))
+        for k in range(len(listed))
+    ]
+    if listed:
+        named = [(legend.typeset(e.name), palette.rgb(e.name, e.kind)) for e in listed]
+        frame.legend(stream, "basin/axes/legend", at, named, size=8.0, below=16.0)
 
 
 def _scalar(
@@ -216,53 +220,33 @@ def _attractors(
 ) -> None:
     """Log the attractors' points; points of orbits have two rings, and a name at the first one."""
     path = f"{root}/data/attractors"
-    spots: list[tuple[float, float]] = []
-    orbits: list[tuple[float, float]] = []
-    names: list[tuple[tuple[float, float], str]] = []
-    colours: list[tuple[int, int, int]] = []
-    tints: list[tuple[int, int, int]] = []
-    sizes: list[float] = []
+    shown = []
     for entry in legend.entries(dataset):
         at = plane.copies(dataset, entry.points, *around.x)
         at = at[(at[:, 1] >= around.y[0]) & (at[:, 1] <= around.y[1])]
-        here = [(float(x), float(v)) for x, v in at]
-        spots += here
-        colours += [palette.rgb(entry.name, entry.kind)] * len(here)
-        sizes += [1.2 if entry.chaotic else 5.0] * len(here)
-        if here and not entry.chaotic:
-            orbits += here
-            names.append((here[0], legend.typeset(entry.name)))
-            tints.append(_tint(palette.rgb(entry.name, entry.kind)))
+        if len(at):
+            shown.append((entry, at, palette.rgb(entry.name, entry.kind)))
+    orbits = [each for each in shown if not each[0].chaotic]
     rings = (("outline", 8.0, (30, 30, 30), 41.0), ("ring", 6.8, (250, 250, 250), 42.0))
     for name, size, colour, order in rings if orbits else ():
+        places = np.concatenate([at for _, at, _ in orbits])
         radius = rr.Radius.ui_points(size)
-        ring = rr.Points2D(orbits, colors=[colour], radii=radius, draw_order=order)
+        ring = rr.Points2D(places, colors=[colour], radii=radius, draw_order=order)
         stream.log(f"{path}/{name}", ring, static=True)
-    if spots:
-        radii = rr.Radius.ui_points(sizes)
-        points = rr.Points2D(spots, colors=colours, radii=radii, draw_order=43.0)
+    if shown:
+        points = rr.Points2D(
+            np.concatenate([at for _, at, _ in shown]),
+            colors=[colour for _, at, colour in shown for _ in at],
+            radii=rr.Radius.ui_points(
+                [1.2 if e.chaotic else 5.0 for e, at, _ in shown for _ in at]
+            ),
+            draw_order=43.0,
+        )
         stream.log(path, points, static=True)
-    if named and names:
-        places, texts = [at for at, _ in names], [text for _, text in names]
-        frame.write(stream, f"{path}/names", places, texts, colours=tints)
-
-
-def _swatches(stream: rr.RecordingStream, listed: list[legend.Entry], around: frame.Frame) -> None:
-    """Log the legend below the map: a spot of each colour with the name below it."""
-    at = [
-        (125.0 + 250.0 * (k % 4), around.height + 170.0 + 110.0 * (k // 4))
-        for k in range(len(listed))
-    ]
-    if not at:
-        return
-    spots = rr.Points2D(
-        at,
-        colors=[palette.rgb(e.name, e.kind) for e in listed],
-        radii=rr.Radius.ui_points(8.0),
-    )
-    stream.log("basin/axes/legend", spots, static=True)
-    names = [legend.typeset(e.name) for e in listed]
-    frame.write(stream, "basin/axes/legend/names", [(x, y + 16.0) for x, y in at], names)
+    if named and orbits:
+        texts = [legend.typeset(entry.name) for entry, *_ in orbits]
+        tints = [_tint(colour) for *_, colour in orbits]
+        frame.write(stream, f"{path}/names", [at[0] for _, at, _ in orbits], texts, colours=tints)
 
 
 def _tint(colour: tuple[int, int, int]) -> tuple[int, int, int]:

@@ -80,13 +80,17 @@ def _values(mark: Mark, which: str) -> npt.ArrayLike:
     return []
 
 
+def places(chart: Chart) -> list[Place]:
+    """Return the panels with a mark in the recording, each with its position."""
+    recorded = (
+        panel for panel in chart.recorded or chart.panels if any(mark.path for mark in panel.marks)
+    )
+    return [Place.of(panel, chart.ratio) for panel in recorded]
+
+
 def blueprint(chart: Chart) -> rrb.Blueprint:
     """Return the layout: the panels, with legend and summary beside them."""
-    views = [
-        Place.of(panel, chart.ratio).frame.view(panel.where, _title(panel))
-        for panel in chart.recorded or chart.panels
-        if _recorded(panel)
-    ]
+    views = [one.frame.view(one.panel.where, _title(one.panel)) for one in places(chart)]
     front: rrb.Container = rrb.Vertical(*views)
     if chart.tabs:
         front = rrb.Tabs(*views, active_tab=0)
@@ -104,17 +108,13 @@ def _title(panel: Panel) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _recorded(panel: Panel) -> bool:
-    return any(mark.path for mark in panel.marks)
-
-
 def log(stream: rr.RecordingStream, dataset: xr.Dataset, chart: Chart) -> None:
     """Log every panel of a chart, the legend and the dataset's summary, all static."""
     frame.summary(stream, dataset)
     named: dict[str, str] = {}
+    for place in places(chart):
+        log_panel(stream, place)
     for panel in chart.recorded or chart.panels:
-        if _recorded(panel):
-            log_panel(stream, Place.of(panel, chart.ratio))
         named |= legend(panel.marks)
     lines = [f"- {name}: {shade}" for name, shade in named.items()]
     frame.text(stream, "legend", "\n".join([*lines, "", chart.remark]).strip() or chart.title)

@@ -11,11 +11,12 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
 from pendmap.analysis.trajectory import simulate
-from pendmap.errors import InputError
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.table1 import first_state
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pendmap.charts.marks import Floats
     from pendmap.identification import IdentificationReport
     from pendmap.records import Run
@@ -86,32 +87,26 @@ def comparisons(report: IdentificationReport) -> list[Comparison]:
 
 def _simulated(report: IdentificationReport) -> Comparison:
     """Return the decay with a simulation from its first peak, if a method found a model."""
-    run = report.run
+    run, best, curve = report.run, report.sound, None
     peaks = report.peaks if run.peaks_only else _in_turn(report.peaks, run)
-    try:
-        best = report.best
-    except InputError:
-        best = None
-    never = np.full(run.time.size, math.nan)
-    if best is None or not len(peaks.turned) or best.method in report.table.lost:
-        w0 = math.pi / float(np.median(np.diff(peaks.time))) if len(peaks) > 1 else 0.0
-        return (
-            _of_peaks(run, peaks, None, 0.0)
-            if run.peaks_only
-            else _drawn(run, (never, never, never), peaks, w0, peaks.sigma)
+    w0 = 0.0
+    if best is not None and len(peaks.turned) and best.method not in report.table.lost:
+        w0, start = best.rig.w0, first_state(peaks)
+        zero = best["offset"] if "offset" in best.estimates else 0.0
+        until = max(float(run.time[-1]) - start.time, 1e-3)
+        made = simulate(best.rig, start.theta - zero, 0.0, until)
+        curve = CubicHermiteSpline(
+            made["time"].values + start.time, made["theta"].values + zero, made["velocity"].values
         )
-    start = first_state(peaks)
-    zero = best["offset"] if "offset" in best.estimates else 0.0
-    until = max(float(run.time[-1]) - start.time, 1e-3)
-    made = simulate(best.rig, start.theta - zero, 0.0, until)
-    curve = CubicHermiteSpline(
-        made["time"].values + start.time, made["theta"].values + zero, made["velocity"].values
-    )
+    elif len(peaks) > 1:
+        w0 = math.pi / float(np.median(np.diff(peaks.time)))
     if run.peaks_only:
-        return _of_peaks(run, peaks, curve, best.rig.w0)
-    model, speed = curve(run.time, extrapolate=False), curve(run.time, 1, extrapolate=False)
+        return _of_peaks(run, peaks, curve, w0)
+    model = speed = np.full(run.time.size, math.nan)
+    if curve is not None:
+        model, speed = (curve(run.time, order, extrapolate=False) for order in (0, 1))
     residual = np.where(run.trusted, run.theta - model, math.nan)
-    return _drawn(run, (model, speed, residual), peaks, best.rig.w0, peaks.sigma)
+    return _drawn(run, (model, speed, residual), peaks, w0, peaks.sigma)
 
 
 def _of_peaks(run: Run, peaks: Peaks, curve: CubicHermiteSpline | None, w0: float) -> Comparison:
@@ -144,49 +139,47 @@ def _drawn(
     run: Run, columns: tuple[Floats, Floats, Floats], peaks: Peaks, w0: float, sigma: float
 ) -> Comparison:
     """Return model, its velocity and the residual for a run, thinned and cut at gaps."""
-    step = float(np.median(np.diff(run.time)))
-    kept, cuts, instants = drawn_at(run.time, w0)
-    model, model_speed, residual = columns
-    record, speed, made, made_speed, left = (
-        np.insert(column[kept], cuts, math.nan)
-        for column in (run.theta, _speed(run, w0, step), model, model_speed, residual)
+    out = np.where(run.trusted, 0.0, 1.0)
+    instants, record, speed, out, *model, residual = thinned(
+        run.time, w0, run.theta, _speed(run, w0), out, *columns
     )
-    there = bool(np.isfinite(made).any())
+    if not np.isfinite(model[0]).any():
+        model = [np.empty(0), np.empty(0)]
     return Comparison(
         name=run.name,
         time=instants,
         record=record,
         speed=speed,
-        left_out=np.insert(~run.trusted[kept], cuts, values=False),
-        model_time=instants if there else np.empty(0),
-        model=made if there else np.empty(0),
-        model_speed=made_speed if there else np.empty(0),
-        residual=left,
+        left_out=out == 1,
+        model_time=instants[: model[0].size],
+        model=model[0],
+        model_speed=model[1],
+        residual=residual,
         peaks=_in_turn(peaks, run),
         sigma=sigma,
     )
 
 
-def drawn_at(time: Floats, w0: float) -> tuple[slice, npt.NDArray[np.int64], Floats]:
-    """Return the drawn samples of a run, the positions of gaps among them, and all instants (s).
+def thinned(time: Floats, w0: float, *columns: Floats) -> Iterator[Floats]:
+    """Yield the drawn instants of a run (s), and columns at these, with NaN in gaps.
 
     ``w0`` is the natural frequency in rad/s, 0 if unknown.
     """
     step = float(np.median(np.diff(time)))
     swing = math.tau / w0 / step if w0 else math.inf
     every = max(1, min(-(-time.size // INSTANTS), int(min(swing, time.size) / PER_SWING)))
-    kept = slice(None, None, every)
-    chosen = time[kept]
+    chosen = time[::every]
     cuts = np.flatnonzero(np.diff(chosen) > GAP * every * step) + 1
     ends = (chosen[cuts - 1] + chosen[cuts]) / 2
-    return kept, cuts, np.insert(chosen, cuts, ends)
+    yield np.insert(chosen, cuts, ends)
+    yield from (np.insert(column[::every], cuts, math.nan) for column in columns)
 
 
-def _speed(run: Run, w0: float, step: float) -> Floats:
+def _speed(run: Run, w0: float) -> Floats:
     """Return the measured velocity, or else differences between trusted samples."""
     if run.velocity is not None:
         return np.where(run.trusted, run.velocity, math.nan)
-    speed = np.full(run.time.size, math.nan)
+    speed, step = np.full(run.time.size, math.nan), float(np.median(np.diff(run.time)))
     reach = max(1, round(SLOPE * math.tau / w0 / step / 2)) if w0 else 1
     if run.time.size > 2 * reach:
         time, theta = run.time, run.theta

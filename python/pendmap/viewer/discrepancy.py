@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from pendmap import report
 from pendmap.charts import diagnosis, names
 from pendmap.viewer import chart, frame, runs
-from pendmap.viewer.comparison import drawn_at
+from pendmap.viewer.comparison import thinned
 from pendmap.viewer.runs import Series
 
 if TYPE_CHECKING:
@@ -107,17 +107,20 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     arrays = (a for one in shown for a in (one.time, one.record, one.before, one.after))
 
     def log(stream: rr.RecordingStream) -> None:
+        frame.text(stream, "summary", report.as_markdown(report.diagnosis(found), {}))
         for number, one in enumerate(shown, 1):
             _log(stream, f"run_{number}", one, larger)
         for place in panels:
             chart.log_panel(stream, place)
 
     gap = found.gap
-    return runs.write(
+    return frame.save(
         path,
-        source.name,
-        runs.content_of((found.verdict, estimates), arrays),
-        {
+        frame.screen(rrb.Tabs(*tabs, active_tab=worst), aside, shares=[5, 3]),
+        log,
+        name=f"diagnosis of {source.name}",
+        content=runs.content_of((found.verdict, estimates), arrays),
+        known={
             "kind": "diagnosis",
             "verdict": found.verdict,
             "effects": ", ".join(effect.name for effect in found.effects),
@@ -128,9 +131,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
             "held_out_after": gap.held_out_after,
             "deviations_drawn_larger": larger,
         },
-        report.as_markdown(report.diagnosis(found), {}),
-        frame.screen(rrb.Tabs(*tabs, active_tab=worst), aside, shares=[5, 3]),
-        log,
+        own_layout=True,
     )
 
 
@@ -163,11 +164,8 @@ def _left(run: FitRun, fit: TrajectoryFit, place: int) -> Floats:
 
 
 def _drawn(run: FitRun, left: list[Floats], name: str, w0: float) -> Beside:
-    kept, cuts, instants = drawn_at(run.time, w0)
-    record, before, after = (
-        np.insert(column[kept], cuts, math.nan) for column in (run.theta, *left)
-    )
     sigma = float(np.sqrt(np.mean(np.square(run.sigma))))
+    instants, record, before, after = thinned(run.time, w0, run.theta, *left)
     return Beside(name, instants, record, before, after, sigma)
 
 
@@ -187,11 +185,8 @@ def _views(root: str, one: Beside, larger: float) -> rrb.Container:
         visual_bounds=rrb.VisualBounds2D(x_range=[-APART / 2, 2.5 * APART], y_range=[-1.15, 1.5]),
     )
     below = [
-        rrb.TimeSeriesView(origin=f"/{root}/{leaf}", name=name, plot_legend=runs.LEGEND)
-        for leaf, name in (
-            ("angle", f"{names.ANGLE}, {one.name}"),
-            ("residual", "Record less model (mrad)"),
-        )
+        runs.view(f"{root}/angle", f"{names.ANGLE}, {one.name}"),
+        runs.view(f"{root}/residual", "Record less model (mrad)"),
     ]
     return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4], name=one.name)
 

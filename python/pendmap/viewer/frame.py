@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +13,17 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.charts import names, plane
+from pendmap.files import whole_file
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from pathlib import Path
+    import os
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import numpy.typing as npt
     import xarray as xr
+
+SUFFIXES = (".rrd",)  # File suffix of a recording
 
 INK = (150, 150, 150)  # Mid grey of lines and labels: the background may be light or dark
 
@@ -30,8 +34,8 @@ SHORT = 8  # Greatest number of letters of an axis name beside the ticks
 TIMELINE = "sim_time"
 
 
-def recording(dataset: xr.Dataset) -> rr.RecordingStream:
-    """Return an empty recording, identified by the dataset's content."""
+def identifier(dataset: xr.Dataset) -> str:
+    """Return an identifier of a dataset's content."""
     attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
     known = ("label", "regime", "entry_theta", "theta", "theta_point", "p", "p_melnikov")
@@ -39,14 +43,11 @@ def recording(dataset: xr.Dataset) -> rr.RecordingStream:
     content.update(np.ascontiguousarray(dataset[telling].values).data)
     for name in sorted(map(str, dataset.indexes)):  # identifies the selected part of a result
         content.update(repr((name, dataset[name].values.tolist())).encode())
-    return identified(content.hexdigest())
+    return content.hexdigest()
 
 
 def identified(name: str, application: str = "pendmap") -> rr.RecordingStream:
-    """Return an empty recording with an identifier, without the time of day.
-
-    The viewer shows all recordings of an application in the layout of the one opened first.
-    """
+    """Return an empty recording with an identifier, without the time of day."""
     stream = rr.RecordingStream(application, recording_id=name, send_properties=False)
     stream.set_log_time_enabled(False)
     return stream
@@ -63,33 +64,49 @@ def strict() -> Iterator[None]:
         rr.set_strict_mode(before)
 
 
-@contextlib.contextmanager
-def written(
-    stream: rr.RecordingStream, layout: rrb.BlueprintLike, path: Path
-) -> Iterator[rr.RecordingStream]:
-    """Collect the data logged in the block in memory, with a layout, and write them at the end.
+def save(  # noqa: PLR0913 (what it is, and how it is shown)
+    path: str | os.PathLike[str],
+    layout: rrb.BlueprintLike,
+    log: Callable[[rr.RecordingStream], None],
+    *,
+    name: str,
+    content: str,
+    known: Mapping[str, object],
+    own_layout: bool = False,
+) -> Path:
+    """Write a recording that ``log`` fills, with its name, identifier and known properties.
 
-    The library's own file output blocks indefinitely when the disk is full.
+    A layout holds for all recordings of an application: with ``own_layout`` this recording has its
+    own application. Data are collected in memory, because the library's own file output blocks
+    indefinitely when the disk is full.
     """
-    try:
-        with stream:
-            memory = stream.memory_recording()
-            stream.send_blueprint(layout, make_active=False, make_default=True)
-            yield stream
-            stream.flush()
-            path.write_bytes(memory.drain_as_bytes())
-    finally:
-        stream.disconnect()
+    application = f"pendmap {known['kind']} {content[:6]}" if own_layout else "pendmap"
+    with whole_file(path, SUFFIXES) as part, strict():
+        stream = identified(content, application)
+        try:
+            with stream:
+                memory = stream.memory_recording()
+                stream.send_blueprint(layout, make_active=False, make_default=True)
+                stream.send_recording_name(name)
+                stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
+                log(stream)
+                stream.flush()
+                part.write_bytes(memory.drain_as_bytes())
+        finally:
+            stream.disconnect()
+    return Path(path)
 
 
-def describe(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the recording's name and, as properties, all attributes of the dataset."""
-    attrs = dataset.attrs
-    stream.send_recording_name(": ".join(str(attrs[k]) for k in ("kind", "title") if k in attrs))
-    plain = {
-        str(k): _plain(v) for k, v in attrs.items() if k != "summary" and _plain(v) is not None
+def properties(dataset: xr.Dataset) -> dict[str, float | str]:
+    """Return the attributes of a dataset that are text or numbers, without its summary.
+
+    A property keeps one type in all recordings of a process, so whole numbers become floats.
+    """
+    return {
+        str(name): value if isinstance(value, str) else float(value)
+        for name, value in dataset.attrs.items()
+        if name != "summary" and isinstance(value, (str, bool, int, float, np.generic))
     }
-    stream.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **plain))
 
 
 def summary(stream: rr.RecordingStream, dataset: xr.Dataset, *further: str) -> None:
@@ -252,6 +269,22 @@ def write(
     stream.log(path, points, static=True)
 
 
+def legend(  # noqa: PLR0913 (where, what, how)
+    stream: rr.RecordingStream,
+    path: str,
+    places: Sequence[tuple[float, float]],
+    parts: Sequence[tuple[str, tuple[int, int, int]]],
+    *,
+    size: float | Sequence[float],
+    below: float,
+) -> None:
+    """Log a spot of each colour, with its name at a distance below it."""
+    names, colours = zip(*parts, strict=True)
+    spots = rr.Points2D(places, colors=colours, radii=rr.Radius.ui_points(size))
+    stream.log(path, spots, static=True)
+    write(stream, f"{path}/names", [(x, y + below) for x, y in places], names)
+
+
 def pieces(
     lines: Iterable[npt.NDArray[np.float64]],
     low: npt.ArrayLike = -np.inf,
@@ -269,13 +302,3 @@ def pieces(
         parts = zip(np.split(line, cuts), np.split(there, cuts), strict=True)
         found += [part for part, seen in parts if len(part) > 1 and seen.all()]
     return found
-
-
-def _plain(value: object) -> float | str | None:
-    """Return a property's value as a number or text, or None for another type.
-
-    A property keeps one type in all recordings of a process, so whole numbers become floats.
-    """
-    if isinstance(value, str):
-        return value
-    return float(value) if isinstance(value, (bool, int, float, np.generic)) else None

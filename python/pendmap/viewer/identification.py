@@ -90,24 +90,27 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
     estimates = [(n, k, e.value) for n, m in report.methods.items() for k, e in m.estimates.items()]
 
     def log(stream: rr.RecordingStream) -> None:
+        frame.text(stream, "summary", "\n".join(_page(report)))
         for number, one in enumerate(shown, 1):
             _log(stream, f"run_{number}", one, w0)
 
-    return runs.write(
+    return frame.save(
         path,
-        Path(report.experiment.path).name,
-        runs.content_of(estimates, (a for one in shown for a in (one.time, one.record, one.model))),
-        _known(report),
-        "\n".join(_page(report)),
         frame.screen(front, aside, shares=[5, 2]),
         log,
+        name=f"identification of {Path(report.experiment.path).name}",
+        content=runs.content_of(
+            estimates, (a for one in shown for a in (one.time, one.record, one.model))
+        ),
+        known=_known(report),
+        own_layout=True,
     )
 
 
 def _known(report: IdentificationReport) -> dict[str, float | str]:
     """Return the properties of a recording: the estimates of the best method."""
     known: dict[str, float | str] = {"kind": "identification"}
-    best = next((found for found in report.methods.values() if found.sound), None)
+    best = report.sound
     if best is not None:
         known["method"] = best.method
         for name, each in best.estimates.items():
@@ -121,7 +124,7 @@ def _known(report: IdentificationReport) -> dict[str, float | str]:
 
 def _page(report: IdentificationReport) -> Iterator[str]:
     """Yield tables of the estimates with intervals, and all warnings."""
-    best = next((found for found in report.methods.values() if found.sound), None)
+    best = report.sound
     if best is None:
         yield from ("**No method could be applied.**", "")
     else:
@@ -171,32 +174,15 @@ def _views(root: str, one: Comparison, w0: float) -> rrb.Container:
         end=rrb.TimeRangeBoundary.cursor_relative(seconds=around),
     )
     right: list[rrb.View] = [
-        rrb.TimeSeriesView(
-            origin=f"/{root}/angle",
-            name=f"{names.ANGLE}, {one.name}",
-            axis_x=_whole(one),
-            plot_legend=runs.LEGEND,
-        ),
-        rrb.TimeSeriesView(
-            origin=f"/{root}/angle",
-            name=f"{names.ANGLE}, near the cursor",
-            time_ranges=[close],
-            plot_legend=runs.LEGEND,
-        ),
+        runs.view(f"{root}/angle", f"{names.ANGLE}, {one.name}", axis_x=_whole(one)),
+        runs.view(f"{root}/angle", f"{names.ANGLE}, near the cursor", time_ranges=[close]),
     ]
     if np.isfinite(one.residual).any():
         # The axis contains the residuals used and the band of the noise.
         least = max(1.5 * runs.BAND * one.sigma, 1e-12)
         reach = 1.05 * runs.MILLI * max(float(np.nanmax(np.abs(one.residual))), least)
-        right.append(
-            rrb.TimeSeriesView(
-                origin=f"/{root}/residual",
-                name="Record less model (mrad)",
-                axis_x=_whole(one),
-                axis_y=rrb.ScalarAxis(range=(-reach, reach)),
-                plot_legend=runs.LEGEND,
-            )
-        )
+        axes = {"axis_x": _whole(one), "axis_y": rrb.ScalarAxis(range=(-reach, reach))}
+        right.append(runs.view(f"{root}/residual", "Record less model (mrad)", **axes))
     return rrb.Horizontal(
         rrb.Vertical(*left), rrb.Vertical(*right), column_shares=[3, 4], name=one.name
     )
@@ -251,15 +237,10 @@ def _pendulums(stream: rr.RecordingStream, path: str, one: Comparison) -> None:
         parts.append((MODEL, one.model_time, one.model, BROAD))
     for look, time, theta, size in parts:
         runs.pendulum(stream, f"{path}/data/{look.name}", time, theta, look, size)
-    places = [[REACH * x, REACH + 0.1] for x in (-0.5, 0.5)][: len(parts)]
-    legend = rr.Points2D(
-        places,
-        colors=[look.colour for look, *_ in parts],
-        radii=rr.Radius.ui_points([bob for *_, (_, bob, _) in parts]),
-    )
-    stream.log(f"{path}/axes/legend", legend, static=True)
-    below = [[x, y + 0.05] for x, y in places]
-    frame.write(stream, f"{path}/axes/legend/names", below, [look.name for look, *_ in parts])
+    places = [(REACH * x, REACH + 0.1) for x in (-0.5, 0.5)][: len(parts)]
+    named = [(look.name, look.colour) for look, *_ in parts]
+    bobs = [bob for *_, (_, bob, _) in parts]
+    frame.legend(stream, f"{path}/axes/legend", places, named, size=bobs, below=0.05)
 
 
 def _phase(stream: rr.RecordingStream, path: str, one: Comparison) -> None:

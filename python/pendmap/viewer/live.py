@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, ViewerError
 from pendmap.viewer import frame, trajectory
-from pendmap.viewer.window import ViewerError
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -116,10 +115,9 @@ class Live:
             If the viewer is no longer there.
         """
         self._send()
-        velocity = dataset["velocity"].values
+        motion = trajectory.motion_of(dataset)
         with frame.strict():
-            self._frame(velocity)
-            motion = trajectory.Motion(dataset["time"].values, dataset["theta"].values, velocity)
+            self._frame(motion[2])
             trajectory.curve(self._stream, self._attrs, motion)
             trajectory.summary(self._stream, dataset)
         try:
@@ -136,15 +134,15 @@ class Live:
         self._waiting = []
         trajectory.refuse_beyond(time, velocity)
         with frame.strict():
-            self._widen(velocity)
+            fastest = float(np.abs(velocity).max())
+            if fastest > self._around.y[1]:
+                self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
             early = self._sent < _MOVING
             bins = trajectory.BINS if early else _LATER
-            motion = trajectory.Motion(time, theta, velocity)
-            trajectory.series(self._stream, self._attrs, motion, bins)
+            trajectory.series(self._stream, self._attrs, block, bins)
             whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
             every = 1 if early else -(-time.size // _LATER)
-            motion = trajectory.Motion(*whole)
-            trajectory.moving(self._stream, self._attrs, motion, since=since, every=every)
+            trajectory.moving(self._stream, self._attrs, whole, since=since, every=every)
             period = np.round(time / self._period).astype(np.int64)
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
             trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
@@ -152,13 +150,8 @@ class Live:
         kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
         self._before = whole[:, -kept:]
 
-    def _widen(self, velocity: Floats) -> None:
-        """Redraw the frames if the motion exceeds their velocities."""
-        fastest = float(np.abs(velocity).max())
-        if fastest > self._around.y[1]:
-            self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
-
     def _frame(self, velocity: Floats) -> None:
+        """Draw the frames anew, for these velocities."""
         self._around = trajectory.frame_of(self._attrs, velocity)
         trajectory.still(self._stream, self._attrs, self._around)
         self._stream.send_blueprint(trajectory.layout(self._attrs, self._around))

@@ -5,22 +5,19 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.errors import InputError
-from pendmap.files import whole_file
 from pendmap.formatting import MINUS
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import Look
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable
 
     from pendmap.charts.marks import Floats
 
@@ -40,28 +37,6 @@ class Series:
     size: float = 3.0
 
 
-def write(  # noqa: PLR0913, PLR0917 (where, what, and how it is shown)
-    path: str | os.PathLike[str],
-    source: str,
-    content: str,
-    known: Mapping[str, float | str],
-    page: str,
-    layout: rrb.Blueprint,
-    log: Callable[[rr.RecordingStream], None],
-) -> Path:
-    """Write a recording with its name, properties (including ``kind``) and page of text."""
-    kind = known["kind"]
-    with whole_file(path, (".rrd",)) as part, frame.strict():
-        # A layout holds for all recordings of an application, so this one has its own application.
-        recording = frame.identified(content, f"pendmap {kind} {content[:6]}")
-        with frame.written(recording, layout, part):
-            recording.send_recording_name(f"{kind} of {source}")
-            recording.send_property("pendmap", rr.AnyValues(drop_untyped_nones=True, **known))
-            frame.text(recording, "summary", page)
-            log(recording)
-    return Path(path)
-
-
 def content_of(found: object, arrays: Iterable[Floats]) -> str:
     """Return an identifier of the recorded content, which changes with readings and estimates."""
     digest = hashlib.blake2b(repr(found).encode(), digest_size=12)
@@ -77,6 +52,11 @@ def refuse_late(name: object, times: Iterable[Floats]) -> None:
         raise InputError(
             f"{name}: time is {latest:g} s: a recording holds up to {columns.LATEST:g} s"
         )
+
+
+def view(path: str, name: str, **axes: Any) -> rrb.TimeSeriesView:  # noqa: ANN401 (of the view)
+    """Return the view of the time series under a path."""
+    return rrb.TimeSeriesView(origin=f"/{path}", name=name, plot_legend=LEGEND, **axes)
 
 
 def series(

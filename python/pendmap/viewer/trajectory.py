@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,18 +55,9 @@ _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
 }
 
 
-@dataclass(frozen=True)
-class Motion:
-    """Samples of a trajectory: times, angles, velocities, three arrays of equal length."""
-
-    time: Floats
-    theta: Floats
-    velocity: Floats
-
-    def part(self, first: int, last: int) -> Motion:
-        """Return the samples from index ``first`` up to, but excluding, ``last``."""
-        cut = slice(first, last)
-        return Motion(self.time[cut], self.theta[cut], self.velocity[cut])
+def motion_of(dataset: xr.Dataset) -> Floats:
+    """Return times, angles and velocities of a trajectory, shape (3, n)."""
+    return np.stack([dataset[name].values for name in ("time", "theta", "velocity")], dtype=float)
 
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
@@ -109,20 +99,17 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log everything in columns, on the timeline ``sim_time`` and, once a period, ``period``."""
-    time = dataset["time"].values.astype(float)
-    theta = dataset["theta"].values.astype(float)
-    velocity = dataset["velocity"].values.astype(float)
+    attrs, motion = dataset.attrs, motion_of(dataset)
+    time, _, velocity = motion
     refuse_beyond(time, velocity)
-    attrs = dataset.attrs
     still(stream, attrs, frame_of(attrs, velocity))
     summary(stream, dataset)
-    motion = Motion(time, theta, velocity)
     series(stream, attrs, motion, BINS)
     first, last = min(time.size, MOVING), max(time.size - MOVING, MOVING)
-    moving(stream, attrs, motion.part(0, first))
+    moving(stream, attrs, motion[:, :first])
     if last < time.size:
         rest(stream, float(time[first]))
-        moving(stream, attrs, motion.part(last, time.size))
+        moving(stream, attrs, motion[:, last:])
     curve(stream, attrs, motion)
     section(
         stream,
@@ -184,26 +171,22 @@ def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) ->
     )
 
 
-def series(stream: rr.RecordingStream, attrs: Attributes, motion: Motion, bins: int) -> None:
+def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
     """Log angle, velocity and energy against time, by their extremes in each of ``bins`` bins."""
-    units, theta, velocity = Units.of(attrs), motion.theta, motion.velocity
-    for name, values in (
-        ("theta", theta),
-        ("omega", velocity),
-        ("energy", energy(theta, velocity, attrs)),
-    ):
-        said, colour = _STATE[name]
+    units, (time, theta, velocity) = Units.of(attrs), motion
+    every = (theta, velocity, energy(theta, velocity, attrs))
+    for (name, (said, colour)), values in zip(_STATE.items(), every, strict=True):
         path = f"state/{name}"
         style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
         stream.log(path, style, static=True)
-        at, shown = plane.envelope(motion.time, values, bins)
+        at, shown = plane.envelope(time, values, bins)
         stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
 
 
 def moving(
     stream: rr.RecordingStream,
     attrs: Attributes,
-    motion: Motion,
+    motion: Floats,
     *,
     since: int = 0,
     every: int = 1,
@@ -214,7 +197,7 @@ def moving(
     -(p / omega^2) cos(omega tau + phase). Samples before ``since`` are already logged and only used
     for the trail; every ``every``-th of the others is logged.
     """
-    time, theta, velocity = motion.time, motion.theta, motion.velocity
+    time, theta, velocity = motion
     omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))
     stroke = math.copysign(_stroke(attrs), float(attrs["p"]))
     tau = Units.of(attrs).bare(time, TIME)
@@ -254,12 +237,13 @@ def rest(stream: rr.RecordingStream, time: float) -> None:
     stream.reset_time()
 
 
-def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Motion) -> None:
+def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Floats) -> None:
     """Log the phase-plane curve of the last periods, broken where the angle wraps."""
     period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
-    first = int(np.searchsorted(motion.time, motion.time[-1] - CURVE_PERIODS * period))
-    first = max(first, motion.time.size - CURVE)
-    points = plane.broken_at_wrap(motion.theta[first:], motion.velocity[first:])
+    time, theta, velocity = motion
+    first = int(np.searchsorted(time, time[-1] - CURVE_PERIODS * period))
+    first = max(first, time.size - CURVE)
+    points = plane.broken_at_wrap(theta[first:], velocity[first:])
     lines = rr.LineStrips2D(
         [points.astype(np.float32)], colors=[LINE], radii=rr.Radius.ui_points(0.6)
     )

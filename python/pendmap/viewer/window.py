@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, ViewerError
 
 MAGIC = b"RRF2"  # First bytes of a recording
 
@@ -22,10 +22,6 @@ PATIENCE = 2.0  # Time in which a viewer that cannot start is expected to exit, 
 _NO_DISPLAY = "there is no display (DISPLAY is not set)"
 
 _RUNNING: list[subprocess.Popen[bytes]] = []  # running viewers, referenced to avoid warnings
-
-
-class ViewerError(RuntimeError):
-    """The viewer cannot be started."""
 
 
 class NoDisplayError(ViewerError):
