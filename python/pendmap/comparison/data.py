@@ -14,12 +14,10 @@ from pendmap.identification.readings import Reading, as_fit_run, reading_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Fractions of a run held out if no whole run is: a fifth in all, at large and small swings."""

@@ -28,16 +28,14 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
     Simulated = Callable[[Floats, Floats, Floats], Floats]
 
 
@@ -329,7 +327,7 @@ def _members(
     time: Floats,
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
-) -> tuple[Itineraries, NDArray[np.bool_]]:
+) -> tuple[Itineraries, Mask]:
     """Return the itineraries of the members, and which members stayed finite."""
     draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
     count, many = starts[0].size, max(1, _AT_ONCE // time.size)

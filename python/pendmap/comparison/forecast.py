@@ -34,9 +34,8 @@ if TYPE_CHECKING:
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
-    Mask = NDArray[np.bool_]
 
 REACH: Final = 2 / 3
 """Length of forecasts over the median stretch; starts are spread over the rest of a stretch."""

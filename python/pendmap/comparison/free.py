@@ -33,13 +33,10 @@ from pendmap.records.summary import doubt_lines, doubts, finding_lines
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors, Table1
     from pendmap.records import Run
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 MODEL = "model"  # Name of the model in table 1

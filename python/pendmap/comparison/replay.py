@@ -14,13 +14,11 @@ from pendmap.model.rig import own_name
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
     States = Sequence[tuple[float, float]]
 
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")

@@ -15,9 +15,7 @@ from pendmap.comparison.itinerary import LONGEST
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 SAMPLES: Final = 64  # Samples of a cycle per forcing period

@@ -42,12 +42,10 @@ from scipy.special import fdtr, fdtrc
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 CERTAIN: Final = 1e9  # Number of amplitudes that represents an exactly known noise level
 

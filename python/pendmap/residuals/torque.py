@@ -26,14 +26,12 @@ from pendmap.identification.sensitivity import window_slopes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import ResidualNoise
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 OVER: Final = {
     "angle": "rad",
