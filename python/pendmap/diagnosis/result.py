@@ -7,7 +7,7 @@ import functools
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
-from pendmap.comparison.further import Reasons
+from pendmap.comparison.replay import Reasons
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.next_experiment.limits import Advice, advise
 from pendmap.diagnosis.scores import Scores
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.further import Reasons
+    from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.functions import FunctionScore
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel

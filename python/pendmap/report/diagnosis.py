@@ -6,8 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendmap.comparison.further import Reasons, compute_part
-from pendmap.comparison.replay import effect_strength
+from pendmap.comparison.replay import Reasons, compute_part, effect_strength
 from pendmap.diagnosis.result import ranking_table, zeroed
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.model.labels import unit_of
