@@ -58,8 +58,7 @@ def command(  # noqa: PLR0913 (an option each)
     that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     from pendmap.comparison import Ensemble, compare
-    from pendmap.comparison.free import as_json as fields
-    from pendmap.comparison.free import as_text, tables
+    from pendmap.comparison.experiment import as_json as fields
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubt_lines
 
@@ -74,12 +73,13 @@ def command(  # noqa: PLR0913 (an option each)
         more = {"model": str(model), "simd": instruction_set()}
         write_json(fields(comparison) | more)
     elif not outputs.quiet:
+        tables, lines = comparison.text_parts()
         doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
         for line in doubts:
             click.echo(line)
-        for table in tables(comparison):
+        for table in tables:
             write_table(*table)
-        for line in as_text(comparison):
+        for line in lines:
             if line not in doubts:
                 click.echo(line)
         written.say()

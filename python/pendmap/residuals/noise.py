@@ -279,8 +279,9 @@ def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     weights = prior * np.exp(-0.5 * (deviance - deviance.min()))
     weights /= weights.sum()
     keep = weights > FAINT * weights.max()
-    every = weights, grid.colours * grid.shares, grid.shapes, scales
-    return Laws(*(values[keep] for values in every), np.where(own, number, total))
+    correlations = (grid.colours * grid.shares)[keep]
+    sizes = np.where(own, number, total)
+    return Laws(weights[keep], correlations, grid.shapes[keep], scales[keep], sizes)
 
 
 @dataclasses.dataclass(frozen=True)
