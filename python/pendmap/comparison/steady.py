@@ -162,23 +162,22 @@ def folded(
 
 
 def reached(
-    simulated: Callable[[Floats, Floats, Floats], Floats],
-    starts: tuple[float, Floats, Floats],
+    simulated: Callable[[Floats, Floats], Floats],
+    begin: float,
+    starts: Floats,
     period: float,
     damping: float,
 ) -> tuple[Reached, ...]:
     """Return the cycles that a model reaches, the most frequent first.
 
-    ``simulated`` returns readings at times (s) from initial angles and velocities (rad, rad/s);
-    ``starts`` are the initial time on the run's clock, angles and velocities; ``damping`` is
-    ``c/m``, 1/s.
+    ``simulated`` returns readings from initial states at times, s, of which the first is ``begin``;
+    ``starts``, shape (2, M), are angles and velocities (rad, rad/s); ``damping`` is ``c/m``, 1/s.
     """
-    begin, theta, velocity = starts
     rate = 0.5 * damping * period
     periods = min(max(_DECAY / rate if rate else math.inf, _FOLLOWED[0]), _FOLLOWED[1])
     first = math.ceil(begin / period) + math.ceil(periods)
     times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
-    readings = simulated(theta, velocity, np.concatenate([[begin], times]))
+    readings = simulated(starts, np.concatenate([[begin], times]))
     groups: list[tuple[Cycle, int]] = []
     for row in readings[:, 1:]:
         cycle = _closed(row, period)
@@ -191,7 +190,7 @@ def reached(
         else:
             groups.append((cycle, 1))
     groups.sort(key=lambda group: -group[1])
-    return tuple(Reached(cycle, count / theta.size) for cycle, count in groups)
+    return tuple(Reached(cycle, count / len(readings)) for cycle, count in groups)
 
 
 def _closed(row: Floats, period: float) -> Cycle | None:
