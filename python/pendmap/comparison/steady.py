@@ -79,15 +79,6 @@ class Cycle:
             return kind_of("inverted_rest" if upside_down else "rest", 1, 0)
         return kind_of("oscillation", self.n, 0)
 
-    def moved(self, periods: int) -> Cycle:
-        """Return the cycle shifted by whole forcing periods."""
-        at = periods * SAMPLES
-        turned = math.tau * self.w
-        theta = np.concatenate([self.theta[at:], self.theta[:at] + turned])
-        return dataclasses.replace(
-            self, theta=theta, velocity=np.concatenate([self.velocity[at:], self.velocity[:at]])
-        )
-
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
         """Return the least rms difference to another cycle, rad, and this cycle shifted to it.
 
@@ -97,13 +88,13 @@ class Cycle:
         if (self.n, self.w) != (other.n, other.w):
             return math.inf, self
         best = (math.inf, self)
-        for periods in range(self.n):
-            one = self.moved(periods)
-            turns = round(float(np.mean(other.theta - one.theta)) / math.tau)
-            one = dataclasses.replace(one, theta=one.theta + math.tau * turns)
-            apart = math.sqrt(float(np.mean((one.theta - other.theta) ** 2)))
+        for at in range(0, self.n * SAMPLES, SAMPLES):
+            theta = np.concatenate([self.theta[at:], self.theta[:at] + math.tau * self.w])
+            theta += math.tau * round(float(np.mean(other.theta - theta)) / math.tau)
+            apart = math.sqrt(float(np.mean((theta - other.theta) ** 2)))
             if apart < best[0]:
-                best = apart, one
+                velocity = np.roll(self.velocity, -at)
+                best = apart, dataclasses.replace(self, theta=theta, velocity=velocity)
         return best
 
 
