@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import numbers
-import operator
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -116,16 +115,15 @@ def check_number(name: str, value: object) -> float:
 def check_whole(name: str, value: object, least: int, most: int) -> int:
     """Return a whole number from ``least`` to ``most`` as an int; refuse 2.0 and ``bool``."""
     value = _bare(value)
-    wanted = f"{name} must be a whole number from {least} to {most}"
-    if isinstance(value, bool):
-        raise InputError(f"{wanted}, got {value}")
-    try:
-        result = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise InputError(f"{wanted}, got {short_repr(value)}") from None
-    if not least <= result <= most:
-        raise InputError(f"{wanted}, got {short_repr(result)}")
-    return result
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, numbers.Integral)
+        or not least <= int(value) <= most
+    ):
+        raise InputError(
+            f"{name} must be a whole number from {least} to {most}, got {short_repr(value)}"
+        )
+    return int(value)
 
 
 def shown_key(key: object) -> str:

@@ -13,8 +13,8 @@ from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.identification import error_panels, residuals
 from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Span, Text
 from pendmap.charts.methods import MEASURED, look, nothing
+from pendmap.comparison.experiment import written
 from pendmap.comparison.forced import ForcedComparison
-from pendmap.comparison.forced_summary import written
 from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.formatting import counted
 from pendmap.identification.readings import as_angles

@@ -55,7 +55,7 @@ def command(  # noqa: PLR0913 (an option each)
     that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
     """
     from pendmap.comparison import Ensemble, compare
-    from pendmap.comparison.free import as_json, as_text, tables
+    from pendmap.comparison.experiment import as_json
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import doubt_lines
 
@@ -68,9 +68,10 @@ def command(  # noqa: PLR0913 (an option each)
     written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-    lines = itertools.chain(
+    tables, lines = comparison.text_parts()
+    text = itertools.chain(
         doubts,
-        (table(*each) for each in tables(comparison)),
-        (line for line in as_text(comparison) if line not in doubts),
+        (table(*each) for each in tables),
+        (line for line in lines if line not in doubts),
     )
-    outputs.finish(written, lambda: as_json(comparison) | more, lines)
+    outputs.finish(written, lambda: as_json(comparison) | more, text)

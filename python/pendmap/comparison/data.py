@@ -14,12 +14,10 @@ from pendmap.identification.readings import Reading, as_fit_run, reading_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Fractions of a run held out if no whole run is: a fifth in all, at large and small swings."""
@@ -101,23 +99,19 @@ def split_records(experiment: Experiment) -> DataSplit:
         raise InputError(f"{experiment.path}: one run or more must have samples, none has")
     experiment.refuse_still(runs)
     runs = tuple(run for run in runs if run.moves)
-    made = [run for run in runs if run.accelerometer is not None]
-    if made:
-        raise InputError(
-            f"{made[0].name}: its angle is computed from an acceleration, whose own errors are not"
-            " among the effects: it must be a record with an angle"
-        )
-    rated = [run for run in runs if run.gyroscope is not None]
-    if rated:
-        raise InputError(
-            f"{rated[0].name}: its angle is an integrated velocity, whose errors add up: it must be"
-            " a record with an angle"
-        )
-    adrift = [run for run in runs if run.kind == "forced" and not (run.drive or run.pivot)]
-    if adrift:
-        raise InputError(
-            f"{adrift[0].name}: a forced run must have drive or pivot, neither is given"
-        )
+    for run in runs:
+        if run.accelerometer is not None:
+            raise InputError(
+                f"{run.name}: its angle is computed from an acceleration, whose own errors are not"
+                " among the effects: it must be a record with an angle"
+            )
+        if run.gyroscope is not None:
+            raise InputError(
+                f"{run.name}: its angle is an integrated velocity, whose errors add up: it must be"
+                " a record with an angle"
+            )
+        if run.kind == "forced" and not (run.drive or run.pivot):
+            raise InputError(f"{run.name}: a forced run must have drive or pivot, neither is given")
     readings = _readings(runs)
     every = [
         average_blocks(as_fit_run(run, reading))

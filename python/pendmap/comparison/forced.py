@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -19,7 +20,7 @@ from pendmap.errors import (
     core_errors,
 )
 from pendmap.identification.fit import fit_runs
-from pendmap.identification.readings import as_angles, as_fit_run, reading_of_run
+from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import bare_run, rig_of
 from pendmap.identification.sensitivity import window_slopes
 from pendmap.signal.robust import intervals_of
@@ -28,17 +29,14 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
-    from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
+    from pendmap.signal import Floats, Mask
 
-    Floats = NDArray[np.float64]
-    Simulated = Callable[[Floats, Floats, Floats], Floats]
+    Simulated = Callable[[Floats, Floats], Floats]
 
 
 _AT_ONCE: Final = 4_000_000  # Samples held in memory at once
@@ -103,8 +101,8 @@ class Start:
         """Standard errors of angle and velocity, rad and rad/s."""
         return tuple(np.sqrt(np.diag(self.covariance)).tolist())
 
-    def drawn(self, count: int, spread: float, w0: float, seed: int) -> tuple[Floats, Floats]:
-        """Return random initial states about this one, which is the first, shapes (count,).
+    def drawn(self, count: int, spread: float, w0: float, seed: int) -> Floats:
+        """Return random initial states about this one, which is the first, shape (2, count).
 
         Their distribution is normal, with this covariance plus ``spread^2`` in angle and ``(spread
         w0)^2`` in velocity.
@@ -112,7 +110,7 @@ class Start:
         wide = self.covariance + np.diag([spread**2, (spread * w0) ** 2])
         drawn = np.random.default_rng(seed).multivariate_normal(np.zeros(2), wide, count)
         drawn[0] = 0.0
-        return self.theta + drawn[:, 0], self.velocity + drawn[:, 1]
+        return np.array([[self.theta], [self.velocity]]) + drawn.T
 
 
 def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
@@ -130,12 +128,12 @@ def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
 
 
 def simulated_readings(
-    run: FitRun, model: Rig, starts: tuple[Floats, Floats], times: Floats, threads: int | None
+    run: FitRun, model: Rig, starts: Floats, times: Floats, threads: int | None
 ) -> Floats:
     """Return readings of a model under the drive or pivot motion of a run, rad, shape (M, N).
 
-    ``starts`` are M angles and velocities (rad, rad/s) at the first of N times (s, on the run's
-    clock). Readings are not wrapped, and NaN after an overflow.
+    ``starts``, shape (2, M), are angles and velocities (rad, rad/s) at the first of N times (s, on
+    the run's clock). Readings are not wrapped, and NaN after an overflow.
     """
     from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
@@ -262,36 +260,31 @@ def compare_forced(
     worth = reading_of_run(run)
     given = as_fit_run(run, worth)
     fit = fit_runs([given], model, free=(), profiled=())
-    found_phase = [each for name, each in fit.estimates.items() if name.startswith("phi")]
-    if given.drive is not None and found_phase:
-        given = dataclasses.replace(given, drive={**given.drive, "phi": found_phase[0].value})
+    phase = next((e for name, e in fit.estimates.items() if name.startswith("phi")), None)
+    given = dataclasses.replace(given, drive=fit.drive_of(given, 0))
     start = start_of(fit, given)
-    time, measured = _evenly(run, worth, given, start.time)
+    time, measured = _evenly(run, given, start.time)
     period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
     own = Itineraries.of(measured[None], ruler)
-    theta, velocity = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
-
-    def simulated(theta: Floats, velocity: Floats, times: Floats) -> Floats:
-        return simulated_readings(given, model, (theta, velocity), times, threads)
-
-    made, kept = _members(simulated, (theta, velocity), time, ruler, progress)
+    starts = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
+    simulated = functools.partial(simulated_readings, given, model, threads=threads)
+    made, kept = _members(simulated, starts, time, ruler, progress)
     if not kept.any():
         raise InputError(f"{run.name}: the model overflows from every start")
-    theta, velocity = theta[kept], velocity[kept]
+    starts = starts[:, kept]
     statistics = tuple(
         Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
         for name, unit, key in _STATISTICS
     )
     place = _example(statistics)
-    reading = simulated(theta[place, None], velocity[place, None], time)[0]
+    reading = simulated(starts[:, [place]], time)[0]
     found = None
     if period is not None and own.n[0]:
         closes, since = (int(own.n[0]), int(own.w[0])), time[0] + float(own.settled[0])
-        starts = start.time, theta[:_FOLLOWED], velocity[:_FOLLOWED]
         found = steady.compared(
             steady.folded(time, measured, period, closes, since),
-            steady.reached(simulated, starts, period, model.c_over_m),
+            steady.reached(simulated, start.time, starts[:, :_FOLLOWED], period, model.c_over_m),
         )
     return ForcedComparison(
         run=run,
@@ -299,44 +292,43 @@ def compare_forced(
         rms=fit.rms,
         windows=len(fit.windows),
         start=start,
-        phase=found_phase[0] if found_phase else None,
+        phase=phase,
         time=time,
         measured=measured,
         velocity=ruler.velocity(measured),
         example=(reading, ruler.velocity(reading)),
-        lost=ensemble.members - theta.size,
+        lost=int((~kept).sum()),
         statistics=statistics,
         steady=found,
         ensemble=ensemble,
     )
 
 
-def _evenly(run: Run, worth: Reading, given: FitRun, begin: float) -> tuple[Floats, Floats]:
+def _evenly(run: Run, given: FitRun, begin: float) -> tuple[Floats, Floats]:
     """Return equally spaced times from the initial state on, and the record's angle at them."""
     tick = intervals_of(run.time).tick
     time = np.arange(begin, given.time[-1] + 0.5 * tick, tick)
-    resting = [s for s in run.segments if s.what == "rest"]
     known = run.trusted.copy()
-    for rest in resting:
-        known |= (run.time >= rest.from_s) & (run.time <= rest.to_s)
-    angle = run.theta if run.rod_sensor is not None else as_angles(run) - worth.shift
-    return time, np.interp(time, given.time[known], angle[known])
+    for segment in run.segments:
+        if segment.what == "rest":
+            known |= (run.time >= segment.from_s) & (run.time <= segment.to_s)
+    return time, np.interp(time, given.time[known], given.angle[known])
 
 
 def _members(
     simulated: Simulated,
-    starts: tuple[Floats, Floats],
+    starts: Floats,
     time: Floats,
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
-) -> tuple[Itineraries, NDArray[np.bool_]]:
+) -> tuple[Itineraries, Mask]:
     """Return the itineraries of the members, and which members stayed finite."""
     draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
-    count, many = starts[0].size, max(1, _AT_ONCE // time.size)
+    count, many = starts.shape[1], max(1, _AT_ONCE // time.size)
     parts, kept = [], np.zeros(count, dtype=bool)
     for first in range(0, count, many):
         own = slice(first, first + many)
-        reading = simulated(starts[0][own], starts[1][own], time)
+        reading = simulated(starts[:, own], time)
         kept[own] = np.isfinite(reading).all(axis=1)
         noise = draw.normal(0.0, ruler.sigma, reading.shape)
         parts.append(Itineraries.of((reading + noise)[kept[own]], ruler))

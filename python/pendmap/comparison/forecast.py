@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.further import Reasons, compute_part
-from pendmap.comparison.replay import Motion, fit_states, run_forward
+from pendmap.comparison.replay import Motion, Reasons, compute_part, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
@@ -27,16 +26,13 @@ from pendmap.identification.table1 import errors_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Fits
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
+    from pendmap.signal import Floats, Indices, Mask
 
-    Floats = NDArray[np.float64]
-    Mask = NDArray[np.bool_]
 
 REACH: Final = 2 / 3
 """Length of forecasts over the median stretch; starts are spread over the rest of a stretch."""
@@ -89,7 +85,7 @@ class _Launch:
     stretch: _Stretch
     behind: Mask  # Readings of the swing before, to which the state is fitted
     ahead: Mask  # Held-out readings up to the horizon
-    bins: NDArray[np.int64]  # Bin of the horizon of each reading ahead
+    bins: Indices  # Bin of the horizon of each reading ahead
 
 
 def compare_forecasts(
@@ -153,7 +149,7 @@ def _launches(stretch: _Stretch, reach: float, swing: float, count: int) -> list
         later = stretch.run.time - at
         behind = stretch.good & (later > -swing) & (later <= 0)
         ahead = stretch.held & (later > 0) & (later <= reach)
-        bins = np.minimum((later[ahead] / reach * count).astype(np.int64), count - 1)
+        bins = np.minimum((later[ahead] / reach * count).astype(np.intp), count - 1)
         if np.count_nonzero(behind) >= FEWEST:
             found.append(_Launch(stretch, behind, ahead, bins))
     return found

@@ -17,7 +17,8 @@ from scipy.signal import savgol_filter
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats, Mask
+
     Whole = NDArray[np.int64]
 
 
@@ -140,7 +141,7 @@ def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
     return n, w, settled
 
 
-def _last(true: NDArray[np.bool_]) -> Whole:
+def _last(true: Mask) -> Whole:
     """Return the last true index of each row, -1 if there is none."""
     size = true.shape[-1]
     found = size - 1 - np.argmax(true[:, ::-1], axis=-1)

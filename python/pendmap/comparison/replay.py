@@ -1,10 +1,14 @@
-"""Integration of a fitted model from given initial states."""
+"""Integration of a fitted model from given initial states.
+
+A fitted model may diverge in another record, from another state or with another size of an effect.
+The part of a diagnosis that needs this motion is then omitted, and the reason is kept.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,16 +16,21 @@ from pendmap.identification.fit import fit_runs
 from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Callable, Mapping, Sequence
 
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
     States = Sequence[tuple[float, float]]
+
+Reasons = dict[str, str]  # Reason why a part was not computed, by its field in the JSON object
+
+Part = TypeVar("Part")
+
+LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
+"""Errors raised by a diverging motion, directly or in arithmetic and linear algebra with it."""
 
 OWN: Final = ("w0", "c_over_m", "Tr", "torque")
 """Parameters kept apart from the model, whose damping cannot be negative as a fitted one can."""
@@ -35,6 +44,15 @@ STEP: Final = 1e-3
 
 EXACT: Final = 1e-9
 """Nominal standard error of readings, rad, which sets the integrator's tolerance."""
+
+
+def compute_part(reasons: Reasons, field: str, compute: Callable[[], Part], default: Part) -> Part:
+    """Return a part of a diagnosis, or the default if it fails, with the reason in ``reasons``."""
+    try:
+        return compute()
+    except LOST as error:
+        reasons[field] = str(error)
+        return default
 
 
 class Fits(NamedTuple):

@@ -15,9 +15,7 @@ from pendmap.comparison.itinerary import LONGEST
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 
 SAMPLES: Final = 64  # Samples of a cycle per forcing period
@@ -81,15 +79,6 @@ class Cycle:
             return kind_of("inverted_rest" if upside_down else "rest", 1, 0)
         return kind_of("oscillation", self.n, 0)
 
-    def moved(self, periods: int) -> Cycle:
-        """Return the cycle shifted by whole forcing periods."""
-        at = periods * SAMPLES
-        turned = math.tau * self.w
-        theta = np.concatenate([self.theta[at:], self.theta[:at] + turned])
-        return dataclasses.replace(
-            self, theta=theta, velocity=np.concatenate([self.velocity[at:], self.velocity[:at]])
-        )
-
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
         """Return the least rms difference to another cycle, rad, and this cycle shifted to it.
 
@@ -99,13 +88,13 @@ class Cycle:
         if (self.n, self.w) != (other.n, other.w):
             return math.inf, self
         best = (math.inf, self)
-        for periods in range(self.n):
-            one = self.moved(periods)
-            turns = round(float(np.mean(other.theta - one.theta)) / math.tau)
-            one = dataclasses.replace(one, theta=one.theta + math.tau * turns)
-            apart = math.sqrt(float(np.mean((one.theta - other.theta) ** 2)))
+        for at in range(0, self.n * SAMPLES, SAMPLES):
+            theta = np.concatenate([self.theta[at:], self.theta[:at] + math.tau * self.w])
+            theta += math.tau * round(float(np.mean(other.theta - theta)) / math.tau)
+            apart = math.sqrt(float(np.mean((theta - other.theta) ** 2)))
             if apart < best[0]:
-                best = apart, one
+                velocity = np.roll(self.velocity, -at)
+                best = apart, dataclasses.replace(self, theta=theta, velocity=velocity)
         return best
 
 
@@ -164,23 +153,22 @@ def folded(
 
 
 def reached(
-    simulated: Callable[[Floats, Floats, Floats], Floats],
-    starts: tuple[float, Floats, Floats],
+    simulated: Callable[[Floats, Floats], Floats],
+    begin: float,
+    starts: Floats,
     period: float,
     damping: float,
 ) -> tuple[Reached, ...]:
     """Return the cycles that a model reaches, the most frequent first.
 
-    ``simulated`` returns readings at times (s) from initial angles and velocities (rad, rad/s);
-    ``starts`` are the initial time on the run's clock, angles and velocities; ``damping`` is
-    ``c/m``, 1/s.
+    ``simulated`` returns readings from initial states at times, s, of which the first is ``begin``;
+    ``starts``, shape (2, M), are angles and velocities (rad, rad/s); ``damping`` is ``c/m``, 1/s.
     """
-    begin, theta, velocity = starts
     rate = 0.5 * damping * period
     periods = min(max(_DECAY / rate if rate else math.inf, _FOLLOWED[0]), _FOLLOWED[1])
     first = math.ceil(begin / period) + math.ceil(periods)
     times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
-    readings = simulated(theta, velocity, np.concatenate([[begin], times]))
+    readings = simulated(starts, np.concatenate([[begin], times]))
     groups: list[tuple[Cycle, int]] = []
     for row in readings[:, 1:]:
         cycle = _closed(row, period)
@@ -193,7 +181,7 @@ def reached(
         else:
             groups.append((cycle, 1))
     groups.sort(key=lambda group: -group[1])
-    return tuple(Reached(cycle, count / theta.size) for cycle, count in groups)
+    return tuple(Reached(cycle, count / len(readings)) for cycle, count in groups)
 
 
 def _closed(row: Floats, period: float) -> Cycle | None:

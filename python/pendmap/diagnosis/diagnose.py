@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import compute_gap
-from pendmap.comparison.further import Reasons, compute_part
+from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.fitted_model import impose_physics

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.further import Reasons
+    from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.functions import FunctionScore
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel

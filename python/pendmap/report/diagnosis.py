@@ -6,8 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendmap.comparison.further import Reasons, compute_part
-from pendmap.comparison.replay import effect_strength
+from pendmap.comparison.replay import LOST, effect_strength
 from pendmap.diagnosis.result import ranking_table, zeroed
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
@@ -126,14 +125,11 @@ def _elsewhere(effect: NamedEffect) -> str:
 
 def _strength(found: Discrepancy, effect: NamedEffect) -> str:
     """Return the strength of an effect over the records, relative to friction and gravity."""
-    reasons: Reasons = {}
     fit = found.best.fitted.fit
-    strength = compute_part(
-        reasons, "strength", lambda: effect_strength(fit, found.data.fitted, effect.name), None
-    )
-    if strength is None:
-        why = plain(reasons["strength"])
-        return f". Its strength over these records is not computed: {why}"
+    try:
+        strength = effect_strength(fit, found.data.fitted, effect.name)
+    except LOST as error:
+        return f". Its strength over these records is not computed: {plain(str(error))}"
     if strength.torque > 0:
         w0, friction = fit["w0"], fit.estimates.get("Tr")
         against = ""

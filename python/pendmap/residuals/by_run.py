@@ -14,11 +14,10 @@ from pendmap.identification.sensitivity import sensitivities
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.residuals.noise import ResidualNoise
+    from pendmap.signal import Floats
 
 CHANCE: Final = 1e-3  # Probability by noise alone below which a parameter differs between runs
 
@@ -87,6 +86,6 @@ def parameters_by_run(
     return RunByRun(wanted, uneven, noise.chance_of(q, degrees))
 
 
-def _rank(information: NDArray[np.float64]) -> int:
+def _rank(information: Floats) -> int:
     values = np.linalg.eigvalsh(information)
     return int(np.count_nonzero(values > BLIND * max(float(values[-1]), 1e-300)))

@@ -42,12 +42,10 @@ from scipy.special import fdtr, fdtrc
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 CERTAIN: Final = 1e9  # Number of amplitudes that represents an exactly known noise level
 
@@ -91,9 +89,10 @@ class ResidualNoise:
 
     level: float  # Spectral density of noise at the motion's frequencies; 1 for stated white noise
     colour: float  # Correlation from sample to sample, mean over all laws
-    excess: float  # Sum of squares of the slow part over the noise's density, less its expectation
-    stderr: float  # Standard error of the excess, from the noise and its unknown law
-    by_run: tuple[float, ...]  # Excess of each run over its standard error
+    # Excess of the slow part: sum of squares over the noise's density, less its expectation, in
+    # standard errors from the noise and its unknown law; of all runs and of each.
+    z: float
+    by_run: tuple[float, ...]
     # Probability that noise alone gives the slow part of all runs or of any one: F-test of the
     # slow part against the quick part, with Bonferroni's factor, mean over all laws.
     chance: float
@@ -114,11 +113,6 @@ class ResidualNoise:
         levels, weights = np.maximum(self.laws[0], least), self.laws[1]
         return float(weights @ fdtrc(count, self.amplitudes, max(gain, 0.0) / count / levels))
 
-    @property
-    def z(self) -> float:
-        """Excess over its standard error."""
-        return self.excess / self.stderr if self.stderr > 0 else 0.0
-
 
 def estimate_noise(
     fit: TrajectoryFit, runs: Sequence[FitRun], adapted: int, floors: Sequence[float]
@@ -131,7 +125,7 @@ def estimate_noise(
     spectra = residual_spectra(fit, runs)
     if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
         none, known = (0.0,) * len(runs), np.ones((2, 1))
-        return ResidualNoise(1.0, 0.0, 0.0, 0.0, none, 1.0, known, CERTAIN, spectra.independent)
+        return ResidualNoise(1.0, 0.0, 0.0, none, 1.0, known, CERTAIN, spectra.independent)
     laws = noise_laws(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
     sizes = spectra.slow_sizes.sum(axis=1)
     degrees = sizes - spectra.states - adapted * sizes / sizes.sum()
@@ -143,17 +137,15 @@ def estimate_noise(
         _excess(left[:, own], degrees[own], sizes[own], laws.weights, laws.sizes[own])
         for own in parts
     ]
-    (excess, stderr, _), *each = found
-    chance = min(min(chance for *_, chance in found) * len(found), 1.0)
+    (z, *by_run), chances = zip(*found, strict=True)
     # The noise's density, weighted by the spectrum of the motion.
     levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
     return ResidualNoise(
         float(laws.weights @ levels),
-        float(laws.weights @ (laws.colours * laws.shares)),
-        excess,
-        stderr,
-        tuple(above / error if error > 0 else 0.0 for above, error, _ in each),
-        chance,
+        float(laws.weights @ laws.correlations),
+        z,
+        tuple(by_run),
+        min(min(chances) * len(found), 1.0),
         np.stack([levels, laws.weights]),
         float(spectra.quick_sizes.sum()),
         spectra.independent,
@@ -185,20 +177,20 @@ def _denominator_degrees(sizes: Floats, quick: Floats) -> float:
 
 def _excess(
     left: Floats, degrees: Floats, sizes: Floats, weights: Floats, quick: Floats
-) -> tuple[float, float, float]:
-    """Return the excess of runs over noise, its standard error, and its p-value.
+) -> tuple[float, float]:
+    """Return the excess of runs over noise, in standard errors, and its p-value.
 
     ``sizes`` and ``quick`` are the numbers of slow and of quick amplitudes, by run.
     """
     number, free = float(sizes.sum()), float(degrees.sum())
     if number == 0 or free <= 0:
-        return 0.0, 0.0, 1.0
+        return 0.0, 1.0
     total = left.sum(axis=1)
     mean = float(weights @ total)
     scatter = 2 * number + 2 * float(np.sum(sizes**2 / quick))
     stderr = math.sqrt(scatter + float(weights @ (total - mean) ** 2))
     chances = fdtrc(free, _denominator_degrees(sizes, quick), total / free)
-    return mean - free, stderr, float(weights @ chances)
+    return (mean - free) / stderr, float(weights @ chances)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -261,8 +253,7 @@ class Laws:
     """Noise models compatible with a spectrum, with their probabilities."""
 
     weights: Floats  # Probability of each law, shape (laws,)
-    colours: Floats  # ``rho``; 0 of white noise, shape (laws,)
-    shares: Floats  # ``c``; 1 of white noise, shape (laws,)
+    correlations: Floats  # From sample to sample, ``c rho``, shape (laws,)
     shapes: Floats  # Spectral density over the variance, shape (laws, BINS)
     scales: Floats  # Variance in each run, in standard errors squared, shape (laws, runs)
     sizes: Floats  # Number of amplitudes of each scale, shape (runs,)
@@ -288,9 +279,9 @@ def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     weights = prior * np.exp(-0.5 * (deviance - deviance.min()))
     weights /= weights.sum()
     keep = weights > FAINT * weights.max()
-    weights, scales = weights[keep], scales[keep]
-    rho, share, shape = (values[keep] for values in (grid.colours, grid.shares, grid.shapes))
-    return Laws(weights, rho, share, shape, scales, np.where(own, number, total))
+    correlations = (grid.colours * grid.shares)[keep]
+    sizes = np.where(own, number, total)
+    return Laws(weights[keep], correlations, grid.shapes[keep], scales[keep], sizes)
 
 
 @dataclasses.dataclass(frozen=True)

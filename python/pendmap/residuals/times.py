@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 KEPT: Final = 4  # Number of frequencies or instants returned; fewest readings of a window
 

@@ -26,14 +26,12 @@ from pendmap.identification.sensitivity import window_slopes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import ResidualNoise
+    from pendmap.signal import Floats
 
-    Floats = NDArray[np.float64]
 
 OVER: Final = {
     "angle": "rad",
@@ -84,16 +82,15 @@ class Torque:
 def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise) -> Torque:
     """Return the residual torque of a model in the runs to which it is fitted."""
     windows, places = window_derivatives(runs, fit)
-    names = [name for name in OVER if any(np.isfinite(p[name]).any() for p in places)]
-    edges = {
-        name: np.unique(
-            np.nanquantile(np.concatenate([p[name] for p in places]), np.linspace(0, 1, BINS + 1))
-        )
-        for name in names
-    }
-    names = [name for name in names if edges[name].size > 2]  # noqa: PLR2004 (two bins at least)
+    edges: dict[str, Floats] = {}
+    for name in OVER:
+        values = np.concatenate([place[name] for place in places])
+        if np.isfinite(values).any():
+            edge = np.unique(np.nanquantile(values, np.linspace(0, 1, BINS + 1)))
+            if edge.size > 2:  # noqa: PLR2004 (two bins at least)
+                edges[name] = edge
     columns = [
-        responses(runs[window.run], window, _binned(place, {n: edges[n] for n in names}))
+        responses(runs[window.run], window, _binned(place, edges))
         for window, place in zip(windows, places, strict=True)
     ]
     further, residual = project_out(runs, windows, columns)
@@ -105,8 +102,8 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
     errors *= math.sqrt(max(noise.level, level))
     first = 0
-    for name in names:
-        lows, highs = edges[name][:-1], edges[name][1:]
+    for name, edge in edges.items():
+        lows, highs = edge[:-1], edge[1:]
         own = slice(first, first + lows.size)
         gains[name] = _solved(further[:, own], residual)[2]
         columns_of = (lows, highs, torques[own], errors[own])

@@ -219,10 +219,15 @@ def test_cycles_are_aligned_by_shifts_of_periods_and_turns() -> None:
     np.testing.assert_allclose(
         one.velocity, math.pi * (np.cos(math.tau * x) + 0.2 * np.cos(2 * math.tau * x)), atol=1e-9
     )
-    other = one.moved(1)
-    apart, moved = dataclasses.replace(other, theta=other.theta + math.tau).nearest(one)
+    shifted = np.roll(one.theta, -64) + math.tau, np.roll(one.velocity, -64)
+    later = dataclasses.replace(one, theta=shifted[0], velocity=shifted[1])
+    apart, moved = later.nearest(one)
     assert apart < 1e-9
     np.testing.assert_allclose(moved.theta, one.theta, atol=1e-9)
+    np.testing.assert_allclose(moved.velocity, one.velocity, atol=1e-9)
+    whirling = Cycle.of(2, 1, 1.0, math.tau * x + 0.2 * np.sin(math.tau * x))
+    theta = np.concatenate([whirling.theta[64:], whirling.theta[:64] + math.tau])
+    assert dataclasses.replace(whirling, theta=theta).nearest(whirling)[0] < 1e-9
     turning = Cycle.of(1, 1, 1.0, math.tau * x + 0.2 * np.sin(math.tau * x))
     assert turning.amplitude == pytest.approx(0.2, rel=1e-3)
     assert turning.kind == "rotation 1:1"

@@ -13,7 +13,7 @@ from accelerations import GRAVITY, SENSORS, TRUTH, column, experiment, handled, 
 from drawn import written
 from pendmap import InputError
 from pendmap.comparison import compare
-from pendmap.comparison import free as compared
+from pendmap.comparison import experiment as compared
 from pendmap.identification import identify_experiment
 from pendmap.identification import report as summary
 
@@ -129,7 +129,7 @@ def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     run = compared.as_json(beside)["runs"][0]
     assert run["peaks"] == run["periods"] == []
     assert run["peak_rms_percent"] is None
-    assert any("computed from an acceleration" in line for line in compared.as_text(beside))
+    assert any("computed from an acceleration" in line for line in beside.text_parts()[1])
 
 
 def test_figures_of_a_reconstructed_angle_explain_the_missing_judgement(tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ import pendmap
 from decays import decay, record
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
-from pendmap.comparison.free import as_json as compared
-from pendmap.comparison.free import as_text as compared_text
+from pendmap.comparison.experiment import as_json as compared
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
@@ -100,7 +99,7 @@ def test_every_command_reports_the_releases(tmp_path: Path, pendmap_command: Com
     assert [record["sha256"] for record in records] == [there.runs[0].sha256]
     beside = compare(model, there)
     assert [run["name"] for run in compared(beside)["runs"]] == ["decay 1/2", "decay 2/2"]
-    for lines in (as_text(report), compared_text(beside)):
+    for lines in (as_text(report), beside.text_parts()[1]):
         assert any("2 releases" in line for line in lines)
     looked = json.loads(pendmap_command("look", path, "--json").stdout)
     assert "several-releases" in {finding["what"] for finding in looked["findings"]}

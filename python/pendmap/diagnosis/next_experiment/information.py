@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.further import Reasons
+    from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Windows
     from pendmap.diagnosis.next_experiment.proposals import Proposal, Start

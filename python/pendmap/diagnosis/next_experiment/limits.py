@@ -7,7 +7,7 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.comparison.further import Reasons, compute_part
+from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.candidates import count_choices
 from pendmap.diagnosis.next_experiment.power import (
     predict_interval,

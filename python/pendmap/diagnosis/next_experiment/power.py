@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.further import Reasons
+    from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.next_experiment.information import Information
     from pendmap.diagnosis.next_experiment.proposals import Proposal
     from pendmap.diagnosis.scores import Scores

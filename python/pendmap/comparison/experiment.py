@@ -1,0 +1,384 @@
+"""Comparison of a model with an experiment's runs, with its JSON and text."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
+from pendmap.comparison.free import MODEL, RunComparison, compare_free
+from pendmap.errors import (
+    MOST_THREADS,
+    FitDiverged,
+    InputError,
+    check_callable,
+    check_type,
+    check_whole,
+)
+from pendmap.formatting import Readable, counted, percent
+from pendmap.model import Rig
+from pendmap.records.experiment import Experiment
+from pendmap.records.summary import doubt_lines, doubts, finding_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from pendmap.comparison.forced import Statistic
+    from pendmap.comparison.steady import Steady
+    from pendmap.formatting import Table
+    from pendmap.records import Run
+    from pendmap.signal import Floats
+
+
+FITS: Final = 1.1
+"""Rms residual over noise up to which a model fits; the noise is known to a few percent."""
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Comparison(Readable):
+    """Comparison of a model with an experiment.
+
+    Parameters
+    ----------
+    model : Rig
+        The model with its effects, including those on the reading.
+    experiment : Experiment
+        The records.
+    runs : tuple of RunComparison
+        Comparisons with the free decays.
+    forced : tuple of ForcedComparison
+        Comparisons with the forced runs.
+    left_out : tuple of (str, str)
+        Name of each other run, and the reason why it is not compared.
+    """
+
+    model: Rig
+    experiment: Experiment
+    runs: tuple[RunComparison, ...]
+    forced: tuple[ForcedComparison, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    def __repr__(self) -> str:
+        every = self.every
+        worst = max(one.rms / one.sigma for one in every)
+        each = f"rms up to {worst:.3g} times the noise"
+        runs = counted(len(every), "run")
+        return f"<Comparison {self.experiment.path.name}: {runs}, {each}; {self.model.title}>"
+
+    @property
+    def every(self) -> tuple[RunComparison | ForcedComparison, ...]:
+        """All runs that were compared, free decays first."""
+        return (*self.runs, *self.forced)
+
+    def text_parts(self) -> tuple[list[Table], list[str]]:
+        """Return the tables and the lines that ``pendmap compare`` prints."""
+        tables = [_free_table(self.runs), _forced_table(self.forced)]
+        return [table for table in tables if table[1]], list(_lines(self))
+
+
+def compare(
+    model: Rig,
+    experiment: Experiment,
+    *,
+    ensemble: Ensemble | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Comparison:
+    """Compare a model with every run of an experiment.
+
+    No parameter of the model is fitted. Of a free decay, angle and velocity at the first free
+    sample are fitted, since they are known only to the noise; periods and peaks are those of the
+    motion from the first measured peak.
+
+    A forced run may be chaotic, and chaotic trajectories diverge however good the model is. It is
+    compared with an ensemble of simulated records over a neighbourhood of its initial state, by the
+    wells visited, escapes between them, the angle covered, the time to settle and the greatest
+    velocity; if it ends on a steady state, also with the model's cycle at equal phase of the drive.
+    Its residual is computed in windows of up to three swings, each with a fitted initial state.
+
+    Parameters
+    ----------
+    model : Rig
+        Model in SI units, from :func:`pendmap.load_model`.
+    experiment : Experiment
+        Records, from :func:`pendmap.read_experiment`.
+    ensemble : Ensemble, optional
+        Number and spread of the initial states for a forced run.
+    threads : int, optional
+        Number of threads; by default one per processor.
+    progress : callable, optional
+        Called repeatedly with the number of members done and in all, for each forced run.
+
+    Raises
+    ------
+    InputError
+        If no run can be compared: one needs samples with motion, a forced one also a known drive.
+    KeyboardInterrupt
+        After Ctrl-C.
+    """
+    check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
+    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    if ensemble is not None:
+        check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
+    if threads is not None:
+        check_whole("threads", threads, 1, MOST_THREADS)
+    check_callable("progress", progress)
+    sampled = [run for run in experiment.runs if not run.peaks_only]
+    if not sampled:
+        raise InputError(f"{experiment.path}: one run or more must have samples, none has")
+    experiment.refuse_still(sampled)
+    free: list[RunComparison] = []
+    forced: list[ForcedComparison] = []
+    out: list[tuple[str, str]] = []
+    for run in experiment.runs:
+        try:
+            _check_comparable(model, run)
+            if run.kind == "free":
+                free.append(compare_free(model, run))
+            else:
+                forced.append(
+                    compare_forced(
+                        model, run, ensemble or Ensemble(), threads=threads, progress=progress
+                    )
+                )
+        except (FitDiverged, InputError) as error:  # the other runs are still compared
+            out.append((run.name, str(error)))
+    if not free and not forced:
+        said = "; ".join(": ".join(each) for each in out)
+        raise InputError(f"{experiment.path}: no run can be compared: {said}")
+    return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
+
+
+def _check_comparable(model: Rig, run: Run) -> None:
+    """Raise InputError with the reason why a run cannot be compared with a model."""
+    time, swing = run.time[run.trusted], math.tau / model.w0
+    seconds = float(np.ptp(time)) if time.size else 0.0
+    if run.peaks_only:
+        raise InputError("it has peaks only")
+    if run.copied:
+        raise InputError("it is a copy of another run")
+    if not run.moves:
+        raise InputError("nothing moves in it")
+    if run.kind == "forced" and run.drive is None and run.pivot is None:
+        raise InputError("neither its drive nor its pivot is given")
+    if run.kind == "forced" and (time.size < FEWEST or seconds < swing):
+        raise InputError(
+            f"it is too short: {counted(time.size, 'sample')} over {seconds:.3g} s; {FEWEST} over "
+            f"{swing:.3g} s, one swing, are needed"
+        )
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """Return the JSON object of ``pendmap compare``; a time beyond a record's end is infinite."""
+    return {
+        "experiment": str(comparison.experiment.path),
+        "doubts": doubts(comparison.experiment, *(one.run for one in comparison.every)),
+        "runs": [
+            {
+                "name": one.run.name,
+                "kind": one.run.kind,
+                "hold_out": one.run.hold_out,
+                "samples": int(one.run.trusted.sum()),
+                "noise": one.sigma,
+                "rms": one.rms,
+                **(_forced(one) if isinstance(one, ForcedComparison) else _free(one)),
+                "findings": [found.text for found in one.run.findings],
+            }
+            for one in comparison.every
+        ],
+        "left_out": [{"name": name, "why": why} for name, why in comparison.left_out],
+        "findings": [found.text for found in comparison.experiment.findings],
+    }
+
+
+def _free(one: RunComparison) -> dict[str, Any]:
+    errors = one.errors
+    return {
+        "start": {"theta": one.start[0], "velocity": one.start[1]},
+        "period_rms_percent": None if errors is None else errors.period_rms,
+        "peak_rms_percent": None if errors is None else errors.peak_rms,
+        "table1": [
+            {
+                "what": row.what,
+                "asked": row.asked,
+                "measured": row.measured,
+                "error_percent": row.errors.get(MODEL),
+            }
+            for row in one.table.rows
+        ],
+        "table1_left_out": one.table.left_out or next(iter(one.table.lost.values()), None),
+        "periods": [] if errors is None else _pairs(errors.period_time, errors.period_error),
+        "peaks": [] if errors is None else _pairs(errors.peak, errors.peak_error),
+    }
+
+
+def _pairs(places: Floats, errors: Floats) -> list[dict[str, float]]:
+    pairs = zip(places.tolist(), errors.tolist(), strict=True)
+    return [{"at": at, "error_percent": error} for at, error in pairs]
+
+
+def _forced(one: ForcedComparison) -> dict[str, Any]:
+    start, drive = one.start, one.run.drive
+    return {
+        "windows": one.windows,
+        "start": {"theta": start.theta, "velocity": start.velocity},
+        "start_stderr": dict(zip(("theta", "velocity"), start.stderr, strict=True)),
+        "drive": None if drive is None else dict(drive),
+        "phi": None
+        if one.phase is None
+        else {"value": one.phase.value, "stderr": one.phase.stderr},
+        "members": one.ensemble.members,
+        "members_lost": one.lost,
+        "spread": one.ensemble.spread,
+        "statistics": [
+            {
+                "what": each.name,
+                "unit": each.unit or "1",
+                "measured": each.measured,
+                "median": each.median,
+                "ci95": each.ci95,
+                "chance": each.chance,
+            }
+            for each in one.statistics
+        ],
+        "steady": None if one.steady is None else _steady(one.steady),
+    }
+
+
+def _steady(found: Steady) -> dict[str, Any]:
+    return {
+        "kind": found.measured.kind,
+        "n": found.measured.n,
+        "w": found.measured.w,
+        "cycles": found.cycles,
+        "amplitude": found.measured.amplitude,
+        "model": [
+            {"kind": one.cycle.kind, "n": one.cycle.n, "w": one.cycle.w, "share": one.share}
+            for one in found.reached
+        ],
+        "rms_theta": found.rms,
+        "rms_velocity": found.rms_velocity,
+        "amplitude_error_percent": 100 * found.overestimate,
+    }
+
+
+def _name(run: Run) -> str:
+    return run.name + (" (held out)" if run.hold_out else "")
+
+
+def _free_table(runs: Sequence[RunComparison]) -> Table:
+    """Return header and rows of the table of free decays."""
+    head = ["run", "rms (rad)", "noise (rad)", "rms / noise", "periods, rms", "peaks, rms"]
+    rows = []
+    for one in runs:
+        errors = one.errors
+        rows.append(
+            [
+                _name(one.run),
+                f"{one.rms:.4g}",
+                f"{one.sigma:.3g}",
+                f"{one.rms / one.sigma:.3g}",
+                "" if errors is None else percent(errors.period_rms),
+                "" if errors is None else percent(errors.peak_rms),
+            ]
+        )
+    return head, rows
+
+
+def _forced_table(runs: Sequence[ForcedComparison]) -> Table:
+    """Return header and rows of the table of statistics of forced runs."""
+    head = ["forced run", "what", "record", "model: median", "95 % of its ensemble", "chance"]
+    rows = []
+    for one in runs:
+        for k, each in enumerate(one.statistics):
+            low, high = each.ci95
+            rows.append(
+                [
+                    "" if k else _name(one.run),
+                    each.name + (f" ({each.unit})" if each.unit else ""),
+                    written(each, each.measured),
+                    written(each, each.median),
+                    f"{written(each, low)} to {written(each, high)}",
+                    f"{each.chance:.2g}",
+                ]
+            )
+    return head, rows
+
+
+def written(of: Statistic, value: float, digits: int = 4) -> str:
+    """Return a value of a statistic as text."""
+    if not math.isfinite(value):
+        return "not yet"
+    return f"{value:.0f}" if not of.unit or abs(value) >= 10**digits else f"{value:.{digits}g}"
+
+
+def _lines(comparison: Comparison) -> Iterator[str]:
+    """Yield the lines printed with the tables: doubts, table 1, quality of fit, findings."""
+    runs = [one.run for one in comparison.every]
+    yield from doubt_lines(comparison.experiment, *runs)
+    for one in comparison.runs:
+        for row in one.table.rows:
+            unit = "s" if row.what == "period" else "rad"
+            error = row.errors.get(MODEL, math.nan)
+            said = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
+            yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
+        if one.table.left_out:
+            yield f"{one.run.name}: {one.table.left_out}"
+        for reason in one.table.lost.values():
+            yield f"{one.run.name}: periods and peaks are not compared: {reason}"
+        if one.rms > FITS * one.sigma:
+            yield (
+                f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
+                "the model does not describe this run"
+            )
+    for forced in comparison.forced:
+        yield from _forced_lines(forced)
+    for name, why in comparison.left_out:
+        yield f"{name}: not compared: {why}"
+    yield from finding_lines(comparison.experiment, *runs)
+
+
+def _forced_lines(one: ForcedComparison) -> Iterator[str]:
+    """Yield the lines on a run's residual, steady state and improbable statistics."""
+    name = one.run.name
+    ratio = one.rms / one.sigma
+    missing = ": the model does not describe this run" if ratio > FITS else ""
+    yield (
+        f"{name}: in {counted(one.windows, 'window')} of up to three swings the residual is "
+        f"{one.rms:.3g} rad, {ratio:.3g} times the noise{missing}"
+    )
+    if one.phase is not None:
+        yield f"{name}: the drive's phase is not given: {one.phase.value:.4g} rad was fitted"
+    if one.steady is not None:
+        yield f"{name}: {_steady_line(one.steady)}"
+    for each in one.unlike:
+        unit = f" {each.unit}" if each.unit and math.isfinite(each.measured) else ""
+        yield (
+            f"{name}: {each.name}: {written(each, each.measured)}{unit} is improbable under the "
+            f"model (p-value {each.chance:.2g})"
+        )
+    if one.lost:
+        yield f"{name}: {one.lost} of {one.ensemble.members} members overflowed"
+
+
+def _steady_line(found: Steady) -> str:
+    """Return the text on the steady states of a record and of the model."""
+    ends = [
+        f"{one.cycle.kind} from {percent(100 * one.share)} of the starts" for one in found.reached
+    ]
+    share = sum(one.share for one in found.reached)
+    if share < 1 - 1e-9:
+        ends.append(f"no cycle from {percent(100 * (1 - share))}")
+    head = f"settles on {found.measured.kind}; the model on {', '.join(ends)}"
+    if found.model is None:
+        return f"{head}: not on the measured one"
+    more = ""
+    if math.isfinite(found.overestimate):
+        more = f", in amplitude by {100 * found.overestimate:+.2g} %"
+    return (
+        f"{head}. Over a cycle they differ by {found.rms:.2g} rad and {found.rms_velocity:.2g} "
+        f"rad/s rms{more}"
+    )
