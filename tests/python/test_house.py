@@ -20,11 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "pendmap"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-LINES = 44_000
+LINES = 43_000
 """Ratchet: lines of Python in python/pendmap, in thousands: a small addition changes no limit."""
 DIRECT = 380
 """Ratchet: format specifications of numbers outside formatting.py."""
-INTERNAL = 106
+INTERNAL = 101
 """Ratchet: modules inside packages that tests import."""
 
 

@@ -42,8 +42,7 @@ from scipy.special import fdtr, fdtrc
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.identification.fit import TrajectoryFit
-    from pendmap.identification.runs import FitRun
+    from pendmap.identification import FitRun, TrajectoryFit
     from pendmap.signal import Floats
 
 

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
     from pendmap.diagnosis import Discrepancy
-    from pendmap.identification.fit import TrajectoryFit
-    from pendmap.identification.runs import FitRun
+    from pendmap.identification import FitRun, TrajectoryFit
 
 RATIO: Final = 0.56  # Height of a panel over its width
 RECORD: Final = Series("record", (128, 128, 128), 1.0)
