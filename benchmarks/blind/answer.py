@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.blind.cases import SOUND, Case, record
 from benchmarks.blind.difficulty import difficulty, disturbance
 from pendmap import virtual_rig
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.diagnosis import diagnose
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.errors import InputError

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.blind.cases import record
-from pendmap.comparison import DataSplit, split_records
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
 from pendmap.diagnosis.fitted_model import fit_model

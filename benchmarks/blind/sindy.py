@@ -57,8 +57,8 @@ from benchmarks.blind.report import right, strength, true_names, wilson
 from benchmarks.blind.sindy_choice import choose
 from benchmarks.blind.sindy_forms import Setting, prepared, regression
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.comparison import split_records
-from pendmap.identification import as_fit_run
+from pendmap.comparison.data import split_records
+from pendmap.identification.readings import as_fit_run
 
 WIDTH = 2.0
 SETTINGS = {

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
     from pendmap.virtual_rig.effects.base import Effect
 
     Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks.blind.sindy_features import Feature, States
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
     from pendmap.virtual_rig.equation import Parameters
 
     Floats = NDArray[np.float64]

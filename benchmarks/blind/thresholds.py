@@ -29,13 +29,14 @@ from benchmarks.blind.cases import Case, record
 from benchmarks.blind.run import drawn, rows_of
 from benchmarks.peers.report import machine, note, say, table
 from pendmap import comparison
-from pendmap.comparison import DataSplit
+from pendmap.comparison.data import DataSplit
 from pendmap.diagnosis import diagnose, fitted_model, hold_out, refit, scores
 from pendmap.diagnosis.fitted_model import FittedModel
 from pendmap.diagnosis.hold_out import HoldOut
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
-from pendmap.identification import FitRun, TrajectoryFit
+from pendmap.identification.fit import TrajectoryFit
+from pendmap.identification.runs import FitRun
 from pendmap.model.effects import library
 from pendmap.records import Experiment
 from pendmap.residuals import by_run, torque

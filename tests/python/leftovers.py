@@ -10,7 +10,7 @@ import numpy as np
 
 import pendmap
 from pendmap.diagnosis.fitted_model import FittedModel
-from pendmap.identification import FitRun
+from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

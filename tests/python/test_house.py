@@ -22,9 +22,9 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 LINES = 43_000
 """Ratchet: lines of Python in python/pendmap, in thousands: a small addition changes no limit."""
-DIRECT = 380
+DIRECT = 370
 """Ratchet: format specifications of numbers outside formatting.py."""
-INTERNAL = 101
+INTERNAL = 104
 """Ratchet: modules inside packages that tests import."""
 
 

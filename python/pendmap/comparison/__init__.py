@@ -5,17 +5,8 @@ divides records into those fitted and those held out; ``replay`` integrates a fi
 state; ``forecast`` computes its errors against the horizon, and those of periods and peaks.
 """
 
-from pendmap.comparison.data import DataSplit, split_records
 from pendmap.comparison.experiment import Comparison, compare
 from pendmap.comparison.forced import Ensemble, ForcedComparison
 from pendmap.comparison.free import RunComparison
 
-__all__ = [
-    "Comparison",
-    "DataSplit",
-    "Ensemble",
-    "ForcedComparison",
-    "RunComparison",
-    "compare",
-    "split_records",
-]
+__all__ = ["Comparison", "Ensemble", "ForcedComparison", "RunComparison", "compare"]

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification import Reading, as_fit_run, reading_of
+from pendmap.identification.readings import Reading, as_fit_run, reading_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
     from pendmap.signal import Floats
 

@@ -19,8 +19,8 @@ from pendmap.errors import (
     check_whole,
     core_errors,
 )
-from pendmap.identification import as_fit_run, fit_runs
-from pendmap.identification.readings import reading_of_run
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import bare_run, rig_of
 from pendmap.identification.sensitivity import window_slopes
 from pendmap.signal.robust import intervals_of
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pendmap.formatting import Estimate
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
     from pendmap.signal import Floats, Mask

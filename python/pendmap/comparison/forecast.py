@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.comparison.replay import Motion, Reasons, compute_part, fit_states, run_forward
-from pendmap.identification import FitRun
 from pendmap.identification.peaks import find_peaks
+from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Fits
-    from pendmap.identification import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
     from pendmap.signal import Floats, Indices, Mask

@@ -6,11 +6,11 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.formatting import Estimate
-from pendmap.identification import as_fit_run, fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.trajectory import OFFSET
 from pendmap.identification.peaks import find_peaks
-from pendmap.identification.readings import reading_of_run
+from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import table_of_run
 

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from pendmap.identification import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.signal import Floats
 

@@ -26,7 +26,7 @@ from pendmap.model.rig import own_name
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
 
 POOR: Final = 0.1
 """Residual, over the standard deviation of the angle, above which a fit does not follow it."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.baseline import fit_baseline

@@ -11,16 +11,16 @@ import numpy as np
 
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
-from pendmap.identification import TrajectoryFit, fit_runs
+from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.valley import refine_exponent
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.model.effects import EffectParameter
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
 from pendmap.errors import FitDiverged
-from pendmap.identification import TrajectoryFit, fit_runs
+from pendmap.identification.fit import TrajectoryFit, fit_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.fitted_model import FittedModel, Windows
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
 
 FOLDS: Final = 5  # Number of folds of stretches; two fixed stretches alone depend on chance
 

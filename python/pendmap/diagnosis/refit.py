@@ -13,13 +13,13 @@ from pendmap.diagnosis.fitted_model import (
     fit_with_candidates,
     impose_physics,
 )
-from pendmap.identification import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.uncertainty import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.scores import Score, Scores
     from pendmap.diagnosis.thresholds import Thresholds

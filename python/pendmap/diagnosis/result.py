@@ -17,7 +17,7 @@ from pendmap.records.summary import doubt_lines, finding_lines
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.functions import FunctionScore
     from pendmap.diagnosis.scores import Scores

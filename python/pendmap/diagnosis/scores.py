@@ -38,10 +38,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
 
     Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ from pendmap.errors import FitDiverged
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.refit import Key

@@ -14,7 +14,8 @@ from pendmap.identification.sensitivity import sensitivities
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.residuals.noise import ResidualNoise
     from pendmap.signal import Floats
 

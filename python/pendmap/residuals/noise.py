@@ -42,7 +42,8 @@ from scipy.special import fdtr, fdtrc
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.signal import Floats
 
 

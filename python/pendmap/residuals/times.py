@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pendmap.identification import FitRun
+    from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.signal import Floats
 

@@ -26,7 +26,8 @@ from pendmap.identification.sensitivity import window_slopes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import ResidualNoise
     from pendmap.signal import Floats

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
     from pendmap.diagnosis import Discrepancy
-    from pendmap.identification import FitRun, TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
 
 RATIO: Final = 0.56  # Height of a panel over its width
 RECORD: Final = Series("record", (128, 128, 128), 1.0)

@@ -7,11 +7,11 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
+from matplotlib.figure import Figure
 
 import pendmap
 from pendmap import InputError, cli, render, viewer
 from pendmap.model import effects_of
-from pendmap.render import style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -67,7 +67,7 @@ def test_every_output_of_every_command_takes_every_model(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     # The figure is built but not rasterised, which would take longer than the rest.
-    monkeypatch.setattr(style, "write", lambda figure, part: part.write_text(str(figure)))
+    monkeypatch.setattr(Figure, "savefig", lambda figure, part, **_: part.write_text(str(figure)))
     (tmp_path / "model.toml").write_text(f"[pendulum]\n{MODELS[model]}", encoding="utf-8")
     files = ("--out", "a.nc", "--plot", "a.png", "--rerun", "a.rrd")
     words = [command, "--model", "model.toml", *COMMANDS[command], *files, "--json"]

@@ -16,7 +16,7 @@ from pendmap import InputError, Rig, virtual_rig
 from pendmap.comparison import Ensemble, compare
 from pendmap.comparison.forced import Start, Statistic, simulated_readings
 from pendmap.comparison.steady import Cycle
-from pendmap.identification import FitRun
+from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.virtual_rig import RunPlan
 

@@ -10,7 +10,7 @@ import pytest
 
 from driven_decays import motion
 from pendmap import InputError
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.records import Experiment, Run
 
 TIME = np.arange(1500) * 0.01

@@ -8,7 +8,8 @@ from scipy.interpolate import CubicSpline
 
 from driven_decays import motion
 from pendmap.comparison.data import average_blocks
-from pendmap.identification import FitRun, fit_runs
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.runs import FitRun
 from pendmap.model import Rig
 
 TIME = np.arange(20000) * 1e-3

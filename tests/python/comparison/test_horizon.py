@@ -14,7 +14,7 @@ from pendmap.comparison import compare
 from pendmap.comparison.forecast import compare_forecasts
 from pendmap.comparison.replay import Motion, effect_strength, run_forward
 from pendmap.diagnosis import diagnosed_model
-from pendmap.identification import FitRun
+from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy

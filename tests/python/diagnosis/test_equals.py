@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from pendmap import virtual_rig
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import Candidate
 from pendmap.diagnosis.scores import Scores, score_candidates

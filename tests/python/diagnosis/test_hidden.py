@@ -9,7 +9,7 @@ import pytest
 from hidden import diagnosed
 from pendmap import InputError, virtual_rig
 from pendmap.diagnosis import diagnose
-from pendmap.identification import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.records import read_experiment
 
 if TYPE_CHECKING:

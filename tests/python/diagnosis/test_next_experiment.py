@@ -23,7 +23,7 @@ from pendmap.diagnosis.next_experiment.limits import required_gain
 from pendmap.diagnosis.next_experiment.power import chance_resolved, chance_wrong_name
 from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.summary import as_json
-from pendmap.identification import as_fit_run, reading_of
+from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import InputError, report, virtual_rig
-from pendmap.comparison import DataSplit, split_records
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis import diagnose, diagnosed_model
 from pendmap.diagnosis.candidates import Candidate
 from pendmap.diagnosis.fitted_model import FittedModel, fit_model, impose_physics

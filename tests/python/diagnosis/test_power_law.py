@@ -12,12 +12,13 @@ import pytest
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import virtual_rig
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.diagnosis import diagnosed_model
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
 from pendmap.diagnosis.fitted_model import fit_with_candidates
-from pendmap.identification import FitRun, fit_runs
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.runs import FitRun
 from pendmap.identification.sensitivity import window_slopes
 from pendmap.model import Effect, Formula, Rig, load_model, save_model
 from pendmap.records import read_experiment

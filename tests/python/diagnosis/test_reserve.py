@@ -13,7 +13,7 @@ import pytest
 import pendmap
 from driven_decays import motion
 from hidden import diagnosed, once
-from pendmap.comparison import split_records
+from pendmap.comparison.data import split_records
 from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates

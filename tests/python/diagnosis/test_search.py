@@ -12,7 +12,7 @@ import pytest
 
 from driven_decays import motion
 from pendmap import FitDiverged, InputError, read_experiment, virtual_rig
-from pendmap.comparison import DataSplit, split_records
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import CORE, Candidate
@@ -21,7 +21,7 @@ from pendmap.diagnosis.hold_out import hold_out_losses
 from pendmap.diagnosis.search import prune_effects, search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.verdict import compare_alternatives
-from pendmap.identification import fit_runs
+from pendmap.identification.fit import fit_runs
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendmap.identification import FitRun
+from pendmap.identification.runs import FitRun
 from pendmap.virtual_rig.equation import Parameters
 
 if TYPE_CHECKING:

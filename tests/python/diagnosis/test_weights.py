@@ -14,9 +14,9 @@ from scipy.fft import idct
 
 from driven_decays import motion
 from leftovers import RUNS, SAMPLES, coloured, fitted_to
-from pendmap.comparison import DataSplit, split_records
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis.fitted_model import model_errors, weight_records
-from pendmap.identification import FitRun
+from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:

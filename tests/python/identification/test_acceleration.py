@@ -12,7 +12,8 @@ import pendmap
 from accelerations import GRAVITY, TRUTH, experiment, readings
 from decays import decay, record
 from pendmap import InputError, render
-from pendmap.comparison import compare, split_records
+from pendmap.comparison import compare
+from pendmap.comparison.data import split_records
 from pendmap.identification import identified_model, identify, identify_experiment
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment

@@ -11,8 +11,10 @@ from scipy.stats import norm
 
 from decays import decay, record
 from pendmap import Rig
-from pendmap.identification import FitRun, TrajectoryFit, fit_runs, reading_of
+from pendmap.identification.fit import TrajectoryFit, fit_runs
 from pendmap.identification.methods.trajectory import fit_decay
+from pendmap.identification.readings import reading_of
+from pendmap.identification.runs import FitRun
 from pendmap.model import Effect
 
 TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 import pendmap
 from decays import decay, record
 from pendmap import InputError, render
-from pendmap.comparison import compare, split_records
+from pendmap.comparison import compare
+from pendmap.comparison.data import split_records
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.methods.trajectory import fit_together
 from pendmap.records import Experiment, Run

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap.identification import FitRun, fit_runs, reading_of
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.trajectory import fit_from_start, identify
+from pendmap.identification.readings import reading_of
+from pendmap.identification.runs import FitRun
 from pendmap.model import Rig
 from pendmap.records.noise import noise_of
 from pendmap.records.summary import noise_said

@@ -9,7 +9,8 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError
-from pendmap.identification import Peaks, find_peaks, reading_of
+from pendmap.identification import Peaks, find_peaks
+from pendmap.identification.readings import reading_of
 from pendmap.records.resolution import step_of
 
 WIDE = decay()

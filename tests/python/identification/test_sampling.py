@@ -12,7 +12,8 @@ from scipy.interpolate import CubicSpline
 
 from decays import Decay, decay, record
 from pendmap import read_experiment
-from pendmap.identification import find_peaks, reading_of
+from pendmap.identification import find_peaks
+from pendmap.identification.readings import reading_of
 from pendmap.records.noise import noise_of
 from pendmap.records.samples import measured
 

@@ -12,8 +12,10 @@ import pytest
 
 from driven_decays import motion
 from pendmap import InputError
-from pendmap.identification import FitRun, Pivot, fit_runs, reading_of
+from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.trajectory import fit_decay, identify
+from pendmap.identification.readings import reading_of
+from pendmap.identification.runs import FitRun, Pivot
 from pendmap.identification.sensitivity import sensitivities
 from pendmap.identification.turning import rough_start
 from pendmap.model import Effect, Rig

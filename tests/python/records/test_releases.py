@@ -11,9 +11,11 @@ import pytest
 
 import pendmap
 from decays import decay, record
-from pendmap.comparison import compare, split_records
+from pendmap.comparison import compare
+from pendmap.comparison.data import split_records
 from pendmap.comparison.experiment import as_json as compared
-from pendmap.identification import as_fit_run, identified_model, identify_experiment, reading_of
+from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Run
 from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text

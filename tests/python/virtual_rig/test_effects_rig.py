@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import virtual_rig
-from pendmap.comparison import DataSplit, split_records
+from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import Candidate, add_candidates
 from pendmap.diagnosis.fitted_model import fit_model

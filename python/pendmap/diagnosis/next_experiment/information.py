@@ -23,22 +23,21 @@ from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.scores import candidate_slopes
 from pendmap.errors import FitDiverged
 from pendmap.formatting import counted
-from pendmap.identification import FitRun
 from pendmap.identification.parameters import PER_RUN
-from pendmap.identification.runs import FORCED_WINDOW_SWINGS
+from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import Windows
     from pendmap.diagnosis.next_experiment.proposals import Proposal, Start
     from pendmap.diagnosis.state import ScoredModel
-    from pendmap.identification import TrajectoryFit
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.sensitivity import WindowSlopes
 
     Floats = NDArray[np.float64]

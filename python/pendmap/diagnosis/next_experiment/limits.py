@@ -16,7 +16,7 @@ from pendmap.diagnosis.next_experiment.power import (
 )
 
 if TYPE_CHECKING:
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.next_experiment.power import Outlook, Prospect

@@ -23,7 +23,7 @@ from pendmap.identification.uncertainty import Z95
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.next_experiment.information import Information
     from pendmap.diagnosis.next_experiment.proposals import Proposal

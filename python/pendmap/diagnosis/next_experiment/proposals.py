@@ -19,7 +19,7 @@ from pendmap.formatting import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from pendmap.comparison import DataSplit
+    from pendmap.comparison.data import DataSplit
 
 RELEASES: Final = (0.5, 1.2, 2.0, 2.8)  # Release angles, rad, reduced to the limits of the rig
 
