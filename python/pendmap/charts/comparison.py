@@ -154,7 +154,7 @@ def _forced(one: ForcedComparison) -> list[Panel]:
     if one.steady is None or one.steady.measured.at_rest:
         third = phase(one, member="a member of the ensemble")
     else:
-        third = cycles(one, one.steady.measured.kind)
+        third = cycles(one, one.steady.measured.name)
     return [history(one, PAIR), phase(one), third, statistics(one)]
 
 
@@ -270,8 +270,8 @@ def _reached(one: ForcedComparison) -> str:
     if found is None:
         return "no steady state"
     if found.model is None:
-        return f"{found.measured.kind}, not that of the model"
-    return f"{found.measured.kind}, amplitude of the model {100 * found.overestimate:+.2g} %"
+        return f"{found.measured.name}, not that of the model"
+    return f"{found.measured.name}, amplitude of the model {100 * found.overestimate:+.2g} %"
 
 
 def _drive(one: ForcedComparison) -> str:

@@ -367,12 +367,12 @@ def _forced_lines(one: ForcedComparison) -> Iterator[str]:
 def _steady_line(found: Steady) -> str:
     """Return the text on the steady states of a record and of the model."""
     ends = [
-        f"{one.cycle.kind} from {percent(100 * one.share)} of the starts" for one in found.reached
+        f"{one.cycle.name} from {percent(100 * one.share)} of the starts" for one in found.reached
     ]
     share = sum(one.share for one in found.reached)
     if share < 1 - 1e-9:
         ends.append(f"no cycle from {percent(100 * (1 - share))}")
-    head = f"settles on {found.measured.kind}; the model on {', '.join(ends)}"
+    head = f"settles on {found.measured.name}; the model on {', '.join(ends)}"
     if found.model is None:
         return f"{head}: not on the measured one"
     more = ""

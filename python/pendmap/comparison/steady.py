@@ -79,6 +79,11 @@ class Cycle:
             return kind_of("inverted_rest" if upside_down else "rest", 1, 0)
         return kind_of("oscillation", self.n, 0)
 
+    @property
+    def name(self) -> str:
+        """Kind of motion, a rotation with its sense: ``rotation 1:+1``."""
+        return f"rotation {self.n}:{self.w:+d}" if self.w else self.kind
+
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
         """Return the least rms difference to another cycle, rad, and this cycle shifted to it.
 

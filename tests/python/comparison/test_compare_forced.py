@@ -142,7 +142,7 @@ def test_a_different_steady_state_is_reported(tmp_path: Path) -> None:
     assert found.model is None
     assert math.isnan(found.rms)
     said = str(comparison)
-    assert "settles on rotation 1:1; the model on" in said
+    assert "settles on rotation 1:+1; the model on" in said
     assert "not on the measured one" in said
     assert "the model does not describe this run" in said
 
