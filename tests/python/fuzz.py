@@ -99,6 +99,8 @@ def child(folder: Path, case: fuzz_cases.Case) -> NoReturn:
     sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace")
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     if case.most is not None:
+        # Python does not notice that a file of bytecode was cut, and later reads what is left.
+        sys.dont_write_bytecode = True
         resource.setrlimit(resource.RLIMIT_FSIZE, (case.most, case.most))
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.argv = ["pendmap", *case.words]

@@ -180,6 +180,9 @@ def _exit_code(stops: Sequence[int]) -> int:
     try:
         result = command.main(prog_name="pendmap", standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (distinguished below)
+        if isinstance(error, click.Abort) and isinstance(error.__cause__, EOFError):
+            # click takes the unexpected end of any file for an interrupt.
+            error = error.__cause__
         interrupted = isinstance(error, (click.Abort, KeyboardInterrupt))
         # After a signal, an error of a library, for example during its import, is due to the
         # signal, except that a stopped trajectory is written and may not fit the disk.

@@ -17,7 +17,7 @@ import xarray as xr
 import pendmap
 from conftest import COMMAND
 from interrupted import started
-from pendmap import Grid, InputError, Pendulum
+from pendmap import Grid, InputError, Pendulum, cli
 from pendmap.files import check_room, whole_file, whole_folder
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ def bounded(words: tuple[str, ...], folder: Path, most: int) -> subprocess.Compl
         text=True,
         check=False,
         timeout=60,
+        # Python does not notice that a file of bytecode was cut, and later reads what is left.
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
     )
 
@@ -56,6 +58,16 @@ def test_a_full_disk_is_reported_on_one_line(tmp_path: Path, files: tuple[str, .
     assert run.stderr.splitlines() == [f"pendmap: {missed}; written: nothing"]
     assert "basin stability" in run.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_unexpected_end_of_a_file_is_no_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def cut(*_: object, **__: object) -> None:
+        raise EOFError("marshal data too short")
+
+    monkeypatch.setattr("pendmap.analysis.basins.basins", cut)
+    monkeypatch.setattr(sys, "argv", ["pendmap", *SMALL])
+    with pytest.raises(EOFError, match="too short"):
+        cli.run()
 
 
 def test_files_written_before_the_disk_is_full_are_kept(tmp_path: Path) -> None:
