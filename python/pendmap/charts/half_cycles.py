@@ -183,7 +183,10 @@ def _velocity(
         every = max(1, time.size // POINTS)
         time, half = time[::every], half[::every]
         within = (peaks.time >= ends[0]) & (peaks.time <= ends[1])
-        speed = _slopes(course, time, SPAN * float(np.median(np.diff(peaks.time[within]))))
+        # A cubic needs five samples, also where the record has few to a half cycle.
+        least = 2.5 * float(np.median(np.diff(course.time)))
+        reach = max(SPAN * float(np.median(np.diff(peaks.time[within]))), least)
+        speed = _slopes(course, time, reach)
     return [*_coloured(time, speed, half, 1.1), ZERO], speed
 
 

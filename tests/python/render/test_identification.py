@@ -18,7 +18,7 @@ import pendmap
 from decays import decay, record
 from pendmap import render
 from pendmap.charts import chart as charts
-from pendmap.charts import decrement, half_cycles, identification, methods
+from pendmap.charts import decrement, half_cycles, identification, marks, methods
 from pendmap.charts.names import signed
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
@@ -183,6 +183,16 @@ def test_half_cycles_are_numbered_by_their_peaks() -> None:
         inner = course.half == 7
         assert np.sum(inner) > 40
         assert course.theta[inner][-1] > course.theta[inner][0]
+
+
+def test_the_velocity_of_a_record_with_few_samples_a_half_cycle_is_drawn() -> None:
+    found = as_report(*record(decay(release=1.0), seconds=40.0, rate=13.0))
+    first = next(panel for panel in half_cycles.part(found).panels if panel.name == "velocity")
+    speeds = [mark.y for mark in first.marks if isinstance(mark, marks.Line)]
+    fastest = np.nanmax(np.abs(np.concatenate(speeds)))
+    # Energy of the largest swing, without damping.
+    largest = 2 * found.best.rig.w0 * math.sin(float(np.abs(found.peaks.amplitude).max()) / 2)
+    assert fastest == pytest.approx(largest, rel=0.1)
 
 
 def test_only_methods_that_apply_are_drawn() -> None:
