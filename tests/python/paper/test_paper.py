@@ -183,7 +183,7 @@ def test_figure_8_compares_steady_states_of_the_requested_kinds(
         assert one.steady.rms < 0.02
     drawing.draw(comparison.steady(runs, "Steady", "rig")).savefig(tmp_path / "8.svg")
     drawn = (tmp_path / "8.svg").read_text()
-    assert drawn.count("rotation 1:1") == 2
+    assert drawn.count("rotation 1:+1") == 2
     assert "identified model" in drawn
 
 
