@@ -118,7 +118,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     search = sweep.CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
     first = None
     if start is not None:
-        if np.shape(start) != (2,):
+        if np.asarray(start, dtype=object).shape != (2,):
             raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pendmap.analysis.result import records
 from pendmap.units import RATE, TIME, VELOCITY, Units
@@ -86,9 +85,9 @@ def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
         **{name: name for name in more},
     )
     for own, points in zip(found, points_of(dataset, one), strict=True):
-        closed = own["n"] > 0
-        own["n"], own["w"] = (own["n"], own["w"]) if closed else (None, None)
-        own["points"] = points.tolist() if closed else None
+        own["points"] = points.tolist()
+        if own["n"] <= 0:  # chaos
+            own["n"] = own["w"] = own["points"] = None
         own["multipliers"] = [p for p in own["multipliers"] if not math.isnan(p[0])] or None
         own["twin"] = own["twin"] or None
     return found
@@ -113,6 +112,8 @@ def matched(
     theirs: list[Floats],
 ) -> list[int]:
     """Match attractors of equal :func:`plain` names by least distance; return indices, else -1."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 (only draws need it)
+
     found = [-1] * len(others)
     for name in dict.fromkeys(map(plain, others)):
         mine = [k for k, own in enumerate(names) if plain(own) == name]

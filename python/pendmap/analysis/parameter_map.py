@@ -11,7 +11,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result, sweep
-from pendmap.analysis.draws import count_sure_cells, drawn, drawn_field, outcomes
+from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_cells, sure_line
 from pendmap.analysis.numerics import Numerics, part
 from pendmap.analysis.result import Field, Schema, records, rows, summarised, variable
 from pendmap.analysis.summary import box_said
@@ -322,6 +322,7 @@ def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
     found = dataset.assign(outcome_kinds=("outcome", texts))
     found = found.assign(outcomes(dims, probability, share[order]))
+    found.attrs["sure_cells"] = sure_cells(found)
     return draws.complete(found, _drawn_summary(found))
 
 
@@ -336,4 +337,4 @@ def _drawn_summary(found: xr.Dataset) -> list[str]:
         )
     if len(every) > _LISTED:
         lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
-    return [*lines, count_sure_cells(found, "a regime")]
+    return [*lines, sure_line(found, "a regime")]

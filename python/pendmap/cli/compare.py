@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,7 +15,7 @@ from pendmap.cli.options import (
     seed_option,
     threads_option,
 )
-from pendmap.cli.show import Outputs, table, write_all
+from pendmap.cli.show import Outputs, doubts_first, write_all
 from pendmap.cli.types import FILE, NUMBER, whole
 from pendmap.errors import instruction_set
 
@@ -68,10 +67,5 @@ def command(  # noqa: PLR0913 (an option each)
     written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-    tables, lines = comparison.text_parts()
-    text = itertools.chain(
-        doubts,
-        (table(*each) for each in tables),
-        (line for line in lines if line not in doubts),
-    )
-    outputs.finish(written, lambda: as_json(comparison) | more, text)
+    lines = doubts_first(comparison, doubts)
+    outputs.finish(written, lambda: as_json(comparison) | more, lines)

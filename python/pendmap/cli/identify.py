@@ -10,15 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import output_options, reading_options
-from pendmap.cli.show import Outputs, Written, table, write_all
+from pendmap.cli.show import Outputs, Written, doubts_first, write_all
 from pendmap.cli.types import FILE
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
-
-    from pendmap.identification import IdentificationReport
 
 
 SUFFIX = ".toml"
@@ -54,7 +51,7 @@ def command(
     other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
     """
     from pendmap.identification import identified_model, identify_experiment
-    from pendmap.identification.report import as_json
+    from pendmap.identification.report import as_json, foremost
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
@@ -68,7 +65,8 @@ def command(
 
     def finish(written: Written) -> None:
         more = {"model": written.name(outputs.out), "simd": instruction_set()}
-        outputs.finish(written, lambda: as_json(report) | more, _lines(report))
+        lines = doubts_first(report, [f"Warning: {text}" for text in foremost(report)])
+        outputs.finish(written, lambda: as_json(report) | more, lines)
 
     try:
         model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
@@ -80,15 +78,3 @@ def command(
         files = outputs.files(report, save, "draw_identification", "record_identification")
         written = write_all(files, keep=True)
     finish(written)
-
-
-def _lines(report: IdentificationReport) -> Iterator[str]:
-    """Yield the doubts, the tables, and what is said of the estimates."""
-    from pendmap.identification.report import as_text, foremost, methods_table, table1_table
-
-    doubts = [f"Warning: {text}" for text in foremost(report)]
-    yield from doubts
-    for head, rows in (methods_table(report), table1_table(report)):
-        if rows:
-            yield table(head, rows)
-    yield from (line for line in as_text(report) if line not in doubts)

@@ -50,7 +50,6 @@ def command(  # noqa: PLR0913 (an option each)
     errors of each, 8 steady states after 2500 s (it takes some minutes), 9 transient tumbling.
     Writes figure_1.png to figure_9.png and table_1.csv, as requested.
     """
-    from pendmap.identification.report import methods_table, table1_table
     from pendmap.paper import figures
 
     keys = figures.wanted(" ".join(figure))
@@ -68,6 +67,8 @@ def command(  # noqa: PLR0913 (an option each)
         write_json({"files": written})
     elif not quiet:
         if any(Path(name).suffix == ".csv" for name in written):
+            from pendmap.identification.report import methods_table, table1_table
+
             found = figures.report(seed)
             for each in (methods_table(found), table1_table(found), figures.printed_table()):
                 click.echo(table(*each))

@@ -21,11 +21,12 @@ from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import columns
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     import xarray as xr
 
     from pendmap.analysis.result import Schema
+    from pendmap.formatting import Readable
 
     Write = Callable[[Path], Path | str]
 
@@ -243,6 +244,14 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table with a bold header and aligned columns, whatever the terminal's width."""
     first, *others = columns(head, rows).split("\n")
     return "\n".join([click.style(first, bold=True), *others])
+
+
+def doubts_first(found: Readable, doubts: Collection[str]) -> Iterator[str]:
+    """Yield doubts, then the tables and lines of a result's text without them."""
+    yield from doubts
+    tables, lines = found.text_parts()
+    yield from (table(head, rows) for head, rows in tables if rows)
+    yield from (line for line in lines if line not in doubts)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

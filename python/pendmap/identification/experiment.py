@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import FitDiverged, InputError, check_callable, check_type, instruction_set
+from pendmap.errors import (
+    FitDiverged,
+    InputError,
+    check_callable,
+    check_type,
+    instruction_set,
+    named,
+)
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
@@ -211,10 +218,8 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         rms, noise = report.joint.fit.rms, report.joint.noise
     notes["provenance"] = provenance(files, command, rms=rms, noise=noise)
     notes["provenance"]["method"] = best.method
-    try:
+    with named(f"{report.run.name}: the result is no valid model"):
         return dataclasses.replace(report.model, notes=notes)
-    except InputError as error:
-        raise InputError(f"{report.run.name}: the result is no valid model: {error}") from None
 
 
 def provenance(

@@ -124,7 +124,7 @@ class EffectDefinition:
 
     def __getitem__(self, name: str) -> EffectParameter:
         """Return a parameter."""
-        return next(parameter for parameter in self.parameters if parameter.name == name)
+        return {parameter.name: parameter for parameter in self.parameters}[name]
 
     @property
     def opposes(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import os
@@ -10,7 +9,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendmap.errors import InputError, check_keys, check_number, core_errors, short_repr
+from pendmap.errors import InputError, check_keys, check_number, core_errors, named, short_repr
 from pendmap.files import read_toml
 from pendmap.model.effects import Effect, EffectDefinition
 
@@ -131,12 +130,10 @@ class Formula:
                 f"of w0, got {shown}"
             )
         names = list(self.parameters)
-        try:
+        with named(f"formula '{self.name}'"):
             parts, tables = zip(
                 *(_parameter(n, self.parameters[n], names) for n in names), strict=True
             )
-        except InputError as error:
-            raise InputError(f"formula '{self.name}': {error}") from None
         if self.name in _TAKEN:
             raise InputError(
                 f"formula '{self.name}': the name must be another, a pendulum has a parameter of "
@@ -208,15 +205,6 @@ class Formula:
         return table | ({"revealed_by": self.revealed_by} if self.revealed_by else {})
 
 
-@contextlib.contextmanager
-def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Prefix the message of an InputError with the name of a file."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{os.fspath(path)}: {error}") from None
-
-
 def each_table(
     name: str, tables: object, keys: tuple[str, ...], examples: Mapping[str, str]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -271,7 +259,7 @@ def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
     """
     content = read_toml(path)
     unknown = [key for key in content if key not in ("formula", "format_version")]
-    with in_file(path):
+    with named(os.fspath(path)):
         if unknown and "pendulum" not in content:
             raise InputError(f"{unknown[0]} is not known: all must be tables [[formula]]")
         if not content.get("formula"):

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from pendmap.errors import InputError, check_keys, check_number, check_whole, short_repr, shown_key
+from pendmap.errors import (
+    InputError,
+    check_keys,
+    check_number,
+    check_whole,
+    named,
+    short_repr,
+    shown_key,
+)
 from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, each_table, formulas_of, in_file
+from pendmap.model.formula import Formula, each_table, formulas_of
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable
 
 FORMAT: Final = 1  # Version of the layout of model files, in their key ``format_version``
@@ -49,7 +57,7 @@ def read_model(
     """Return the model of a file, made by ``bare`` or ``si``; refuse it if its maker is None."""
     content = read_toml(path)
     typed = dict(typed or {})
-    with in_file(path):
+    with named(os.fspath(path)):
         _check_top(content)
         table = content.get("pendulum")
         if not isinstance(table, dict):

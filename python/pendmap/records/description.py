@@ -6,7 +6,15 @@ import dataclasses
 import difflib
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pendmap.errors import InputError, check_flag, check_number, check_whole, short_repr
+from pendmap.errors import (
+    InputError,
+    check_flag,
+    check_number,
+    check_whole,
+    named,
+    short_repr,
+    shown_key,
+)
 from pendmap.files import read_toml
 from pendmap.records.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
 
@@ -87,10 +95,8 @@ class Description:
 def read_description(path: Path) -> Description:
     """Read an ``experiment.toml``; raise InputError, with the path, for invalid content."""
     content = read_toml(path)
-    try:
+    with named(str(path)):
         return _description(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def _description(content: dict[str, Any]) -> Description:
@@ -132,10 +138,10 @@ def _refuse_unknown(
         near = difflib.get_close_matches(key.lower(), [k.lower() for k in known], 1, 0.55)
         meant = next((k for k in known if near and k.lower() == near[0]), None)
         perhaps = f", perhaps {meant} is meant" if meant else ""
-        shown = key if key.isidentifier() else short_repr(key)
         place = f"{where}: " if where else ""
+        names = among or ", ".join(known)
         raise InputError(
-            f"{place}{shown} is not known{perhaps}: it must be one of {among or ', '.join(known)}"
+            f"{place}{shown_key(key)} is not known{perhaps}: it must be one of {names}"
         )
 
 

@@ -96,7 +96,7 @@ def test_simulate_names_what_it_refuses(words: dict[str, Any], complaint: str) -
         )
 
 
-@pytest.mark.parametrize("start", [3, (1.0,), (1.0, 2.0, 3.0), ("a", 1.0)])
+@pytest.mark.parametrize("start", [3, (1.0,), (1.0, 2.0, 3.0), ("a", 1.0), ((1.0, 2.0), 3.0)])
 def test_sweeps_start_from_an_angle_and_a_velocity(start: Any) -> None:  # noqa: ANN401
     with pytest.raises(InputError, match="start must be"):
         pendmap.bifurcation(Pendulum(), {"p": (0.5, 0.6, 2)}, start=start)

@@ -1,6 +1,6 @@
 """Models drawn from the covariance of fitted parameters.
 
-The modules, one for each analysis, compute statistics of its results over the draws.
+``draws.basins`` computes statistics of basin maps over the draws; other analyses compute their own.
 """
 
 from __future__ import annotations
@@ -174,10 +174,14 @@ def outcomes(
     }
 
 
-def count_sure_cells(found: xr.Dataset, what: str) -> str:
-    """Set the attribute ``sure_cells``, the share of cells that are sure; return a summary line."""
-    share = found.attrs["sure_cells"] = float((found["certainty"].values >= _SURE).mean())
+def sure_cells(found: xr.Dataset) -> float:
+    """Return the share of the cells whose most likely outcome is sure."""
+    return float((found["certainty"].values >= _SURE).mean())
+
+
+def sure_line(found: xr.Dataset, what: str) -> str:
+    """Return a summary line on the attribute ``sure_cells``."""
     return (
-        f"{100 * share:.1f} % of the cells have {what} with a probability of {100 * _SURE:g} % or "
-        "more."
+        f"{100 * found.attrs['sure_cells']:.1f} % of the cells have {what} with a probability of "
+        f"{100 * _SURE:g} % or more."
     )

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.draws import count_sure_cells, drawn_field, outcomes
+from pendmap.analysis.draws import drawn_field, outcomes, sure_cells, sure_line
 from pendmap.analysis.fractality import BOX
 from pendmap.analysis.orbit_table import matched, plain, points_of
 from pendmap.analysis.result import rows
@@ -54,6 +54,7 @@ def basins_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """
     ends, start, known = _counted(dataset, draws.each(run))
     found = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
+    found.attrs["sure_cells"] = sure_cells(found)
     for name in _DOUBT:
         found.attrs[name] = float(found[name].values.mean())
     return draws.complete(found, _summary(found))
@@ -173,7 +174,7 @@ def _summary(found: xr.Dataset) -> list[str]:
             f"{name}: {100 * mean:.2f} % of the starts, 95 % of the draws in "
             f"[{100 * low:.2f}, {100 * high:.2f}] %{there}."
         )
-    lines.append(count_sure_cells(found, "an end"))
+    lines.append(sure_line(found, "an end"))
     both = a["doubt_start"] + a["doubt_parameters"]
     lines.append(
         f"Entropy of the end in a box of {BOX} x {BOX} cells: {both:.3f} nat = "
