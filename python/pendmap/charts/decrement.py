@@ -14,10 +14,11 @@ import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import NONE, QUIET, ZERO, Band, Level, Line, Mark, Points
-from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, Z95, look, nothing
+from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, look, nothing
 from pendmap.formatting import Estimate, estimate_text, typographic
 from pendmap.identification.methods.combined import CUT, triplets
 from pendmap.identification.table1 import first_state, simulated_peaks
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

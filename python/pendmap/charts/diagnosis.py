@@ -13,8 +13,9 @@ from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
 from pendmap.charts.identification import errors_of
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
-from pendmap.charts.methods import NOISE, Z95, look
+from pendmap.charts.methods import NOISE, look
 from pendmap.model.labels import unit_of
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,9 +11,10 @@ import numpy as np
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import NONE, QUIET, ZERO, Areas, Level, Line, Mark, Points, bars
-from pendmap.charts.methods import EVEN, MEASURED, ODD, Z95
+from pendmap.charts.methods import EVEN, MEASURED, ODD
 from pendmap.charts.record import UNUSED
 from pendmap.formatting import typographic
+from pendmap.signal.robust import Z95
 from pendmap.units import Units
 
 if TYPE_CHECKING:

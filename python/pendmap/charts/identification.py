@@ -13,11 +13,11 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.charts import decrement, half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
-from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, Z95, drawn, look, nothing
+from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, drawn, look, nothing
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
-from pendmap.signal.robust import span
+from pendmap.signal.robust import Z95, span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -20,7 +20,6 @@ MEASURED: Final = "#222222"
 NOISE: Final = "#d9d9d9"
 NOISE_SAID: Final = "95 % of the readings' noise"
 """Colour and name of the band of the readings' noise."""
-Z95: Final = 1.959963984540054  # Half width of a 95 % interval, standard errors
 
 
 @dataclasses.dataclass(frozen=True)

@@ -230,7 +230,7 @@ class ForcedComparison:
 
     def __repr__(self) -> str:
         held = ", held out" if self.run.hold_out else ""
-        ends = "no steady state" if self.steady is None else self.steady.measured.kind
+        ends = "no steady state" if self.steady is None else self.steady.measured.name
         return (
             f"<ForcedComparison {self.run.name}{held}: rms {self.rms:.3g} rad in "
             f"{self.windows} windows, noise {self.sigma:.3g} rad; {ends}>"

@@ -18,10 +18,9 @@ from pendmap.model.rig import own_name
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.model import Rig
     from pendmap.model.effects import EffectDefinition, EffectParameter
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 ZERO: Final = "encoder_offset"
@@ -230,7 +229,7 @@ def _shapes(entry: EffectDefinition) -> Iterator[dict[str, float]]:
         yield {first.name: float(value)} | fixed
 
 
-def _scan(entry: EffectParameter) -> NDArray[np.float64]:
+def _scan(entry: EffectParameter) -> Floats:
     """Return the scored values of a shape parameter, nondimensional."""
     low, high = entry.typical
     if entry.role == "order":

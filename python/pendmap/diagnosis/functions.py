@@ -23,13 +23,10 @@ from pendmap.residuals.torque import project_out, responses, window_derivatives
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.records import Run
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 VISITED: Final = (0.05, 0.95)
 """Quantiles to which angles and velocities are clipped in a check: noise exceeds them."""

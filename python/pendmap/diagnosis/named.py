@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
-from pendmap.identification.uncertainty import Z95
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubted
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.candidates import Candidate

@@ -14,7 +14,7 @@ from pendmap.diagnosis.fitted_model import (
     impose_physics,
 )
 from pendmap.identification.fit import fit_runs
-from pendmap.identification.uncertainty import Z95
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

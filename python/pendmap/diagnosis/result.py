@@ -165,8 +165,8 @@ def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
             f"{own} = {value:.3g} {unit_of(f'{name}.{own}', found.definition)}".rstrip()
             for own, value in row["shape"].items()
         )
-        gains = () if tried is None else (tried.bic_gain, tried.held_out_gain)
-        said = ["" if gain is None else f"{gain:.1f}" for gain in gains] or ["", ""]
+        gains = (None, None) if tried is None else (tried.bic_gain, tried.held_out_gain)
+        said = ["" if gain is None else f"{gain:.1f}" for gain in gains]
         rows.append([name, shape, f"{row['score']:.1f}", *said])
     return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
 

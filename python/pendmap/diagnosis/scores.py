@@ -36,16 +36,13 @@ from pendmap.residuals.times import calm_responses, frequencies, instants
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 PASS: Final = 16  # Directions of derivatives in one pass of the integrator
 

@@ -11,13 +11,7 @@ import numpy as np
 from pendmap.errors import FitDiverged, InputError, core_errors
 from pendmap.formatting import Estimate
 from pendmap.identification.parameters import PER_RUN, PLACES, Conversion, free_quantities, interval
-from pendmap.identification.runs import (
-    FitRun,
-    bare_run,
-    bare_windows,
-    rig_of,
-    tolerance_of,
-)
+from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.units import Units
 
 if TYPE_CHECKING:

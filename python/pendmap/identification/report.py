@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
 from pendmap.formatting import Readable, counted, estimate_text, interval, percent
-from pendmap.identification.methods.base import Identification
 from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
@@ -170,13 +169,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             "rms": report.with_drag.fit.rms,
             "parameters": {n: e.value for n, e in report.with_drag.fit.estimates.items()},
         },
-        "findings": [
-            found.text
-            for found in (
-                *report.experiment.findings,
-                *(found for each in report.runs for found in each.findings),
-            )
-        ],
+        "findings": [found.text for _, found in report.experiment.said(report.runs)],
     }
 
 

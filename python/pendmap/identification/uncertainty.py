@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
@@ -11,9 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pendmap.signal import Floats, Indices
-
-
-Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
 
 
 def jacobian(function: Callable[[Floats], Floats], values: Floats, steps: Floats) -> Floats:

@@ -24,7 +24,7 @@ import numpy as np
 
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.resolution import step_of, still_noise
-from pendmap.signal.local_polynomial import LocalFit, local_fit
+from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, widened
 
 if TYPE_CHECKING:

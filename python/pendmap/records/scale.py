@@ -16,7 +16,7 @@ import numpy as np
 
 from pendmap.model.quantities import GRAVITY
 from pendmap.signal.half_cycles import after_turns, swings
-from pendmap.signal.robust import normal_scale
+from pendmap.signal.robust import Z95, normal_scale
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -31,7 +31,6 @@ UNLIKE_RIG: Final = 0.25  # Relative difference from the period of [rig] above w
 FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
 LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
 LEAST_ERROR: Final = 1e-3  # Least relative error of a scale factor
-Z95: Final = 1.959963984540054  # The 97.5 % point of the standard normal distribution
 FAR_ZERO: Final = 0.15  # Rest angle, rad, above which friction (Tr/w0^2) cannot explain it
 OFF_QUARTER: Final = 0.1  # Greatest deviation of a rotated gauge from multiples of 90 degrees, rad
 CERTAIN_MIDDLE: Final = 10  # Fewest half cycles that determine the middle

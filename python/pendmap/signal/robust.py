@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
+Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
 LONG_INTERVAL: Final = 1.6  # Interval, in median intervals, above which samples are missing
 SCATTERED_STAMPS: Final = 0.1  # Scatter, in median intervals, above which stamps are averaged
 STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared
@@ -70,7 +71,7 @@ def equal_runs(values: Floats, least: int) -> tuple[Indices, Indices]:
 
 def from_first(time: ArrayLike) -> tuple[Floats, float]:
     """Return times relative to the first, which keeps their digits, and the first time, s."""
-    t = np.ascontiguousarray(time, dtype=np.float64)
+    t = np.asarray(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t[0]):
         return t, 0.0
     return t - t[0], float(t[0])

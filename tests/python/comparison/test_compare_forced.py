@@ -99,10 +99,14 @@ def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("start", "kind"), [((0.9, 0.0), "oscillation period 2"), ((0.2, 14.5), "rotation 1:1")]
+    ("start", "kind", "name"),
+    [
+        ((0.9, 0.0), "oscillation period 2", "oscillation period 2"),
+        ((0.2, 14.5), "rotation 1:1", "rotation 1:+1"),
+    ],
 )
 def test_a_steady_state_is_the_models_orbit(
-    start: tuple[float, float], kind: str, tmp_path: Path
+    start: tuple[float, float], kind: str, name: str, tmp_path: Path
 ) -> None:
     """The orbit equals that found by Newton's method; more damping makes a smaller oscillation."""
     experiment = made(tmp_path, forced(*start, 90.0))
@@ -110,6 +114,7 @@ def test_a_steady_state_is_the_models_orbit(
     found = one.steady
     assert found is not None
     assert found.measured.kind == kind
+    assert repr(one).endswith(f"; {name}>")
     assert [(r.cycle.kind, r.share) for r in found.reached] == [(kind, 1.0)]
     assert found.rms < 3e-3
     assert found.rms_velocity < 0.05

@@ -29,8 +29,6 @@ from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.candidates import Candidate
@@ -39,8 +37,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.sensitivity import WindowSlopes
-
-    Floats = NDArray[np.float64]
+    from pendmap.signal import Floats
 
 FOLLOWED: Final = 1e-9
 """Eigenvalue of information over the largest below which a direction is undetermined."""

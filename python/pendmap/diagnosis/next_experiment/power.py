@@ -18,7 +18,7 @@ import numpy as np
 
 from pendmap.diagnosis.candidates import Candidate, list_candidates
 from pendmap.diagnosis.next_experiment.information import Prospects
-from pendmap.identification.uncertainty import Z95
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.formatting import Estimate, counted, estimate_text
-from pendmap.identification.uncertainty import Z95
 from pendmap.model import Rig
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
