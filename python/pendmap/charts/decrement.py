@@ -127,11 +127,6 @@ def _source(report: IdentificationReport) -> Identification | None:
     return None
 
 
-def offset_of(found: Identification) -> float:
-    """Return the zero error of an identification, 0 if it estimates none."""
-    return found["offset"] if "offset" in found.estimates else 0.0
-
-
 def from_first_peak(rig: Rig, peaks: Peaks, zero: float) -> tuple[State, Floats, Floats]:
     """Return the first peak less a zero error, and times and angles of the peaks from it on."""
     start = first_state(peaks)
@@ -193,7 +188,7 @@ def _model(
         Level(CUT, axis="x", colour=QUIET, dash=":", name="12°"),
     ]
     turned = peaks.turned
-    _, _, angles = from_first_peak(source.rig, peaks, offset_of(source))
+    _, _, angles = from_first_peak(source.rig, peaks, source.zero)
     size = np.abs(angles + shift)
     if size.size < 3:  # noqa: PLR2004
         return marks

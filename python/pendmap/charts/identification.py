@@ -114,7 +114,7 @@ def _decays(report: IdentificationReport) -> dict[str, Decay]:
         if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
             continue
         rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
-        made[name] = Decay.of(rig, report.peaks, decrement.offset_of(found))
+        made[name] = Decay.of(rig, report.peaks, found.zero)
     return made
 
 

@@ -192,8 +192,7 @@ def _residuals(run: Run) -> Panel:
     # An angle changes with the velocity, a rate with the acceleration.
     speeds = "|dθ/dt| (rad/s)"
     if run.gyroscope is not None:
-        two = "²"
-        speeds = f"|d{two}θ/dt{two}| (rad/s{two})"
+        speeds = "|d²θ/dt²| (rad/s²)"
     fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
     across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
     up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))

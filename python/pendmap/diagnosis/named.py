@@ -11,7 +11,7 @@ from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
 from pendmap.model import Effect
 from pendmap.model.rig import own_name
-from pendmap.records.summary import doubted
+from pendmap.records.summary import doubt_keys
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def name_effects(
                 parameters,
                 ci95,
                 each.share * sure,
-                assessment.approximate or bool(doubted(data.experiment, *data.runs)),
+                assessment.approximate or bool(doubt_keys(data.experiment, *data.runs)),
                 each.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),

@@ -107,7 +107,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         else [dataclasses.asdict(score) for score in found.functions],
         "not_computed": unknown,
         "attempts": [dataclasses.asdict(attempt) for attempt in found.attempts],
-        "findings": [one.text for _, one in found.data.experiment.said(found.data.runs)],
+        "findings": [one.text for _, one in found.data.experiment.findings_of(found.data.runs)],
     }
 
 

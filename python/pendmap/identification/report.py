@@ -169,7 +169,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             "rms": report.with_drag.fit.rms,
             "parameters": {n: e.value for n, e in report.with_drag.fit.estimates.items()},
         },
-        "findings": [found.text for _, found in report.experiment.said(report.runs)],
+        "findings": [found.text for _, found in report.experiment.findings_of(report.runs)],
     }
 
 

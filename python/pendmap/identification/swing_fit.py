@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.signal.robust import NORMAL_MAD
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -21,7 +23,6 @@ _SETTLED: Final = 6  # Iteration after which no more outliers are excluded
 _LOSS: Final = 4  # Number of turns above which their damping is estimated
 _OUTLIER: Final = 5.0  # Standard deviations beyond which a sample is excluded
 _DOUBT: Final = 3.0  # Standard errors of a block's noise above which the model misfits
-_NORMAL_MAD: Final = 0.674489750196  # Median absolute deviation of a standard normal variable
 
 
 @dataclasses.dataclass(frozen=True)
@@ -189,7 +190,7 @@ def _scales(residual: Floats, used: Mask, blocks: list[slice]) -> Floats:
         some = np.abs(residual[block][used[block]])
         points, windows = some.size, block.stop - block.start
         freedom = max(points - 2 * windows - FORM, 1)
-        scale[block] = float(np.median(some)) / _NORMAL_MAD * np.sqrt(points / freedom)
+        scale[block] = float(np.median(some)) / NORMAL_MAD * np.sqrt(points / freedom)
     return scale
 
 

@@ -134,10 +134,9 @@ def peak_errors(
     The identified zero error is subtracted from the recorded ``start``. ``offset`` is the zero
     error of ``peaks``, rad, if it differs.
     """
-    zero = found["offset"] if "offset" in found.estimates else 0.0
-    shown = zero if offset is None else offset
+    shown = found.zero if offset is None else offset
     turned = peaks.turned
-    origin = dataclasses.replace(start, theta=start.theta - zero)
+    origin = dataclasses.replace(start, theta=start.theta - found.zero)
     span = float(turned.time[-1]) - start.time
     times, angles = simulated_peaks(found.rig, origin, start.time + 1.2 * span + 5.0)
     return errors_of(found.method, peaks, times, angles + shown)

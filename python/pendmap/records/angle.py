@@ -11,6 +11,7 @@ from pendmap.errors import InputError
 from pendmap.formatting import counted
 from pendmap.records.from_acceleration import angle_from
 from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_rate
+from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -156,7 +157,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
     for _ in range(2):
         a, b, radius, error, rms = _geometric(u[kept], v[kept], a, b, radius)
         away = np.abs(np.hypot(u - a, v - b) - radius)
-        limit = 6 * max(1.4826 * float(np.median(away)), 1e-9)
+        limit = 6 * max(normal_scale(away), 1e-9)
         kept = away <= limit
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(

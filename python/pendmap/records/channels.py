@@ -80,7 +80,8 @@ def channels_of(  # noqa: C901 (a step each)
     findings += questions
     sensor, missing = None, ""
     if "acceleration" in places:
-        head, gravity = table.names[places["acceleration"]], float(known.get("gravity", GRAVITY))
+        head = table.names[places["acceleration"]]
+        gravity = float(known.get("gravity", GRAVITY))
         sensor, missing = accelerometer_of(asked.get("acceleration", Column()), head, gravity)
     edges = asked.get("trigger", Column())
     time = values.pop("time")

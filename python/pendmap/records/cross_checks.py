@@ -182,10 +182,12 @@ def _acceleration(work: Work) -> None:
     """Compare an acceleration with the angle; invert it if it has the opposite sign."""
     if work.angle_source is not None:
         return
-    motion = None if work.plan.kind == "forced" else _motion(work)
+    forced = work.plan.kind == "forced"
+    motion = None if forced else _motion(work)
     if motion is None:
         why = "too few samples have an angle to compare it with"
-        why = "on a forced run it includes the pivot's" if work.plan.kind == "forced" else why
+        if forced:
+            why = "on a forced run it includes the pivot's"
         work.report("acceleration-unused", f"the acceleration is not used: {why}")
     elif work.accelerometer is None:
         _unplaced(work, motion)

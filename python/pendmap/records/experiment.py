@@ -9,7 +9,7 @@ from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from pendmap.records.description import Kind
@@ -201,7 +201,9 @@ class Experiment:
     @property
     def w0(self) -> float | None:
         """``w0`` of ``[rig]``, rad/s; None if not given or inconsistent with a record's period."""
-        doubtful = any(found.what == "period-unlike-rig" for _, found in self.said(self.runs))
+        doubtful = any(
+            found.what == "period-unlike-rig" for _, found in self.findings_of(self.runs)
+        )
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
 
     @property
@@ -209,15 +211,15 @@ class Experiment:
         """``gravity`` of ``[rig]``, m/s^2; 9.81 by default."""
         return float(self.known.get("gravity", GRAVITY))
 
-    def refuse_still(self, runs: Iterable[Run]) -> None:
+    def refuse_still(self, runs: Sequence[Run]) -> None:
         """Raise InputError if none of the runs has samples for fitting."""
         if any(run.moves for run in runs):
             return
-        whys = (found.text for _, found in self.said(self.runs) if found.what in NOTHING_TO_FIT)
+        whys = (found.text for _, found in self.findings_of(runs) if found.what in NOTHING_TO_FIT)
         why = next(whys, "no sample is trusted")
         raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 
-    def said(self, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
+    def findings_of(self, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
         """Yield the findings about the experiment and some runs, with their places."""
         yield from ((str(self.path), found) for found in self.findings)
         yield from ((run.name, found) for run in runs for found in run.findings)

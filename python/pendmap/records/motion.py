@@ -12,7 +12,7 @@ from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
 from pendmap.records import trigger
 from pendmap.records.experiment import Segment
-from pendmap.records.from_acceleration import constant, release_after_hold, swinging
+from pendmap.records.from_acceleration import STILL_SPAN, constant, release_after_hold, swinging
 from pendmap.records.noise import noise_of
 from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.rod_sensors import gyroscope_of
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Stretch
 
-STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
 MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported

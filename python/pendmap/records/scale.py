@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.model.quantities import GRAVITY
+from pendmap.records.units import DEGREE
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices
 
 
-DEGREE: Final = math.pi / 180
 LONGEST_PERIOD: Final = 60.0  # Longest period of a laboratory pendulum, s
 SHORTEST_PERIOD: Final = 0.02  # Shortest period, s: a length of 0.1 mm
 SAMPLES_A_PERIOD: Final = 8.0  # Samples per period below which slow sampling is reported
@@ -248,7 +248,7 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
         root = np.sqrt(weights)[:, None]
         answer = np.linalg.lstsq(columns * root, values * root[:, 0], rcond=None)[0]
         away = np.abs(values - columns @ answer)
-        scale = max(1.4826 * float(np.median(away)), 1e-12)
+        scale = max(normal_scale(away), 1e-12)
         weights = np.minimum(1.0, 1.345 * scale / np.maximum(away, 1e-12))
     inverse = np.linalg.pinv((columns * weights[:, None]).T @ columns)
     return np.asarray(answer, float), scale * np.sqrt(np.diag(inverse))

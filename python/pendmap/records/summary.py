@@ -137,7 +137,7 @@ def _line(found: Finding) -> str:
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
     """Return the texts of all uncorrected findings that make results doubtful."""
-    said = experiment.said(runs)
+    said = experiment.findings_of(runs)
     return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
 
 
@@ -146,20 +146,20 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     return (f"Warning: {text}" for text in doubts(experiment, *runs))
 
 
-def doubted(experiment: Experiment, *runs: Run) -> set[str]:
+def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
     """Return the keys of uncorrected doubtful findings, without the scale of the angle."""
-    said = {found.what for _, found in experiment.said(runs) if _doubted(found)}
+    said = {found.what for _, found in experiment.findings_of(runs) if _doubted(found)}
     return said - {SCALE_FINDING}
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
     """Return whether a unit of these runs is wrong, which makes residuals meaningless."""
-    return bool(doubted(experiment, *runs) & UNIT_FINDINGS)
+    return bool(doubt_keys(experiment, *runs) & UNIT_FINDINGS)
 
 
 def finding_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
     """Yield a line for each finding that is not in :func:`doubts`."""
-    for where, found in experiment.said(runs):
+    for where, found in experiment.findings_of(runs):
         if not _doubted(found):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
 

@@ -21,7 +21,7 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-_DEGREE: Final = math.pi / 180
+DEGREE: Final = math.pi / 180
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,20 +65,20 @@ _TIMES: Final = {
 _ANGLES: Final = {
     **dict.fromkeys(("rad", "radian", "radians"), 1.0),
     "mrad": 1e-3,
-    **dict.fromkeys(("deg", "degree", "degrees", "grad", "°"), _DEGREE),
+    **dict.fromkeys(("deg", "degree", "degrees", "grad", "°"), DEGREE),
     **dict.fromkeys(("rev", "turn", "turns", "revolutions"), math.tau),
 }
 _SPEEDS: Final = {
     **dict.fromkeys(("rad/s", "rads", "1/s"), 1.0),
     "mrad/s": 1e-3,
-    **dict.fromkeys(("deg/s", "°/s", "dps", "degs"), _DEGREE),
+    **dict.fromkeys(("deg/s", "°/s", "dps", "degs"), DEGREE),
     "rpm": math.tau / 60,
     **dict.fromkeys(("rev/s", "rps"), math.tau),
 }
 # Units of an angular acceleration, in rad/s^2
 ANGULAR_ACCELERATIONS: Final = {
     **dict.fromkeys(("rad/s2", "1/s2"), 1.0),
-    **dict.fromkeys(("deg/s2", "°/s2"), _DEGREE),
+    **dict.fromkeys(("deg/s2", "°/s2"), DEGREE),
 }
 _ACCELERATIONS: Final = {
     **dict.fromkeys(("m/s2", "m/s/s", "ms-2", "m/ss"), 1.0),

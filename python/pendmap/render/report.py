@@ -40,17 +40,17 @@ def write(found: Discrepancy, path: Path) -> Path:
     with mpl.rc_context(style.RC):
         drawn = figures(found)
         pictures = {name: _png(drawn[name]) for name in document.pictures if name in drawn}
-    html = report.as_html(document, pictures).encode()
     suffix = "" if path.is_dir() else path.suffix.lower()
     if suffix == ".html":
-        _put({path: html})
+        _put({path: report.as_html(document, pictures).encode()})
     elif suffix == ".md":
         _put(_markdown(path, document, pictures, f"{path.stem}_"))
     else:
         with contextlib.nullcontext(path) if path.is_dir() else whole_folder(path) as folder:
             folder.mkdir(exist_ok=True)
             files = _markdown(folder / "report.md", document, pictures)
-            _put(files | {folder / "report.html": html})
+            files[folder / "report.html"] = report.as_html(document, pictures).encode()
+            _put(files)
     return path
 
 

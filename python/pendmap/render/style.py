@@ -114,8 +114,7 @@ def written(
     """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
     ``size``, inches, and ``dpi`` are the requested values; InputError is raised for impossible
-    ones. Files are undated,
-    so that equal figures give equal files.
+    ones. Files are undated, so that equal figures give equal files.
     """
     pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
     if not low <= pixels <= high:

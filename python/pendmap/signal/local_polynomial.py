@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.signal.robust import NORMAL_MAD
+
 if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Mask
 
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
 POINTS: Final = 9  # Number of samples in a window
 _EVEN: Final = 1e-3  # Offset from even spacing, in intervals, above which a window is uneven
 _BLOCK: Final = 20_000  # Number of uneven windows solved at a time
-_NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
 _OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
 _ROUNDS: Final = 4  # Largest number of repetitions of a fit without outliers
 _WINDOW_BLOCK: Final = 4096  # Number of windows of uneven samples solved at a time
@@ -216,7 +217,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
     for _ in range(_ROUNDS if sigma > 0 else 0):
         if float(np.abs(residual).max()) <= _OUTLIER * sigma:
             break
-        scale = max(sigma, float(np.median(np.abs(residual))) / _NORMAL_MAD)
+        scale = max(sigma, float(np.median(np.abs(residual))) / NORMAL_MAD)
         good = np.abs(residual) < _OUTLIER * scale
         if good.all() or good.sum() <= len(powers) + 1:
             break

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
 Z95: Final = 1.959963984540054  # 97.5 % point of the standard normal distribution
+NORMAL_MAD: Final = 0.674489750196  # Median of the absolute value of a standard normal variable
 LONG_INTERVAL: Final = 1.6  # Interval, in median intervals, above which samples are missing
 SCATTERED_STAMPS: Final = 0.1  # Scatter, in median intervals, above which stamps are averaged
 STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared

@@ -92,12 +92,10 @@ def _simulated(report: IdentificationReport) -> Comparison:
     w0 = 0.0
     if best is not None and len(peaks.turned) and best.method not in report.table.lost:
         w0, start = best.rig.w0, first_state(peaks)
-        zero = best["offset"] if "offset" in best.estimates else 0.0
         until = max(float(run.time[-1]) - start.time, 1e-3)
-        made = simulate(best.rig, start.theta - zero, 0.0, until)
-        curve = CubicHermiteSpline(
-            made["time"].values + start.time, made["theta"].values + zero, made["velocity"].values
-        )
+        made = simulate(best.rig, start.theta - best.zero, 0.0, until)
+        times, angles = made["time"].values + start.time, made["theta"].values + best.zero
+        curve = CubicHermiteSpline(times, angles, made["velocity"].values)
     elif len(peaks) > 1:
         w0 = math.pi / float(np.median(np.diff(peaks.time)))
     if run.peaks_only:

@@ -61,7 +61,7 @@ class Lanes:
         self.longest = 1.0 / fastest
         self.wish = np.full(count, _FIRST * self.longest)
         self.paths = [Path(lab) for lab in equation.lab[starts.run].tolist()]
-        # The end is a last kick of size 0.
+        # The last entry is the end of the run: it bounds the steps and is never applied.
         self._kicks = [
             [*equation.kicks(int(run), float(begin), float(end)), (float(end), 0.0)]
             for run, begin, end in zip(starts.run, starts.begin, starts.end, strict=True)

@@ -14,10 +14,11 @@ from decays import decay, record
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
 from pendmap.comparison.experiment import as_json as compared
+from pendmap.errors import InputError
 from pendmap.identification import identified_model, identify_experiment
 from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
-from pendmap.records import Experiment, Run
+from pendmap.records import Experiment, Finding, Run
 from recorded import TR, W0, C, clean, experiment, found, motion, noisy, text
 from released import Released, released
 
@@ -173,6 +174,19 @@ def test_noise_alone_is_refused_in_one_line(tmp_path: Path, pendmap_command: Com
         assert ran.returncode == 2
         assert ran.stderr.count("\n") == 1
         assert "nothing moves" in ran.stderr
+
+
+def test_a_refusal_gives_the_reason_of_the_runs_asked_for(tmp_path: Path) -> None:
+    time = np.arange(20.0)
+    still = [
+        Run(name, f"{name}.csv", "free", time, 0 * time, time < 0, findings=(reason,))
+        for name, reason in (
+            ("a", Finding("no-motion", "nothing moves: within 1 rad")),
+            ("b", Finding("no-motion", "nothing moves: within 2 rad")),
+        )
+    ]
+    with pytest.raises(InputError, match="within 2 rad"):
+        Experiment(tmp_path, tuple(still)).refuse_still(still[1:])
 
 
 def test_a_still_run_is_left_out(tmp_path: Path) -> None:

@@ -79,6 +79,11 @@ class Identification:
         w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
         return self.applicable and self.converged and 0 < w0 < math.inf
 
+    @property
+    def zero(self) -> float:
+        """Zero error of the sensor, rad; 0 if the method estimates none."""
+        return self["offset"] if "offset" in self.estimates else 0.0
+
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
         return self.estimates[name].value
