@@ -132,9 +132,9 @@ def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
 def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     """Return which starts are at rest, hanging or inverted, for any drive."""
     of = "start_" if "start_theta" in dataset else ""
-    hangs: xr.DataArray = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
+    hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
     alone = facts(dataset)["torque"] == 0 and not effects_of(dataset.attrs)
-    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0) & alone
+    still: xr.DataArray = (dataset[f"{of}velocity"] == 0) & hangs & alone
     return still
 
 

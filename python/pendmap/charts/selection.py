@@ -154,6 +154,7 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
 
 def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
     """Recompute the shares of a part of a map over two parameters from its cells."""
+    _refuse_kinds(dataset)
     regime = dataset["regime"]
     whole = int(dataset.attrs["cells"])
     if "set" in dataset.indexes:
@@ -170,14 +171,19 @@ def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
     return _note_selection(part, f"{counted(regime.size, 'cell')} of {whole}")
 
 
+def _refuse_kinds(dataset: xr.Dataset) -> None:
+    """Raise InputError for a selection of kinds, without which regimes and entries are wrong."""
+    if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
+        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
+
+
 def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     """Keep the attractors and points at the selected values."""
     name = str(dataset.attrs["varied"])
     values = dataset[name].values
     if "entry_value" not in dataset:  # from an earlier version, and whole
         return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
-    if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
-        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
+    _refuse_kinds(dataset)
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)
