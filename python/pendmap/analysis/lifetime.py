@@ -14,16 +14,7 @@ from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import (
-    NO_YES,
-    Field,
-    Found,
-    Schema,
-    none_below_0,
-    records,
-    summarised,
-    variable,
-)
+from pendmap.analysis.result import Field, Found, Schema, flag, variable
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.files import facts
@@ -52,7 +43,7 @@ _DRAWN: Final = ("mean_periods", "mean_periods_stderr", "transient_chaos", "pers
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
     last = dataset.isel(elapsed=-1)
-    return records(last, name="attractor", fraction="fraction", captured="captured")
+    return result.records(last, name="attractor", fraction="fraction", captured="captured")
 
 
 @drawn_field
@@ -73,7 +64,7 @@ SCHEMA = Schema(
     Found("stderr", "periods", "its standard error", variable="mean_periods_stderr"),
     Found("persistent", result.FLAG, "1 where every start ends on chaos", convert=bool),
     Found("transient_chaos", result.FLAG, "1 where there is transient chaos", convert=bool),
-    Found("from_period", "periods", "beginning of the tail; -1: none", convert=none_below_0),
+    Found("from_period", "periods", "beginning of the tail; -1: none", convert=result.none_below_0),
     Found("mean_time", result.OF_TIME, "mean lifetime as a time"),
     Found("mean_time_stderr", result.OF_TIME, "its standard error"),
     Found("escape_rate", "1/period", "rate at which starts leave the saddle"),
@@ -248,7 +239,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = _summary(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
-    summarised(dataset, lines, pendulum, "these lifetimes are")
+    result.summarised(dataset, lines, pendulum, "these lifetimes are")
     return dataset
 
 
@@ -429,11 +420,10 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     mean, error, transient, persistent = np.array(rows).T
     _, _, low, high = interval(mean)
     lives, share = "mean lifetime of transient chaos", "share of the draws that"
-    lasts = persistent.astype(np.int8)
     found = dataset.assign(
         drawn_mean_periods=variable("draw", mean, "periods", lives),
         drawn_stderr=variable("draw", error, "periods", f"standard error of the {lives}"),
-        drawn_persistent=variable("draw", lasts, "", "whether chaos persists", flags=NO_YES),
+        drawn_persistent=flag("draw", persistent, "whether chaos persists"),
         mean_periods_low=variable((), float(low), "periods", f"lower end of 95 % of the {lives}"),
         mean_periods_high=variable((), float(high), "periods", f"upper end of 95 % of the {lives}"),
         transient_share=variable((), transient.mean(), "1", f"{share} have transient chaos"),

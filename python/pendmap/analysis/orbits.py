@@ -15,7 +15,7 @@ from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import matched, objects, points_of, table
-from pendmap.analysis.result import NO_YES, Field, Schema, records, summarised, variable
+from pendmap.analysis.result import Field, Schema, flag, records, summarised, variable
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
 from pendmap.formatting import counted, with_error
@@ -155,12 +155,11 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         raw = _core.orbits(bare, (n, w), *box, numerics.workers, progress)
         paths = _paths(bare, raw.orbits, units)
     found = raw.orbits
-    stable = np.array([o.stable for o in found], dtype=np.int8)
     residual = np.array([o.residual for o in found], dtype=float)
     dataset = xr.Dataset(
         {
             **table(found, units, "orbit"),
-            "stable": variable("orbit", stable, "", "whether it is stable", flags=NO_YES),
+            "stable": flag("orbit", [o.stable for o in found], "whether it is stable"),
             "residual": variable("orbit", residual, "1", "distance that remains after a period"),
             **paths,
         }

@@ -12,7 +12,7 @@ from pendmap import _core
 from pendmap.analysis import result, sweep
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics, part
-from pendmap.analysis.result import NO_YES, Field, Schema, rows, summarised, variable
+from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.tongues import MOST_P, tongues
 from pendmap.errors import InputError, check_flag, core_errors
@@ -58,7 +58,7 @@ def having(dim: str, sets: Iterable[Collection[str]], kinds: Iterable[str]) -> t
     has = [[kind in one for kind in kinds] for one in sets]
     both = (dim, "kind" if dim == "set" else f"{dim}_kind")
     array = np.array(has, dtype=np.int8).reshape(len(has), -1)
-    return variable(both, array, "", "whether the regime has the kind of attractor", flags=NO_YES)
+    return flag(both, array, "whether the regime has the kind of attractor")
 
 
 @drawn_field

@@ -101,7 +101,7 @@ class Found(Field):
     def put(self, dataset: xr.Dataset, value: Any, units: Units) -> None:  # noqa: ANN401
         """Set the value in a dataset."""
         if self.unit == FLAG:
-            dataset[self.place] = variable((), np.int8(value), "", self.meaning, flags=NO_YES)
+            dataset[self.place] = flag((), value, self.meaning)
         else:
             unit = getattr(units, _OF[self.unit]) if self.unit in _OF else self.unit
             dataset[self.place] = variable((), value, unit, self.meaning)
@@ -224,6 +224,16 @@ def variable(  # noqa: PLR0913 (attributes of CF)
     if missing is not None:
         attributes["_FillValue"] = np.asarray(values).dtype.type(missing)
     return dims, values, attributes
+
+
+def flag(
+    dims: Hashable | tuple[Hashable, ...],
+    values: Any,  # noqa: ANN401 (an array)
+    long_name: str,
+    flags: Mapping[int, str] = NO_YES,
+) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
+    """Return a variable that is 0 or 1, or another small number with a meaning."""
+    return variable(dims, np.asarray(values, dtype=np.int8), "", long_name, flags=flags)
 
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:

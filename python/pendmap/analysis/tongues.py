@@ -15,7 +15,7 @@ from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import NO_YES, Field, Found, Schema, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
 from pendmap.analysis.sweep import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts
@@ -225,24 +225,16 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         undamped = [_NO_REST] * len(found)
     reach = 0.0 if moved else p_max
     asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
-    of_omega = {
-        "asked": (np.isin(frequencies, asked), "whether the frequency was asked for"),
-        "fold_sought": (looked, "whether a fold was sought here"),
-    }
     variables = {
         **_variables(frequencies, found, undamped, upright),
-        **{
-            name: variable("omega", values.astype(np.int8), "", meaning, flags=NO_YES)
-            for name, (values, meaning) in of_omega.items()
-        },
+        "asked": flag("omega", np.isin(frequencies, asked), "whether the frequency was asked for"),
+        "fold_sought": flag("omega", looked, "whether a fold was sought here"),
         "asymptotic": variable(("curve", "omega"), asymptotic, *_OF_P),
         "asymptotic_error": variable(("curve", "omega"), errors, "1", "relative error of p"),
     }
     coords: dict[str, Any] = {
         "omega": variable("omega", frequencies, "1", "Omega/w0"),
-        "curve": variable(
-            "curve", np.array(list(critical_curves.CURVES)), long_name="curve by perturbation"
-        ),
+        "curve": variable("curve", np.array([*critical_curves.CURVES]), "", "by perturbation"),
     }
     if units.si:
         given = units.given(frequencies, RATE)
@@ -306,11 +298,9 @@ def _variables(
     """Return the tables of critical amplitudes, and the folds, at these frequencies."""
     folds = [row.fold or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
-    first = np.array([row.stable[0] for row in found], dtype=np.int8)
+    first = [row.stable[0] for row in found]
     variables: dict[str, Any] = {
-        "stable_at_first": variable(
-            "omega", first, "", "rest below the first critical amplitude", flags=_STABLE
-        ),
+        "stable_at_first": flag("omega", first, "rest below the first amplitude", _STABLE),
         "fold": variable("omega", fold, *_OF_P, "of the oscillation born at the first loss"),
         "fold_theta": variable("omega", theta, "rad", "angle of a point of the fold"),
         "fold_velocity": variable("omega", velocity, "1", "velocity dtheta/dtau of this point"),
@@ -331,9 +321,7 @@ def _variables(
         }
         if one != "undamped":
             above = [stable for row in rows for stable in row.stable[1:]]
-            variables[f"{prefix}stable_above"] = variable(
-                one, np.array(above, dtype=np.int8), "", "rest right above it", flags=_STABLE
-            )
+            variables[f"{prefix}stable_above"] = flag(one, above, "rest right above it", _STABLE)
     return variables
 
 
@@ -422,15 +410,14 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     for table, prefix in tables:
         mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]
         p = np.array(mine, dtype=float).reshape(-1, len(draws))
+        there = np.isfinite(p).mean(axis=1)
         _, _, low, high = interval(p)
         found = found.assign(
             {
                 f"{prefix}drawn_p": variable((table, "draw"), p, *_OF_P),
                 f"{prefix}p_low": variable(table, low, "1", "lower end of 95 % of the draws"),
                 f"{prefix}p_high": variable(table, high, "1", "upper end of 95 % of the draws"),
-                f"{prefix}exists": variable(
-                    table, np.isfinite(p).mean(axis=1), "1", "share of the draws that have it"
-                ),
+                f"{prefix}exists": variable(table, there, "1", "share of the draws that have it"),
             }
         )
     return draws.complete(found, _lowest(found))

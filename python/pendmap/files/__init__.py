@@ -10,7 +10,7 @@ from pendmap.files.atomic import (
     whole_file,
     whole_folder,
 )
-from pendmap.files.facts import facts, with_facts
+from pendmap.files.scalars import facts, with_facts
 from pendmap.files.toml import read_toml, toml_text
 
 __all__ = [

@@ -235,7 +235,7 @@ def test_a_bias_torque_equals_the_model_s_torque_and_a_weak_one_is_a_perturbatio
         facts(pendmap.melnikov(model, [1.0]))
         for model in (Pendulum(torque=0.2), Pendulum(effects=bias))
     )
-    assert other["p_melnikov"] == pytest.approx(own["p_melnikov"], rel=1e-9)
+    assert other["own_p_melnikov"] == pytest.approx(own["own_p_melnikov"], rel=1e-9)
     drag = (Effect("quadratic_drag", {"q": 0.05}),)
     tilted, damped = (
         pendmap.melnikov(Pendulum(torque=0.4, omega=2.0, effects=effects), [1.0])["p_loop"].item()
@@ -264,7 +264,7 @@ def test_a_weak_torque_has_both_thresholds(seed: int) -> None:
 def test_losses_that_a_torque_compensates_remain_losses() -> None:
     made_up = Pendulum(gamma=0.1, omega=2.0, torque=0.4 / math.pi)
     said = facts(pendmap.melnikov(made_up, [2.0]))
-    assert said["p_melnikov"] == pytest.approx(0.0, abs=1e-12)
+    assert said["own_p_melnikov"] == pytest.approx(0.0, abs=1e-12)
     assert "fractal" in said["summary"]
     assert "Without damping" not in said["summary"]
     free = pendmap.melnikov(Pendulum(gamma=0.0, omega=2.0, torque=0.3), [2.0])
@@ -291,7 +291,7 @@ def test_thresholds_that_rounding_hides_are_not_given() -> None:
     assert fast["own_p_melnikov"].item() == pytest.approx(formula(0.1, 14.0), rel=1e-6)
     assert np.isnan(fast["p_melnikov"].values[1]).all()
     said = facts(pendmap.melnikov(Pendulum(gamma=0.1, omega=30.0), [1.0]))
-    assert math.isnan(said["p_melnikov"])
+    assert math.isnan(said["own_p_melnikov"])
     assert "below rounding errors" in said["summary"]
 
 
@@ -318,7 +318,7 @@ def test_figure_recording_and_file(tmp_path: Path) -> None:
 def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("melnikov", "--omega", 1, "--json")
     said = json.loads(run.stdout)
-    assert abs(said["p_melnikov"] - 0.293010476667326976) < 1e-9
+    assert abs(said["own_p_melnikov"] - 0.293010476667326976) < 1e-9
     assert said["p_tangency"] is None
     assert not list(tmp_path.iterdir())
     run = pendmap_command("melnikov", "--omega", 1)
