@@ -292,7 +292,7 @@ TIMES = RUN["time"].values
 @settings(max_examples=6, phases=FEW)
 @given(
     first=st.integers(0, TIMES.size // 2),
-    count=st.integers(2, TIMES.size // 2),
+    count=st.integers(4, TIMES.size // 2),
     step=st.integers(-3, 3).filter(bool),
 )
 def test_a_part_of_a_trajectory_is_drawn(first: int, count: int, step: int) -> None:
