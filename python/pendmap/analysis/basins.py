@@ -185,8 +185,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     -------
     xarray.Dataset
         ``label``, ``settle_periods`` and ``net_turns`` over (velocity, theta), the table of
-        attractors over ``attractor``, their stroboscopic points over ``point``; parameters, shares
-        and the error reached as attributes. The bounds of the cells are the coordinates
+        attractors over ``attractor``, their stroboscopic points over ``point``; without dimensions
+        shares and the error reached, as coordinates the parameters. The bounds of the cells are the coordinates
         ``theta_bounds`` and ``velocity_bounds``. A selection of cells keeps shares, attributes and
         summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
         the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
@@ -381,7 +381,7 @@ def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
 def _complete(
     dataset: xr.Dataset, raw: _core.BasinMap, model: Pendulum | Rig, numerics: Numerics
 ) -> xr.Dataset:
-    """Add the table of attractors, all attributes and the summary to the cells."""
+    """Add the table of attractors, all facts and the summary to the cells."""
     count, attractors = dataset["label"].size, raw.attractors
     fraction = np.array([a.fraction for a in attractors], dtype=float)
     stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))

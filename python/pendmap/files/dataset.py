@@ -37,7 +37,10 @@ _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a result; the file is complete or absent.
+    """Write a result by the CF conventions 1.11; the file is complete or absent.
+
+    The attribute ``history`` is added, unless the result has one: UTC time (or that of the
+    environment variable ``SOURCE_DATE_EPOCH``), version, and the function or command.
 
     Parameters
     ----------
@@ -76,7 +79,7 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     if target.suffix.lower() == ".zarr" and importlib.util.find_spec("zarr") is None:
         raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works")
     if "history" not in dataset.attrs:
-        made_by = f"pendmap.{KINDS[dataset.attrs['kind']][0]}"
+        made_by = " or ".join(f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
         dataset = dataset.assign_attrs(history=history(made_by))
     texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
     dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
@@ -100,12 +103,10 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def history(made_by: str) -> str:
-    """Return the line of the attribute ``history``: UTC time, version, command or function.
-
-    The time is that of the environment variable ``SOURCE_DATE_EPOCH``, if it is set.
-    """
-    now = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
-    at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(now))
+    """Return the line of the attribute ``history``."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = time.gmtime(int(given) if given.isdecimal() else None)
+    at = time.strftime("%Y-%m-%dT%H:%M:%SZ", now)
     return f"{at} pendmap {_core.__version__}: {made_by}"
 
 
