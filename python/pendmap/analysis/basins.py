@@ -186,7 +186,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     xarray.Dataset
         ``label``, ``settle_periods`` and ``net_turns`` over (velocity, theta), the table of
         attractors over ``attractor``, their stroboscopic points over ``point``; without dimensions
-        shares and the error reached, as coordinates the parameters. The bounds of the cells are the coordinates
+        shares and the error reached, as coordinates the parameters. The bounds of the cells are
         ``theta_bounds`` and ``velocity_bounds``. A selection of cells keeps shares, attributes and
         summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
         the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
