@@ -16,9 +16,10 @@ from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, none_below_0, variable
+from pendmap.analysis.result import Field, Found, Schema, none_below_0, variable
 from pendmap.analysis.summary import summarise
 from pendmap.errors import MOST_PERIODS, check_flag, core_errors
+from pendmap.files import facts
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, VELOCITY, Units
@@ -42,7 +43,7 @@ _LAYERS: Final = {
 
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
-    a = dataset.attrs
+    a = facts(dataset)
     if "uncertainty_exponent" not in a:
         return None
     value = a["uncertainty_exponent"]
@@ -66,31 +67,31 @@ SCHEMA = Schema(
         "attractors with their shares of the starts",
         read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr"),
     ),
-    Field("undecided", "1", "share of the starts that no attractor captured within the bound"),
-    Field("failed", "1", "share of the starts that failed or diverged"),
+    Found("undecided", "1", "share of the starts that no attractor captured within the bound"),
+    Found("failed", "1", "share of the starts that failed or diverged"),
     Field("cells", "1", "starts"),
-    Field("mean_periods", "periods", "periods computed for a start, on average"),
+    Found("mean_periods", "periods", "periods computed for a start, on average"),
     result.SECONDS,
     result.REACHED,
-    Field(
+    Found(
         "basin_entropy",
         "nat",
         "mean entropy of the labels in boxes of 5 x 5 cells",
         "texture.basin_entropy",
     ),
-    Field("boundary_basin_entropy", "nat", "the same, of boxes with more than one label", None),
-    Field("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes", None),
-    Field("unreliable", "1", "share of sampled labels that half the step or mirroring changes"),
+    Found("boundary_basin_entropy", "nat", "the same, of boxes with more than one label", None),
+    Found("boundary_basin_entropy_stderr", "nat", "its standard error over those boxes", None),
+    Found("unreliable", "1", "share of sampled labels that half the step or mirroring changes"),
     Field("labels_sampled", "1", "labels checked so"),
-    Field("unreliable_half_step", "1", "share that half the step changes"),
-    Field("unreliable_mirror", "1", "share that mirroring changes; absent without the symmetry"),
-    Field(
+    Found("unreliable_half_step", "1", "share that half the step changes"),
+    Found("unreliable_mirror", "1", "share that mirroring changes; absent without the symmetry"),
+    Found(
         "neighbours_agree",
         "1",
         "share of neighbouring cells with the same label",
         "texture.neighbours_agree",
     ),
-    Field("neighbours_chance", "1", "share that would agree by chance", "texture.chance"),
+    Found("neighbours_chance", "1", "share that would agree by chance", "texture.chance"),
     result.CHAOS_BOUND,
     Field("searched_starts", "1", "starts of the search for attractors"),
     Field("plane", "", "basins, only_chaos or conservative"),
@@ -99,21 +100,29 @@ SCHEMA = Schema(
     result.BOUND,
     result.TOL,
     *result.RUN[1:],
-    Field("log2_criterion", "", "1 where the log 2 criterion is met: fractal", None, convert=bool),
-    Field("uncertainty_exponent", "1", "exponent of the uncertain share", read=_uncertainty),
-    Field("mean_settle", "periods", "mean time of capture; -1: none", convert=none_below_0),
-    Field("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
+    Found(
+        "log2_criterion",
+        result.FLAG,
+        "1 where the log 2 criterion is met: fractal",
+        None,
+        convert=bool,
+    ),
+    Found("uncertainty_exponent", "1", "exponent of the uncertain share", read=_uncertainty),
+    Found("mean_settle", "periods", "mean time of capture; -1: none", convert=none_below_0),
+    Found("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
     *result.END,
     drawn_basins,
     result.SECTION,
     Field("layers", "", "labels or finite_time: layers that describe the plane", json=False),
-    Field("boundary_boxes", "1", "boxes with more than one label", None, json=False),
-    Field("labels_reliable", "", "1 where labels of single cells are reliable", json=False),
-    Field("uncertainty_exponent_stderr", "1", "its standard error", None, json=False),
-    Field("uncertainty_exponent_low", "1", "lower end of its 95 % interval", None, json=False),
-    Field("uncertainty_exponent_high", "1", "upper end of its 95 % interval", None, json=False),
-    Field("uncertainty_eps_low", "1", "least distance, in sides of the window", None, json=False),
-    Field("uncertainty_eps_high", "1", "greatest distance that was fitted", None, json=False),
+    Found("boundary_boxes", "1", "boxes with more than one label", None, json=False),
+    Found(
+        "labels_reliable", result.FLAG, "1 where labels of single cells are reliable", json=False
+    ),
+    Found("uncertainty_exponent_stderr", "1", "its standard error", None, json=False),
+    Found("uncertainty_exponent_low", "1", "lower end of its 95 % interval", None, json=False),
+    Found("uncertainty_exponent_high", "1", "upper end of its 95 % interval", None, json=False),
+    Found("uncertainty_eps_low", "1", "least distance, in sides of the window", None, json=False),
+    Found("uncertainty_eps_high", "1", "greatest distance that was fitted", None, json=False),
 )
 
 
@@ -176,8 +185,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     -------
     xarray.Dataset
         ``label``, ``settle_periods`` and ``net_turns`` over (velocity, theta), the table of
-        attractors over ``attractor``, their stroboscopic points over ``point``; parameters, shares
-        and the error reached as attributes. The bounds of the cells are the coordinates
+        attractors over ``attractor``, their stroboscopic points over ``point``; without dimensions
+        shares and the error reached, as coordinates the parameters. The bounds of the cells are
         ``theta_bounds`` and ``velocity_bounds``. A selection of cells keeps shares, attributes and
         summary of the whole map; figures and recordings of it count its own cells. ``fraction`` is
         the basin stability of an attractor in this window (Menck et al. 2013, Nature Physics 9,
@@ -292,8 +301,8 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     dataset = xr.Dataset(
         {
             **_cells(raw, ("start",), angles.shape, units),
-            "start_theta": ("start", angles, {"units": "rad"}),
-            "start_velocity": ("start", speeds, {"units": units.of_velocity}),
+            "start_theta": variable("start", angles, "rad", "initial angle"),
+            "start_velocity": variable("start", speeds, units.of_velocity, "initial velocity"),
         }
     )
     return _complete(dataset, raw, pendulum, numerics)
@@ -320,6 +329,7 @@ def _cells(
             raw.label.reshape(shape),
             long_name="attractor",
             comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
+            flags=dict(enumerate(["failed", "undecided", *(a.name for a in raw.attractors)], -1)),
         ),
         "settle_periods": variable(
             dims,
@@ -327,6 +337,7 @@ def _cells(
             "1",
             "periods until the trap of an attractor captures the trajectory",
             "-1 where no attractor captured it",
+            missing=-1,
         ),
         "net_turns": variable(
             dims,
@@ -354,12 +365,14 @@ def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
         "uncertain": variable(
             "distance",
             raw.uncertain.astype(np.int64),
-            long_name="starts with another label at this distance on one side or the other",
+            "1",
+            "starts with another label at this distance on one side or the other",
         ),
         "uncertainty_tried": variable(
             "distance",
             raw.uncertainty_tried.astype(np.int64),
-            long_name="starts with known ends, drawn anew for each distance; where drawn by "
+            "1",
+            "starts with known ends, drawn anew for each distance; where drawn by "
             "strata, the equivalent number of evenly drawn starts",
         ),
     }
@@ -368,15 +381,15 @@ def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
 def _complete(
     dataset: xr.Dataset, raw: _core.BasinMap, model: Pendulum | Rig, numerics: Numerics
 ) -> xr.Dataset:
-    """Add the table of attractors, all attributes and the summary to the cells."""
+    """Add the table of attractors, all facts and the summary to the cells."""
     count, attractors = dataset["label"].size, raw.attractors
     fraction = np.array([a.fraction for a in attractors], dtype=float)
     stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))
     dataset = dataset.assign(
         {
             **orbit_table.table(attractors, model.units, "attractor"),
-            "fraction": ("attractor", fraction),
-            "stderr": ("attractor", stderr),
+            "fraction": variable("attractor", fraction, "1", "share of the starts"),
+            "stderr": variable("attractor", stderr, "1", "standard error of the share"),
         }
     )
     settle = dataset["settle_periods"].values
@@ -398,7 +411,7 @@ def _complete(
 
 
 def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
-    """Return the measures of the boundary as attributes, None without a boundary."""
+    """Return the measures of the boundary as facts, None without a boundary."""
     found: dict[str, float | None] = {}
     if raw.texture.boundary_boxes:
         entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr

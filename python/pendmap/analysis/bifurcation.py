@@ -11,9 +11,10 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, records, summarised
+from pendmap.analysis.result import Field, Schema, records, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.errors import InputError, check_number, core_errors, short_repr
+from pendmap.files import facts
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
@@ -131,7 +132,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         "varied": axis.name,
         "points": dataset.sizes["point"],
     }
-    SCHEMA.complete(dataset, pendulum, values, raw)
+    SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
     dataset.attrs["title"] = sweep.title(pendulum, axis)
     lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
     summarised(dataset, lines, pendulum, "attractors are")
@@ -143,44 +144,47 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
     value = axis.values[raw.cell]
-    speed = {"units": units.of_velocity}
+    speed = units.given(raw.point_velocity, VELOCITY)
     ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
     loose = {
         key: np.concatenate([getattr(raw.up, key), getattr(raw.down, key)])
         for key in ("value", "theta", "velocity")
     }
+    loose_speed = units.given(loose["velocity"], VELOCITY)
+    way = np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])
+    kind, meanings = which[ends[:, 0]].astype(np.int16), dict(enumerate(kinds.tolist()))
+    angle, rate = "angle of a stroboscopic point", "velocity of this point"
+    on = "entry of the attractor that the sweep {} is on"
     data: dict[str, Any] = {
-        **sweep.entries(raw, which, units),
+        **sweep.entries(raw, kinds, which, units),
         "entry_value": ("entry", value, axis.attributes),
-        "entry_branch": ("entry", of_entry),
-        "branch_kind": ("branch", which[ends[:, 0]].astype(np.int16)),
-        "branch_w": ("branch", raw.w[ends[:, 0]]),
+        "entry_branch": variable("entry", of_entry, "1", "number of the branch"),
+        "branch_kind": variable("branch", kind, "", "kind of attractor", flags=meanings),
+        "branch_w": variable("branch", raw.w[ends[:, 0]], "turns", "net turns w over a period"),
         "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
         "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
-        "point_entry": ("point", owner),
+        "point_entry": variable("point", owner, "1", "entry of the attractor"),
         "point_value": ("point", value[owner], axis.attributes),
-        "point_theta": ("point", raw.point_theta, {"units": "rad"}),
-        "point_velocity": ("point", units.given(raw.point_velocity, VELOCITY), speed),
-        "up": (axis.name, raw.up.on, {"comment": "entry, -1: none"}),
-        "down": (axis.name, raw.down.on, {"comment": "entry, -1: none"}),
-        "undecided": (axis.name, raw.undecided),
-        "failed": (axis.name, raw.failed),
-        "chaos_periods": (axis.name, raw.chaos_periods, {"comment": sweep.CHAOS_PERIODS}),
-        "loose_sweep": ("loose", np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])),
+        "point_theta": variable("point", raw.point_theta, "rad", angle),
+        "point_velocity": variable("point", speed, units.of_velocity, rate),
+        "up": variable(axis.name, raw.up.on, "1", on.format("up"), "-1: none", missing=-1),
+        "down": variable(axis.name, raw.down.on, "1", on.format("down"), "-1: none", missing=-1),
+        **sweep.shares(raw, (axis.name,), axis.values.shape),
+        "loose_sweep": variable("loose", way, "", "sweep", flags={-1: "down", 1: "up"}),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
-        "loose_theta": ("loose", loose["theta"], {"units": "rad"}),
-        "loose_velocity": ("loose", units.given(loose["velocity"], VELOCITY), speed),
+        "loose_theta": variable("loose", loose["theta"], "rad", angle),
+        "loose_velocity": variable("loose", loose_speed, units.of_velocity, rate),
     }
     coordinates = {
         **axis.coordinates,
-        "kind": ("kind", kinds),
-        "entry": ("entry", np.arange(which.size)),
+        "kind": variable("kind", kinds, long_name="kind of attractor"),
+        "entry": variable("entry", np.arange(which.size), "1", "number of the entry"),
     }
     return xr.Dataset(data, coords=coordinates)
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a = dataset.attrs
+    a = facts(dataset)
     name = a["varied"]
     values = dataset[name].values
     count = dataset.sizes["branch"]

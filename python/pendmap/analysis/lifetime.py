@@ -14,9 +14,10 @@ from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, none_below_0, records, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, flag, variable
 from pendmap.analysis.summary import effort, window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
+from pendmap.files import facts
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
@@ -35,20 +36,20 @@ _MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
 """Excess of the exponent over the escape rate that shows transient chaos, standard errors."""
 _STORED: Final = 4000  # Largest number of periods of a stored survival curve
-_DRAWN: Final = ("mean_periods", "stderr", "transient_chaos", "persistent")
-"""Attributes that are kept of each draw."""
+_DRAWN: Final = ("mean_periods", "mean_periods_stderr", "transient_chaos", "persistent")
+"""Facts that are kept of each draw."""
 
 
 def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors with their captures for the JSON object."""
     last = dataset.isel(elapsed=-1)
-    return records(last, name="attractor", fraction="fraction", captured="captured")
+    return result.records(last, name="attractor", fraction="fraction", captured="captured")
 
 
 @drawn_field
 def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a lifetime for the JSON object."""
-    a = dataset.attrs
+    a = facts(dataset)
     return {
         "mean_periods_ci95": [a["mean_periods_low"], a["mean_periods_high"]],
         "transient_share": a["transient_share"],
@@ -59,28 +60,35 @@ def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
 SCHEMA = Schema(
     "lifetime",
     result.UNITS,
-    Field("mean_periods", "periods", "mean lifetime of transient chaos"),
-    Field("stderr", "periods", "its standard error"),
-    Field("persistent", "", "1 where every start ends on chaos", convert=bool),
-    Field("transient_chaos", "", "1 where there is transient chaos", convert=bool),
-    Field("from_period", "periods", "beginning of the tail; -1: none", convert=none_below_0),
-    Field("mean_time", result.OF_TIME, "mean lifetime as a time"),
-    Field("mean_time_stderr", result.OF_TIME, "its standard error"),
-    Field("escape_rate", "1/period", "rate at which starts leave the saddle"),
-    Field("exponent", result.OF_RATE, "Lyapunov exponent on the saddle, or of lasting chaos"),
-    Field("exponent_stderr", result.OF_RATE, "its standard error"),
-    Field("exponent_per_period", "1/period", "the exponent per forcing period"),
-    Field("entropy", "1/period", "metric entropy of the saddle"),
-    Field("saddle_dimension", "1", "dimension of the saddle"),
-    Field("tail_captured", "1", "captures in the tail"),
-    Field("tail_weibull", "1", "chance of an exponential tail by a score test of the shape"),
-    Field("tail_steady", "1", "chance of an exponential tail by chi squared of its rates"),
-    Field("tail_mean_periods", "periods", "mean time of the tail, exponential or not"),
+    Found("mean_periods", "periods", "mean lifetime of transient chaos"),
+    Found("stderr", "periods", "its standard error", variable="mean_periods_stderr"),
+    Found("persistent", result.FLAG, "1 where every start ends on chaos", convert=bool),
+    Found("transient_chaos", result.FLAG, "1 where there is transient chaos", convert=bool),
+    Found("from_period", "periods", "beginning of the tail; -1: none", convert=result.none_below_0),
+    Found("mean_time", result.OF_TIME, "mean lifetime as a time"),
+    Found("mean_time_stderr", result.OF_TIME, "its standard error"),
+    Found("escape_rate", "1/period", "rate at which starts leave the saddle"),
+    Found(
+        "exponent",
+        result.OF_RATE,
+        "Lyapunov exponent on the saddle, or of lasting chaos",
+        variable="chaos_exponent",
+    ),
+    Found(
+        "exponent_stderr", result.OF_RATE, "its standard error", variable="chaos_exponent_stderr"
+    ),
+    Found("exponent_per_period", "1/period", "the exponent per forcing period"),
+    Found("entropy", "1/period", "metric entropy of the saddle"),
+    Found("saddle_dimension", "1", "dimension of the saddle"),
+    Found("tail_captured", "1", "captures in the tail"),
+    Found("tail_weibull", "1", "chance of an exponential tail by a score test of the shape"),
+    Found("tail_steady", "1", "chance of an exponential tail by chi squared of its rates"),
+    Found("tail_mean_periods", "periods", "mean time of the tail, exponential or not"),
     Field("starts", "1", "starts"),
-    Field("captured", "1", "starts that an attractor captured"),
-    Field("censored", "1", "starts alive at the bound"),
-    Field("failed", "1", "starts that failed or diverged"),
-    Field("chaotic_share", "1", "share of the starts that end on a chaotic attractor"),
+    Found("captured", "1", "starts that an attractor captured", variable="captured_starts"),
+    Found("censored", "1", "starts alive at the bound"),
+    Found("failed", "1", "starts that failed or diverged"),
+    Found("chaotic_share", "1", "share of the starts that end on a chaotic attractor"),
     result.BOUND,
     result.CHAOS_BOUND,
     result.TOL,
@@ -93,6 +101,7 @@ SCHEMA = Schema(
     result.SECTION,
     Field("from_period_given", "", "1 where the caller chose the beginning", json=False),
     Field("exponent_trajectories", "1", "trajectories the exponent was measured on", json=False),
+    references="Kantz & Grassberger (1985), Physica D 17, 75",
 )
 
 
@@ -150,10 +159,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``captured`` over ``attractor`` and ``elapsed``: the number that each attractor has captured
         up to a period. ``tail_mean`` and ``tail_stderr`` over ``tail_begin``, the mean from other
         beginnings. ``start_theta``, ``start_velocity``, ``capture_period`` (-1:
-        never) and ``label`` over ``start``. Attributes ``mean_periods``, ``stderr``,
-        ``from_period``, ``persistent`` (1 where every start ends on chaos; ``exponent`` is that of
-        the most chaotic attractor then), ``transient_chaos``, ``escape_rate`` and ``entropy`` per
-        period, ``exponent`` on the saddle, ``saddle_dimension``; nan where one has no meaning.
+        never) and ``label`` over ``start``. Without dimensions ``mean_periods``,
+        ``mean_periods_stderr``, ``from_period``, ``persistent`` (1 where every start ends on chaos;
+        ``chaos_exponent`` is that of the most chaotic attractor then), ``transient_chaos``,
+        ``escape_rate`` and ``entropy`` per period, ``chaos_exponent`` on the saddle,
+        ``saddle_dimension``; nan where one has no meaning.
 
     Raises
     ------
@@ -169,7 +179,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> import pendmap
     >>> pendulum = pendmap.Pendulum(gamma=0.1, p=1.7, omega=2.0)
     >>> result = pendmap.lifetime(pendulum, starts=400)
-    >>> round(result.attrs["mean_periods"])
+    >>> round(float(result["mean_periods"]))
     132
     """
     bare, units = without_dimensions(pendulum)
@@ -209,11 +219,13 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         {
             **_curves(found, times, censored, bound),
             **{name: found[name] for name in ("start_theta", "start_velocity", "label")},
-            "capture_period": ("start", settle.astype(np.int32), {"comment": "-1: never"}),
+            "capture_period": variable(
+                "start", settle.astype(np.int32), "periods", "capture", "-1: never", missing=-1
+            ),
         }
     )
     values = {
-        **found.attrs,
+        **facts(found),
         **numerics.provenance(),
         **_measures(found, fitted, saddle, bare, units),
         "starts": angles.size,
@@ -227,7 +239,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     lines = _summary(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
-    summarised(dataset, lines, pendulum, "these lifetimes are")
+    result.summarised(dataset, lines, pendulum, "these lifetimes are")
     return dataset
 
 
@@ -252,14 +264,14 @@ def _curves(
     rows = [(t.begin, t.mean, t.stderr, min(t.weibull, t.steady)) for t in tails]
     begin, mean, stderr, chance = np.array(rows, dtype=float).reshape(-1, 4).T
     within = "starts captured up to this period"
-    unlike = "chance of times as unlike an exponential's, the lesser of two tests"
+    one, unlike = "tail_begin", "chance of times as unlike an exponential's, lesser of two tests"
     return {
-        "captured": variable(("attractor", "elapsed"), captured, long_name=within),
-        "elapsed": variable("elapsed", elapsed, long_name="periods"),
-        "tail_mean": variable("tail_begin", mean, long_name="mean time left, periods"),
-        "tail_stderr": ("tail_begin", stderr),
-        "tail_exponential": variable("tail_begin", chance, comment=unlike),
-        "tail_begin": variable("tail_begin", begin.astype(np.int64), long_name="periods"),
+        "captured": variable(("attractor", "elapsed"), captured, "1", within),
+        "elapsed": variable("elapsed", elapsed, "periods", "time since the start"),
+        "tail_mean": variable(one, mean, "periods", "mean time left"),
+        "tail_stderr": variable(one, stderr, "periods", "standard error of the mean time left"),
+        "tail_exponential": variable(one, chance, "1", unlike),
+        "tail_begin": variable(one, begin.astype(np.int64), "periods", "beginning of the tail"),
     }
 
 
@@ -270,7 +282,7 @@ def _measures(
     pendulum: Pendulum,
     units: Units,
 ) -> dict[str, Any]:
-    """Return the measures of the tail, the saddle or persistent chaos as attributes."""
+    """Return the measures of the tail, the saddle or persistent chaos as facts."""
     period = pendulum.period
     growth, error, followed = saddle
     persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
@@ -312,9 +324,9 @@ def _measures(
 
 def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
-    a, units = dataset.attrs, Units.of(dataset.attrs)
+    a, units = facts(dataset), Units.of(facts(dataset))
     lines: list[str] = []
-    exponent = f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}"
+    exponent = f"{with_error(a['chaos_exponent'], a['chaos_exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         lines.append(
             f"Persistent: {_shares(found)}; largest exponent {exponent}; none of the "
@@ -337,7 +349,7 @@ def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
             f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
             f"{counted(a['max_periods'], 'period')}."
         )
-    if a["captured"]:
+    if a["captured_starts"]:
         lines.append(f"Ended on {_shares(found)}.")
     return [*lines, f"{counted(a['starts'], 'start')}, {effort(a)}"]
 
@@ -349,9 +361,9 @@ def _shares(found: xr.Dataset) -> str:
 
 
 def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
-    a, units = dataset.attrs, Units.of(dataset.attrs)
+    a, units = facts(dataset), Units.of(facts(dataset))
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
-    mean = with_error(a["mean_periods"], a["stderr"])
+    mean = with_error(a["mean_periods"], a["mean_periods_stderr"])
     said = (
         f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
         f"{counted(a['tail_captured'], 'capture')} after period "
@@ -374,10 +386,10 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
 
 
 def _why_not(dataset: xr.Dataset, exponent: str) -> str:
-    a = dataset.attrs
-    if not a["captured"] and a["chaotic_share"]:
+    a = facts(dataset)
+    if not a["captured_starts"] and a["chaotic_share"]:
         return "Starts end only on chaotic attractors: no lifetime."
-    if not a["captured"]:
+    if not a["captured_starts"]:
         return (
             "No start was captured, and chaos is not shown to persist: undecided within "
             f"{counted(a['max_periods'], 'period')}; --max-periods raises this bound."
@@ -400,25 +412,24 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a lifetime with the lifetimes of D draws from the same starts.
 
     Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
-    ``drawn_persistent`` (D) and ``drawn`` (D, parameter); attributes ``mean_periods_low`` and
+    ``drawn_persistent`` (D) and ``drawn`` (D, parameter); ``mean_periods_low`` and
     ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
     ``transient_share`` and ``persistent_share``.
     """
-    rows = [[float(one.attrs[key]) for key in _DRAWN] for one in draws.each(run)]
+    rows = [[float(one[key]) for key in _DRAWN] for one in draws.each(run)]
     mean, error, transient, persistent = np.array(rows).T
     _, _, low, high = interval(mean)
+    lives, share = "mean lifetime of transient chaos", "share of the draws that"
     found = dataset.assign(
-        drawn_mean_periods=("draw", mean),
-        drawn_stderr=("draw", error),
-        drawn_persistent=("draw", persistent.astype(np.int8)),
+        drawn_mean_periods=variable("draw", mean, "periods", lives),
+        drawn_stderr=variable("draw", error, "periods", f"standard error of the {lives}"),
+        drawn_persistent=flag("draw", persistent, "whether chaos persists"),
+        mean_periods_low=variable((), float(low), "periods", f"lower end of 95 % of the {lives}"),
+        mean_periods_high=variable((), float(high), "periods", f"upper end of 95 % of the {lives}"),
+        transient_share=variable((), transient.mean(), "1", f"{share} have transient chaos"),
+        persistent_share=variable((), persistent.mean(), "1", f"{share} have persistent chaos"),
     )
-    found.attrs |= {
-        "mean_periods_low": float(low),
-        "mean_periods_high": float(high),
-        "transient_share": float(transient.mean()),
-        "persistent_share": float(persistent.mean()),
-    }
-    return draws.complete(found, _drawn_summary(found.attrs))
+    return draws.complete(found, _drawn_summary(facts(found)))
 
 
 def _drawn_summary(a: dict[str, Any]) -> list[str]:

@@ -11,9 +11,10 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, none_below_0, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised, variable
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
+from pendmap.files import facts
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
@@ -38,25 +39,30 @@ _BY_ROUNDING = math.log(1e10)
 SCHEMA = Schema(
     "lyapunov",
     result.UNITS,
-    Field("exponent", result.OF_RATE, "largest Lyapunov exponent"),
-    Field("stderr", result.OF_RATE, "its standard error; 0 where it is exact"),
-    Field("per_period", "1/period", "the exponent per forcing period"),
-    Field("per_period_stderr", "1/period", "its standard error"),
-    Field("second_exponent", result.OF_RATE, "the other exponent"),
-    Field("exponent_sum", result.OF_RATE, "sum of both exponents"),
-    Field("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
-    Field("end", "", "captured, chaotic, undamped, undecided or failed"),
+    Found("exponent", result.OF_RATE, "largest Lyapunov exponent", variable="largest_exponent"),
+    Found(
+        "stderr",
+        result.OF_RATE,
+        "its standard error; 0 where it is exact",
+        variable="largest_exponent_stderr",
+    ),
+    Found("per_period", "1/period", "the exponent per forcing period"),
+    Found("per_period_stderr", "1/period", "its standard error"),
+    Found("second_exponent", result.OF_RATE, "the other exponent"),
+    Found("exponent_sum", result.OF_RATE, "sum of both exponents"),
+    Found("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
+    Found("end", "", "captured, chaotic, undamped, undecided or failed"),
     Field(
         "attractor",
         "",
         "the attractor that was reached",
         read=lambda d: next(iter(orbit_table.objects(d, "attractor")), None),
     ),
-    Field("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
+    Found("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
     Field("trajectories", "1", "trajectories of the ensemble"),
     Field("periods", "periods", "length of each of them"),
     Field("dropped_periods", "periods", "periods of each dropped before"),
-    Field("lost", "1", "trajectories that settled elsewhere"),
+    Found("lost", "1", "trajectories that settled elsewhere"),
     Field("precision", "1", "relative standard error that was asked for"),
     result.TOL,
     result.REACHED,
@@ -69,9 +75,10 @@ SCHEMA = Schema(
     Field("forcing_period", result.OF_TIME, "forcing period", json=False),
     Field("theta0", "rad", "angle at the start", json=False),
     Field("velocity0", result.OF_VELOCITY, "velocity at the start", json=False),
-    Field("regular", result.OF_RATE, "exponent of regular motion over this time", json=False),
-    Field("exponent_sum_stderr", result.OF_RATE, "standard error of the sum", json=False),
+    Found("regular", result.OF_RATE, "exponent of regular motion over this time", json=False),
+    Found("exponent_sum_stderr", result.OF_RATE, "standard error of the sum", json=False),
     Field("window", "periods", "length of a window of finite_time_exponent", json=False),
+    references="Benettin, Galgani, Giorgilli & Strelcyn (1980), Meccanica 15, 9 and 21",
 )
 
 
@@ -125,12 +132,13 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         start's own trajectory. Of chaos ``running_exponent`` and ``running_stderr`` over
         ``averaged``, the periods that each trajectory has been averaged for, and
         ``finite_time_exponent`` over ``trajectory`` and ``window``. The attractor with its points,
-        as for :func:`pendmap.basins`. Attributes ``exponent``, ``stderr`` (0 where the exponent is
-        exact, nan for regular motion without damping), ``regular`` (the exponent of such motion
-        over the same time), ``per_period``, ``end`` (``captured``, ``chaotic``, ``undamped``,
-        ``undecided`` or ``failed``), ``transient_periods``, ``second_exponent`` and
-        ``kaplan_yorke_dimension`` (of the stroboscopic map's attractor, ``1 + lambda_1 /
-        |lambda_2|``); nan where one has no meaning.
+        as for :func:`pendmap.basins`. Without dimensions ``largest_exponent``,
+        ``largest_exponent_stderr`` (0 where the exponent is exact, nan for regular motion without
+        damping), ``regular`` (the exponent of such motion over the same time), ``per_period``,
+        ``end`` (``captured``, ``chaotic``, ``undamped``, ``undecided`` or ``failed``),
+        ``transient_periods``, ``second_exponent`` and ``kaplan_yorke_dimension`` (of the
+        stroboscopic map's attractor, ``1 + lambda_1 / |lambda_2|``); nan where one has no
+        meaning.
 
     Raises
     ------
@@ -148,7 +156,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> import pendmap
     >>> pendulum = pendmap.Pendulum(gamma=0.1, p=2.0, omega=2.0)
     >>> result = pendmap.lyapunov(pendulum)
-    >>> round(result.attrs["exponent"], 1)
+    >>> round(float(result["largest_exponent"]), 1)
     0.3
     """
     bare, units = without_dimensions(pendulum)
@@ -247,32 +255,35 @@ def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) ->
     mean = means.mean(axis=0) if count else np.zeros(windows)
     elapsed = np.arange(course.size, dtype=np.int32)
     periods = (averaged * raw.window).astype(np.int32)
-    rate, lasting = units.of_rate, "periods that each trajectory has been averaged for"
+    rate, lasting = units.of_rate, "time that each trajectory has been averaged for"
+    running = "mean exponent of the trajectories up to this time"
+    error = "standard error of the mean exponent"
     text = "logarithm of the growth of a deviation along the start's own trajectory"
     return {
         "growth": variable("elapsed", course, "1", text),
-        "elapsed": variable("elapsed", elapsed, long_name="periods since the start"),
+        "elapsed": variable("elapsed", elapsed, "periods", "time since the start"),
         "finite_time_exponent": variable(
             ("trajectory", "window"),
             units.given(growth / time, RATE),
             rate,
             f"finite-time exponent over {raw.window} periods",
         ),
-        "running_exponent": variable("window", units.given(mean, RATE), rate),
-        "running_stderr": variable("window", units.given(stderr, RATE), rate),
-        "averaged": variable("window", periods, long_name=lasting),
+        "running_exponent": variable("window", units.given(mean, RATE), rate, running),
+        "running_stderr": variable("window", units.given(stderr, RATE), rate, error),
+        "averaged": variable("window", periods, "periods", lasting),
     }
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a, units = dataset.attrs, Units.of(dataset.attrs)
+    a, units = facts(dataset), Units.of(facts(dataset))
     name = str(dataset["attractor"].values[0]) if dataset.sizes["attractor"] else ""
     lines = [*_ended(dataset, name)]
-    value, per = a["exponent"], units.per_time
+    value, per = a["largest_exponent"], units.per_time
     if math.isfinite(value) and a["end"] in {"chaotic", "undamped"}:
-        known = math.isfinite(a["stderr"])
+        known = math.isfinite(a["largest_exponent_stderr"])
         each, whole = (
-            f" +- {a[key]:.2g}" if known else "" for key in ("stderr", "per_period_stderr")
+            f" +- {a[f'{key}_stderr']:.2g}" if known else ""
+            for key in ("largest_exponent", "per_period")
         )
         lines.append(
             f"Largest Lyapunov exponent {value:.6g}{each} {per}, "
@@ -290,7 +301,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
                 f"A deviation doubles in {math.log(2) / a['per_period']:.3g} periods on average."
             )
         aim = a["precision"] * abs(value)
-        if a["end"] == "chaotic" and a["stderr"] > aim:
+        if a["end"] == "chaotic" and a["largest_exponent_stderr"] > aim:
             lines.append(f"THE PRECISION {a['precision']:g} WAS NOT REACHED: raise --max-periods.")
     elif math.isfinite(value):
         pairs = dataset["multipliers"].values
@@ -299,14 +310,14 @@ def _summary(dataset: xr.Dataset) -> list[str]:
             f"Largest Lyapunov exponent {value:.9g} {per}, {a['per_period']:.9g} per period: "
             f"{exact}."
         )
-    if not (math.isfinite(value) and math.isnan(a["stderr"])):
+    if not (math.isfinite(value) and math.isnan(a["largest_exponent_stderr"])):
         lines += _other(a, units)
     return [*lines, effort(a)]
 
 
 def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     """Return summary lines on how the start's trajectory ended."""
-    a, units = dataset.attrs, Units.of(dataset.attrs)
+    a, units = facts(dataset), Units.of(facts(dataset))
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
     if a["end"] == "captured":
@@ -317,9 +328,9 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
                 f" On the way deviations grow by 1e{grown / math.log(10):.0f}: rounding decides "
                 "when it is reached, and which one where others coexist."
             )
-        if a["exponent"] == -math.inf:
+        if a["largest_exponent"] == -math.inf:
             said += " Its exponent is minus infinity: both multipliers are 0."
-        elif math.isnan(a["exponent"]):
+        elif math.isnan(a["largest_exponent"]):
             said += " Friction holds it permanently: deviations neither grow nor decay, and there"
             said += " is no exponent."
     else:

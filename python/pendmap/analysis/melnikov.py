@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised, variable
+from pendmap.analysis.result import Found, Schema, summarised, variable
 from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
@@ -50,15 +50,21 @@ leaves the other upright rest; width of further panels; end, where the angle is 
 SCHEMA = Schema(
     "melnikov",
     result.UNITS,
-    Field("p_melnikov", "1", "threshold at the model's frequency; 0 without losses"),
-    Field("p_tangency", "1", "amplitude of the tangency itself; not computed"),
-    Field("p_forward", "1", "threshold on the separatrix, forward"),
-    Field("p_backward", "1", "threshold on the separatrix, backward"),
-    Field("p_loop", "1", "threshold on the loop that a torque makes"),
+    Found(
+        "p_melnikov",
+        "1",
+        "threshold at the model's frequency; 0 without losses",
+        variable="own_p_melnikov",
+    ),
+    Found("p_tangency", "1", "amplitude of the tangency itself; not computed"),
+    Found("p_forward", "1", "threshold on the separatrix, forward"),
+    Found("p_backward", "1", "threshold on the separatrix, backward"),
+    Found("p_loop", "1", "threshold on the loop that a torque makes"),
     result.SIMD,
     *result.END,
     *result.OWN,
     *result.VERSIONS,
+    references="Koch & Leven (1985), Physica D 16, 1",
 )
 
 
@@ -92,7 +98,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     Parameters
     ----------
     pendulum : Pendulum or Rig
-        The model; attributes give the threshold at its ``omega``.
+        The model; variables without dimensions give the threshold at its ``omega``.
     omega : array_like, optional
         Frequencies ``Omega/w0`` of the curve, by default 191 from 0.2 to 4.
 
@@ -100,9 +106,9 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     -------
     xarray.Dataset
         ``p_melnikov`` over ``omega`` and ``branch`` (forward, backward, before them loop where the
-        torque keeps up a rotation); nan where the drive's work is not above rounding. The
-        attributes hold the values at the model's own frequency: ``p_forward``, ``p_backward``,
-        ``p_loop`` (nan without a torque) and ``p_melnikov``, that of the loop where the torque
+        torque keeps up a rotation); nan where the drive's work is not above rounding. Without
+        dimensions are the values at the model's own frequency: ``p_forward``, ``p_backward``,
+        ``p_loop`` (nan without a torque) and ``own_p_melnikov``, that of the loop where the torque
         keeps up a rotation, else the lower of the others. ``p_tangency`` is nan: to be computed by
         following manifolds.
 
@@ -121,7 +127,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     --------
     >>> import pendmap
     >>> result = pendmap.melnikov(pendmap.Pendulum(gamma=0.1, p=1.0, omega=2.0))
-    >>> round(result.attrs["p_melnikov"], 6)
+    >>> round(float(result["own_p_melnikov"]), 6)
     0.367608
     """
     bare, _ = without_dimensions(pendulum)
@@ -151,7 +157,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         },
         coords={
             "omega": variable("omega", frequencies, "1", "Omega/w0"),
-            "branch": ("branch", np.array(list(orbits))),
+            "branch": variable("branch", np.array(list(orbits)), long_name="orbit of upright rest"),
         },
     )
     values = {

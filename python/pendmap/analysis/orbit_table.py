@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.result import records
+from pendmap.analysis.result import records, variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -41,27 +41,32 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     flat = np.array(points, dtype=float).reshape(-1, 3)
     flat[:, 2] = units.given(flat[:, 2], VELOCITY)
     speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
-    of_velocity = {"units": units.of_velocity}
+    theta = np.array([c[0] for c in closed], dtype=float)
+    rate, error = measured("exponent", RATE), measured("exponent_stderr", RATE)
+    names = {
+        key: np.array([getattr(a, key) for a in orbits], dtype=str) for key in ("name", "kind")
+    }
+    number, none = np.arange(1, len(orbits) + 1, dtype=np.int32), "0: no meaning"
+    image = "its own number where symmetric, 0 if not known"
+    multiplier, owner = "Floquet multiplier, real and imaginary part", f"number of the {one}"
     return {
-        one: (one, np.array([a.name for a in orbits], dtype=str)),
-        "id": (one, np.arange(1, len(orbits) + 1, dtype=np.int32)),
-        "kind": (one, np.array([a.kind for a in orbits], dtype=str)),
-        "n": (one, whole("n"), {"comment": "0: no meaning"}),
-        "w": (one, whole("w")),
-        "theta_point": (one, np.array([c[0] for c in closed], dtype=float), {"units": "rad"}),
-        "velocity_point": (one, speed, of_velocity),
-        "period": (one, measured("period", TIME), {"units": units.of_time}),
-        "exponent": (one, measured("exponent", RATE), {"units": units.of_rate}),
-        "exponent_stderr": (one, measured("exponent_stderr", RATE), {"units": units.of_rate}),
-        "twin": (
-            one,
-            whole("twin"),
-            {"comment": "number of the mirror image; its own where symmetric, 0 if not known"},
+        one: variable(one, names["name"], long_name=f"name of the {one}"),
+        "id": variable(one, number, "1", owner),
+        "kind": variable(one, names["kind"], long_name=f"kind of {one}"),
+        "n": variable(one, whole("n"), "periods", "period n", none),
+        "w": variable(one, whole("w"), "turns", "net turns w over a period"),
+        "theta_point": variable(one, theta, "rad", "angle of a stroboscopic point"),
+        "velocity_point": variable(one, speed, units.of_velocity, "velocity of this point"),
+        "period": variable(one, measured("period", TIME), units.of_time, "period as a time"),
+        "exponent": variable(one, rate, units.of_rate, "largest Lyapunov exponent"),
+        "exponent_stderr": variable(one, error, units.of_rate, "standard error of the exponent"),
+        "twin": variable(one, whole("twin"), "1", "number of the mirror image", image),
+        "multipliers": variable((one, "eigenvalue", "part"), multipliers, "1", multiplier),
+        f"point_{one}": variable("point", flat[:, 0].astype(np.int32), "1", owner),
+        "point_theta": variable("point", flat[:, 1], "rad", "angle of a stroboscopic point"),
+        "point_velocity": variable(
+            "point", flat[:, 2], units.of_velocity, "velocity of this point"
         ),
-        "multipliers": ((one, "eigenvalue", "part"), multipliers, {"comment": "part: re, im"}),
-        f"point_{one}": ("point", flat[:, 0].astype(np.int32)),
-        "point_theta": ("point", flat[:, 1], {"units": "rad"}),
-        "point_velocity": ("point", flat[:, 2], of_velocity),
     }
 
 

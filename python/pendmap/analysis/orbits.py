@@ -15,8 +15,9 @@ from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import matched, objects, points_of, table
-from pendmap.analysis.result import Field, Schema, records, summarised
+from pendmap.analysis.result import Field, Schema, flag, records, summarised, variable
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
+from pendmap.files import facts
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
@@ -45,7 +46,7 @@ def drawn_orbits(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of closed orbits for the JSON object."""
     spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
     orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
-    return {"orbits": orbits, "others": dataset.attrs["drawn_others"]}
+    return {"orbits": orbits, "others": facts(dataset)["drawn_others"]}
 
 
 SCHEMA = Schema(
@@ -154,11 +155,12 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         raw = _core.orbits(bare, (n, w), *box, numerics.workers, progress)
         paths = _paths(bare, raw.orbits, units)
     found = raw.orbits
+    residual = np.array([o.residual for o in found], dtype=float)
     dataset = xr.Dataset(
         {
             **table(found, units, "orbit"),
-            "stable": ("orbit", np.array([o.stable for o in found], dtype=np.int8)),
-            "residual": ("orbit", np.array([o.residual for o in found], dtype=float)),
+            "stable": flag("orbit", [o.stable for o in found], "whether it is stable"),
+            "residual": variable("orbit", residual, "1", "distance that remains after a period"),
             **paths,
         }
     )
@@ -190,15 +192,15 @@ def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[s
     empty = tuple(np.empty(0, dtype=t) for t in (np.int32, np.int32, float, float))
     columns = [np.concatenate(c) for c in zip(*(pieces or [empty]), strict=True)]
     return {
-        "path_orbit": ("sample", columns[0]),
-        "path_piece": ("sample", columns[1], {"comment": "from which of its points on"}),
-        "path_theta": ("sample", columns[2], {"units": "rad", "long_name": "angle, not wrapped"}),
-        "path_velocity": ("sample", columns[3], {"units": units.of_velocity}),
+        "path_orbit": variable("sample", columns[0], "1", "number of the orbit"),
+        "path_piece": variable("sample", columns[1], "1", "from which of its points on"),
+        "path_theta": variable("sample", columns[2], "rad", "angle, not wrapped"),
+        "path_velocity": variable("sample", columns[3], units.of_velocity, "velocity"),
     }
 
 
 def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list[str]:
-    a, units = dataset.attrs, Units.of(dataset.attrs)
+    a, units = facts(dataset), Units.of(facts(dataset))
     stable = int(dataset["stable"].sum())
     count = dataset.sizes["orbit"]
     own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
@@ -252,8 +254,8 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
     has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
     standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
-    which it exists, and exists and is stable; ``drawn`` (D, parameter). Attribute ``drawn_others``:
-    mean number of orbits of a draw that the model itself lacks.
+    which it exists, and exists and is stable; ``drawn`` (D, parameter); ``drawn_others``, the mean
+    number of orbits of a draw that the model itself lacks.
     """
     names, points = dataset["orbit"].values.tolist(), points_of(dataset, "orbit")
     count, total = len(names), len(draws)
@@ -276,18 +278,20 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
             swapped = np.abs(pair[::-1] - own).sum() < np.abs(pair - own).sum()
             multipliers[k, ..., d] = pair[::-1] if swapped else pair
     spread = interval(state)[1]
-    dims = dataset["multipliers"].dims
+    dims, speed = dataset["multipliers"].dims, dataset["velocity_point"].attrs["units"]
+    single, each, part = "orbit", ("orbit", "draw"), dataset["multipliers"].attrs["long_name"]
+    of = "standard deviation over the draws of"
     found = dataset.assign(
-        drawn_theta=(("orbit", "draw"), state[:, 0], {"units": "rad"}),
-        drawn_velocity=(("orbit", "draw"), state[:, 1], dataset["velocity_point"].attrs),
-        drawn_multipliers=((*dims, "draw"), multipliers),
-        theta_spread=("orbit", spread[:, 0], {"units": "rad"}),
-        velocity_spread=("orbit", spread[:, 1], dataset["velocity_point"].attrs),
-        multipliers_spread=(dims, interval(multipliers)[1]),
-        exists=("orbit", there.mean(axis=1)),
-        stable_share=("orbit", stable.mean(axis=1)),
+        drawn_theta=variable(each, state[:, 0], "rad", "angle of a stroboscopic point"),
+        drawn_velocity=variable(each, state[:, 1], speed, "velocity of this point"),
+        drawn_multipliers=variable((*dims, "draw"), multipliers, "1", part),
+        theta_spread=variable(single, spread[:, 0], "rad", f"{of} the angle"),
+        velocity_spread=variable(single, spread[:, 1], speed, f"{of} the velocity"),
+        multipliers_spread=variable(dims, interval(multipliers)[1], "1", f"{of} a {part}"),
+        exists=variable(single, there.mean(axis=1), "1", "share of the draws that have the orbit"),
+        stable_share=variable(single, stable.mean(axis=1), "1", "share in which it is stable"),
+        drawn_others=variable((), others / total, "1", "orbits of a draw that the model lacks"),
     )
-    found.attrs["drawn_others"] = others / total
     return draws.complete(found, _drawn_summary(found, others))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +10,21 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result, sweep
-from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_cells, sure_line
+from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics, part
-from pendmap.analysis.result import Field, Schema, records, rows, summarised, variable
+from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.tongues import MOST_P, tongues
 from pendmap.errors import InputError, check_flag, core_errors
+from pendmap.files import facts
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
+
+    from numpy.typing import NDArray
 
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
@@ -33,25 +35,46 @@ if TYPE_CHECKING:
 
 
 _LISTED = 10  # Largest number of regimes in a summary
-_SHARES = ("outcome_kinds", "share_mean", "share_low", "share_high")  # Variables over the outcomes
+_SHARES = ("share_mean", "share_low", "share_high")  # Variables over the outcomes
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
 _FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regimes with their shares of the cells for the JSON object."""
-    found = records(dataset, kinds="regime_kinds", share="regime_share")
-    return [one | {"kinds": json.loads(one["kinds"])} for one in found]
+    both = zip(sets(dataset), dataset["regime_share"].values.tolist(), strict=True)
+    return [{"kinds": kinds, "share": share} for kinds, share in both]
+
+
+def sets(dataset: xr.Dataset, which: str = "regime_has", kind: str = "kind") -> list[list[str]]:
+    """Return the kinds of attractor in each regime, rest first, chaos last."""
+    names = dataset[kind].values
+    found = (names[has.astype(bool)].tolist() for has in dataset[which].transpose(..., kind).values)
+    return [sorted(one, key=sweep.order) or [sweep.UNDECIDED] for one in found]
+
+
+def having(dim: str, sets: Iterable[Collection[str]], kinds: Iterable[str]) -> tuple[Any, ...]:
+    """Return which of the kinds each set contains, as a variable."""
+    has = [[kind in one for kind in kinds] for one in sets]
+    both = (dim, "kind" if dim == "set" else f"{dim}_kind")
+    array = np.array(has, dtype=np.int8).reshape(len(has), -1)
+    return flag(both, array, "whether the regime has the kind of attractor")
 
 
 @drawn_field
 def drawn_regimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a map over two parameters for the JSON object."""
     regimes = [
-        {"kinds": json.loads(text), "share": mean, "ci95": [low, high]}
-        for text, mean, low, high in rows(dataset, *_SHARES)
+        {"kinds": kinds, "share": mean, "ci95": [low, high]}
+        for kinds, (mean, low, high) in _outcomes(dataset)
     ]
-    return {"regimes": regimes, "sure_cells": dataset.attrs["sure_cells"]}
+    return {"regimes": regimes, "sure_cells": facts(dataset)["sure_cells"]}
+
+
+def _outcomes(dataset: xr.Dataset) -> Iterator[tuple[list[str], tuple[Any, ...]]]:
+    """Return the kinds of each outcome of the draws, and its shares."""
+    every = sets(dataset, "outcome_has", "outcome_kind")
+    return zip(every, rows(dataset, *_SHARES), strict=True)
 
 
 SCHEMA = Schema(
@@ -63,6 +86,7 @@ SCHEMA = Schema(
     Field("cells", "1", "cells of the plane"),
     *sweep.SEARCH,
     drawn_regimes,
+    references="Xu, Wiercigroch & Cartmell (2005), Chaos, Solitons & Fractals 23, 1537",
 )
 
 
@@ -131,7 +155,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     Returns
     -------
     xarray.Dataset
-        Over (row, column): ``regime`` (index into ``regime_kinds`` and ``regime_share``),
+        Over (row, column): ``regime`` (index into ``regime_has``, over ``kind``
+        too, and ``regime_share``),
         ``attractors`` (how many coexist, mirror images counted), ``period`` and ``winding`` of the
         kind that most starts end on (0 for chaos), ``exponent`` (the largest of all attractors),
         ``undecided`` and ``failed`` (shares of the starts), ``chaos_periods`` (periods within which
@@ -183,7 +208,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         "rows": rows.name,
         "cells": columns.values.size * rows.values.size,
     }
-    SCHEMA.complete(dataset, pendulum, values, raw)
+    replaced = [*columns.replaced, *rows.replaced]
+    SCHEMA.complete(dataset, pendulum, values, raw, replaced)
     dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
     lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
     summarised(dataset, lines, pendulum, "attractors are")
@@ -207,25 +233,29 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     leading = share[which, cell]
     for k in np.lexsort((-np.arange(cell.size), leading)):
         period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
+    coexist = np.bincount(cell, minlength=cells).astype(np.int16)
+    on_kind = "share of the starts on a kind of attractor"
+
+    def over(values: NDArray[Any], *texts: str, **flags: Any) -> tuple[Any, ...]:  # noqa: ANN401
+        return variable(dims, values.reshape(shape), *texts, **flags)
+
     data: dict[str, Any] = {
-        "regime": (dims, regime.reshape(shape)),
-        "regime_share": ("set", frequency),
-        "regime_kinds": ("set", np.array([json.dumps(one) for one in sets], dtype=str)),
-        "attractors": (dims, np.bincount(cell, minlength=cells).astype(np.int16).reshape(shape)),
-        "period": (dims, period.reshape(shape), {"units": "forcing periods"}),
-        "winding": (dims, winding.reshape(shape), {"units": "turns"}),
-        "exponent": variable(dims, units.given(exponent, RATE).reshape(shape), units.of_rate),
-        "undecided": (dims, raw.undecided.reshape(shape)),
-        "failed": (dims, raw.failed.reshape(shape)),
-        "chaos_periods": (dims, raw.chaos_periods.reshape(shape), {"comment": sweep.CHAOS_PERIODS}),
-        "share": (("kind", *dims), share.reshape((kinds.size, *shape))),
-        **sweep.entries(raw, which, units),
+        "regime": over(regime, "", "set of attractors", flags=dict(enumerate(map("+".join, sets)))),
+        "regime_share": variable("set", frequency, "1", "share of the cells"),
+        "regime_has": having("set", sets, kinds.tolist()),
+        "attractors": over(coexist, "1", "attractors that coexist"),
+        "period": over(period, "periods", "period of the kind that most starts end on"),
+        "winding": over(winding, "turns", "net turns in that period"),
+        "exponent": over(units.given(exponent, RATE), units.of_rate, "largest Lyapunov exponent"),
+        "share": variable(("kind", *dims), share.reshape((kinds.size, *shape)), "1", on_kind),
+        **sweep.shares(raw, dims, shape),
+        **sweep.entries(raw, kinds, which, units),
     }
     coordinates = {
         **columns.coordinates,
         **rows.coordinates,
-        "kind": ("kind", kinds),
-        "set": ("set", np.arange(len(sets))),
+        "kind": variable("kind", kinds, long_name="kind of attractor"),
+        "set": variable("set", np.arange(len(sets)), "1", "number of the regime"),
     }
     return xr.Dataset(data, coords=coordinates)
 
@@ -249,14 +279,14 @@ def _curves(
     p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
     found = tongues(model, frequency, p_max, inverted=False, refine=True, progress=progress)
-    scale = omega.values[-1] / omega.bare[-1]
+    scale, sought = omega.values[-1] / omega.bare[-1], found["fold_sought"]
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
         "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
-        "curve_fold_sought": ("curve_frequency", found["fold_sought"].values),
-        "curve_index": ("curve_point", found["index"].values),
+        "curve_fold_sought": ("curve_frequency", sought.values, sought.attrs),
+        "curve_index": ("curve_point", found["index"].values, found["index"].attrs),
         "curve_p": ("curve_point", found["p"].values, p.attributes),
-        "curve_multiplier": ("curve_point", found["multiplier"].values),
+        "curve_multiplier": ("curve_point", found["multiplier"].values, found["multiplier"].attrs),
     }
 
 
@@ -270,17 +300,16 @@ def _place_text(place: dict[str, Any]) -> str:
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a = dataset.attrs
-    count = dataset.sizes["set"]
+    a = facts(dataset)
+    count, kinds = dataset.sizes["set"], sets(dataset)
     spans = [
         f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
         for name in (a["columns"], a["rows"])
     ]
     said = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
     lines = [f"{', '.join(spans)}: {said}"]
-    for k in range(min(count, _LISTED)):
-        kinds = json.loads(str(dataset["regime_kinds"].values[k]))
-        lines.append(f"{100 * float(dataset['regime_share'][k]):.3g} %: {', '.join(kinds)}.")
+    shares = dataset["regime_share"].values[:_LISTED]
+    lines += [f"{100 * share:.3g} %: {', '.join(kinds[k])}." for k, share in enumerate(shares)]
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
@@ -302,37 +331,40 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a map of M x N cells with the regimes of D draws of the other parameters.
 
-    Adds, over ``outcome``, all regimes: ``outcome_kinds`` (as ``regime_kinds``), ``probability``
+    Adds, over ``outcome``, all regimes: ``outcome_has`` (as ``regime_has``), ``probability``
     (outcome, M, N), ``drawn_share`` (outcome, D), ``share_mean``, ``share_low`` and ``share_high``
     (the 95 % interval over the draws); over the cells ``certainty``, the probability of the most
-    likely regime; ``drawn`` (D, parameter). Attribute ``sure_cells``: the share of the cells with a
-    certainty of 95 % or more.
+    likely regime; ``drawn`` (D, parameter); ``sure_cells``: the share of the cells with a certainty
+    of 95 % or more.
     """
     dims, shape = dataset["regime"].dims, dataset["regime"].shape
-    counts: dict[str, np.ndarray] = {}
-    shares: list[dict[str, float]] = []
+    counts: dict[tuple[str, ...], np.ndarray] = {}
+    shares: list[dict[tuple[str, ...], float]] = []
     for one in draws.each(run):
-        own = [str(text) for text in one["regime_kinds"].values]
+        own = [tuple(kinds) for kinds in sets(one)]
         shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
-        for k, text in enumerate(own):
-            counts.setdefault(text, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
-    share = np.array([[one.get(text, 0.0) for one in shares] for text in counts])
+        for k, kinds in enumerate(own):
+            counts.setdefault(kinds, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
+    share = np.array([[one.get(kinds, 0.0) for one in shares] for kinds in counts])
     order = np.argsort(-share.mean(axis=1), kind="stable")
-    texts = np.array(list(counts), dtype=str)[order]
+    every = sorted(set().union(*counts) - {sweep.UNDECIDED})
+    ranked = [list(counts)[k] for k in order]
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
-    found = dataset.assign(outcome_kinds=("outcome", texts))
+    found = dataset.assign(outcome_has=having("outcome", ranked, every))
+    names = np.array(every, dtype=str)
+    found = found.assign_coords(
+        outcome_kind=variable("outcome_kind", names, long_name="kind of attractor")
+    )
     found = found.assign(outcomes(dims, probability, share[order]))
-    found.attrs["sure_cells"] = sure_cells(found)
     return draws.complete(found, _drawn_summary(found))
 
 
 def _drawn_summary(found: xr.Dataset) -> list[str]:
     lines = []
-    every = list(rows(found, *_SHARES))
-    for kinds, mean, low, high in every[:_LISTED]:
-        text = kinds.strip("[]").replace('"', "")
+    every = list(_outcomes(found))
+    for kinds, (mean, low, high) in every[:_LISTED]:
         lines.append(
-            f"{text}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
+            f"{', '.join(kinds)}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
             f"[{100 * low:.3g}, {100 * high:.3g}] %."
         )
     if len(every) > _LISTED:

@@ -1,24 +1,48 @@
-"""Schema of a result: attributes of its dataset and keys of its JSON object, from one table."""
+"""Schema of a result: facts of its dataset and keys of its JSON object, from one table.
+
+Files follow the CF conventions 1.11: units are those of UDUNITS-2, and what it does not have is the
+unit 1 with its meaning in the long name.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import operator
+import re
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from pendmap import ANALYSES, _core
+from pendmap.files import facts
 from pendmap.model.covariance import misses
+from pendmap.model.labels import LABELS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 
     import xarray as xr
 
     from pendmap.model import Pendulum, Rig
+    from pendmap.units import Units
 
 OF_TIME: Final = "1/w0 or s"  # Unit of times: without dimensions or in SI, as the model is
 OF_RATE: Final = "1/tau or 1/s"  # Unit of exponents: without dimensions or in SI
 OF_VELOCITY: Final = "1 or rad/s"  # Unit of velocities: without dimensions or in SI
+_OF: Final = {OF_TIME: "of_time", OF_RATE: "of_rate", OF_VELOCITY: "of_velocity"}
+NO_YES: Final = {0: "no", 1: "yes"}  # Meanings of a flag
+FLAG: Final = "no or yes"  # Unit of a fact that is 0 or 1
+
+CONVENTIONS: Final = "CF-1.11"
+PAPER: Final = (
+    "Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A 366, 767, doi:10.1098/rsta.2007.2126"
+)
+"""The paper whose equation of motion all results solve."""
+_UDUNITS: Final = re.compile(r"(1|rad|m|mm|s|Hz)(/(rad|s)\d?)?")  # Units that UDUNITS-2 has too
+_NOT_IN_FLAGS: Final = re.compile(r"[^\w@.+-]", re.ASCII)
+"""Characters that CF does not allow in ``flag_meanings``."""
+_WITHOUT_INDEX: Final = ("bound", "eigenvalue", "part")  # Dimensions with two places each
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,20 +69,51 @@ class Field:
         """The field without its key in the JSON object."""
         return dataclasses.replace(self, json=False)
 
-    def value(self, dataset: xr.Dataset) -> Any:  # noqa: ANN401 (any part of a JSON object)
-        """Return the JSON value; null where the attribute is absent."""
+    def value(self, dataset: xr.Dataset, known: Mapping[str, Any]) -> Any:  # noqa: ANN401 (JSON)
+        """Return the JSON value from a dataset and its facts; null where the fact is absent."""
         if self.read is not None:
             return self.read(dataset)
-        value = dataset.attrs.get(self.name)
+        value = known.get(self.place)
         return value if value is None or self.convert is None else self.convert(value)
+
+    @property
+    def place(self) -> str:
+        """Name of the attribute or variable that holds the value."""
+        return self.name
+
+    def put(self, dataset: xr.Dataset, value: Any, units: Units) -> None:  # noqa: ANN401, ARG002
+        """Set the value in a dataset."""
+        dataset.attrs[self.place] = value
+
+
+@dataclasses.dataclass(frozen=True)
+class Found(Field):
+    """A number or text that was computed: a variable without dimensions, not an attribute."""
+
+    variable: str = ""
+    """Name of the variable, if another variable of the dataset has the name of the field."""
+
+    @property
+    def place(self) -> str:
+        """Name of the variable that holds the value."""
+        return self.variable or self.name
+
+    def put(self, dataset: xr.Dataset, value: Any, units: Units) -> None:  # noqa: ANN401
+        """Set the value in a dataset."""
+        if self.unit == FLAG:
+            dataset[self.place] = flag((), value, self.meaning)
+        else:
+            unit = getattr(units, _OF[self.unit]) if self.unit in _OF else self.unit
+            dataset[self.place] = variable((), value, unit, self.meaning)
 
 
 class Schema:
     """The fields of one kind of dataset, in the order of the JSON object."""
 
-    def __init__(self, kind: str, *fields: Field) -> None:
+    def __init__(self, kind: str, *fields: Field, references: str = "") -> None:
         self.kind = kind
         self.fields = fields
+        self.references = "; ".join(filter(None, (PAPER, references)))
 
     def complete(
         self,
@@ -66,24 +121,61 @@ class Schema:
         model: Pendulum | Rig,
         values: Mapping[str, Any],
         raw: object = None,
+        replaced: Collection[str] = (),
     ) -> None:
-        """Set the attributes of a dataset: values given, else those of the core's result."""
+        """Set the facts of a dataset: values given, else those of the core's result.
+
+        Those of a dataset that it was made of are removed. The parameters of the model become
+        coordinates without dimensions, except those ``replaced`` by others, which vary.
+        """
+        for name in [name for name in dataset.variables if not dataset[name].dims]:
+            del dataset[name]
+        known = model.attributes
+        dataset.attrs = {"kind": self.kind, "title": model.title}
+        dataset.attrs |= {name: value for name, value in known.items() if name not in LABELS}
         values = {"section": model.units.section, **values}
-        dataset.attrs = {"kind": self.kind, "title": model.title, **model.attributes}
         for field in self.fields:
             value = values.get(field.name)
             if not (field.name in values or field.read or field.core is None or raw is None):
                 value = operator.attrgetter(field.core or field.name)(raw)
             if value is not None:
-                dataset.attrs[field.name] = value
+                field.put(dataset, value, model.units)
+        own = {n: x for n, x in known.items() if n in LABELS and n not in replaced}
+        self.describe(dataset, own)
+
+    def describe(self, dataset: xr.Dataset, parameters: Mapping[str, Any]) -> None:
+        """Set what all results have: parameters, indices of dimensions, attributes of CF."""
+        bare = dataset.attrs["units"] != "SI"
+        for name, value in parameters.items():
+            label = LABELS[name]
+            unit = "1" if bare and name == "torque" else label.unit or "1"
+            if name not in dataset.variables and name not in dataset.dims:
+                dataset.coords[name] = variable((), float(value), unit, label.meaning)
+        dataset.coords.update(indices(dataset))
+        dataset.attrs |= {
+            "Conventions": CONVENTIONS,
+            "comment": ANALYSES[self.kind][2],
+            "source": f"pendmap {dataset.attrs.get('pendmap_version', _core.__version__)}",
+            "references": self.references,
+        }
 
     def json(self, dataset: xr.Dataset) -> dict[str, Any]:
         """Return the JSON object of a dataset."""
+        known = facts(dataset)
         return {
-            field.name: field.value(dataset)
+            field.name: field.value(dataset, known)
             for field in self.fields
-            if field.json and (not field.when or dataset.attrs[field.when])
+            if field.json and (not field.when or known[field.when])
         }
+
+
+def indices(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return numbers from 0 for each dimension without a coordinate, so that results align."""
+    return {
+        str(name): variable(name, np.arange(size, dtype=np.int32), "1", f"number of the {name}")
+        for name, size in dataset.sizes.items()
+        if name not in dataset.variables and name not in _WITHOUT_INDEX
+    }
 
 
 def of_model(model: Pendulum | Rig, what: str) -> list[str]:
@@ -106,16 +198,42 @@ def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig,
     dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
 
 
-def variable(
-    dims: str | tuple[Hashable, ...],
+def variable(  # noqa: PLR0913 (attributes of CF)
+    dims: Hashable | tuple[Hashable, ...],
     values: Any,  # noqa: ANN401 (an array)
     units: str = "",
     long_name: str = "",
     comment: str = "",
-) -> tuple[str | tuple[Hashable, ...], Any, dict[str, str]]:
-    """Return a variable of a dataset with the attributes that are not empty."""
-    attributes = {"units": units, "long_name": long_name, "comment": comment}
-    return dims, values, {key: text for key, text in attributes.items() if text}
+    *,
+    flags: Mapping[int, str] | None = None,
+    missing: int | None = None,
+) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
+    """Return a variable of a dataset with the attributes of CF that are not empty.
+
+    ``flags`` are the meanings of whole numbers, ``missing`` the number that means none.
+    """
+    units = units.replace("^", "")
+    if units and not _UDUNITS.fullmatch(units):
+        units, long_name = "1", f"{long_name}, in {units}"
+    attributes: dict[str, Any] = {"units": units, "long_name": long_name, "comment": comment}
+    attributes = {key: text for key, text in attributes.items() if text}
+    if flags is not None:
+        attributes["flag_values"] = np.array([*flags], dtype=np.asarray(values).dtype)
+        meanings = (_NOT_IN_FLAGS.sub("_", meaning) for meaning in flags.values())
+        attributes["flag_meanings"] = " ".join(meanings)
+    if missing is not None:
+        attributes["_FillValue"] = np.asarray(values).dtype.type(missing)
+    return dims, values, attributes
+
+
+def flag(
+    dims: Hashable | tuple[Hashable, ...],
+    values: Any,  # noqa: ANN401 (an array)
+    long_name: str,
+    flags: Mapping[int, str] = NO_YES,
+) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
+    """Return a variable that is 0 or 1, or another small number with a meaning."""
+    return variable(dims, np.asarray(values, dtype=np.int8), "", long_name, flags=flags)
 
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
@@ -136,7 +254,7 @@ def none_below_0(value: float) -> float | None:
 UNITS: Final = Field("units", "", "SI or nondimensional", None)
 SECTION: Final = Field("section", "", "where the stroboscopic section lies", json=False)
 TOL: Final = Field("tol", "1", "error after 5 periods that was asked for")
-REACHED: Final = Field("reached_error", "1", "error after 5 periods that was reached")
+REACHED: Final = Found("reached_error", "1", "error after 5 periods that was reached")
 STEPS: Final = Field("steps_per_period", "1", "steps of the integrator in a forcing period")
 BOUND: Final = Field("max_periods", "periods", "bound after which a start is undecided", "bound")
 CHAOS_BOUND: Final = Field("chaos_bound", "periods", "bound within which chaos was watched")
@@ -153,8 +271,8 @@ BOX: Final = (
     Field("high_velocity", OF_VELOCITY, "upper end of its velocities", json=False),
 )
 OWN: Final = (
-    Field("own_p", "1", "amplitude of the model itself", json=False),
-    Field("own_omega", "1", "frequency of the model itself", json=False),
+    Found("own_p", "1", "amplitude p of the model itself", json=False),
+    Found("own_omega", "1", "frequency omega of the model itself", json=False),
 )
 TIMED: Final = (SECONDS, SIMD, THREADS)
 RUN: Final = (*TIMED, SEED, VERSION, FORMAT)

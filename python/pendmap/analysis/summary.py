@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.result import of_model, rows
+from pendmap.files import facts
 from pendmap.formatting import counted, with_error, written
 from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.units import TIME, VELOCITY, Units
@@ -26,8 +27,8 @@ _STILL = 1e-12  # Sine of the angle below which a start hangs or is upright
 
 
 def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
-    """Return the summary of a basin map whose attributes are set, one sentence a line."""
-    a, plane = dataset.attrs, dataset.attrs["plane"]
+    """Return the summary of a basin map whose facts are set, one sentence a line."""
+    a, plane = facts(dataset), dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
         line = (
@@ -132,8 +133,8 @@ def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
     """Return which starts are at rest, hanging or inverted, for any drive."""
     of = "start_" if "start_theta" in dataset else ""
     hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
-    alone = dataset.attrs["torque"] == 0 and dataset.attrs["effects"] == "[]"
-    still: xr.DataArray = hangs & (dataset[f"{of}velocity"] == 0) & alone
+    alone = facts(dataset)["torque"] == 0 and not effects_of(dataset.attrs)
+    still: xr.DataArray = (dataset[f"{of}velocity"] == 0) & hangs & alone
     return still
 
 
@@ -178,7 +179,7 @@ def _only_chaos(dataset: xr.Dataset) -> str:
 def _attractors(dataset: xr.Dataset) -> list[str]:
     lines = []
     names = dataset["attractor"].values.tolist()
-    units = Units.of(dataset.attrs)
+    units = Units.of(facts(dataset))
     unit = f" {units.of_rate}" if units.si else ""
     columns = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
     for k, (share, error, twin, exponent, spread) in enumerate(rows(dataset, *columns)):
@@ -196,7 +197,7 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
 
 
 def _settling(dataset: xr.Dataset) -> list[str]:
-    a = dataset.attrs
+    a = facts(dataset)
     if a["longest_settle"] < 0:
         return []
     own, units = "", Units.of(a)
@@ -231,7 +232,7 @@ def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
 
 
 def _texture(dataset: xr.Dataset) -> list[str]:
-    a = dataset.attrs
+    a = facts(dataset)
     if not (dataset["label"] > 0).any():
         return []  # no label is decided: agreement has no meaning
     lines = []

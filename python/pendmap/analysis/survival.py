@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap import _core
+from pendmap.files import facts
 from pendmap.units import RATE, VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def growth_on_saddle(
     none = math.nan, math.nan, 0
     if fitted is None:
         return none
-    units = Units.of(found.attrs)
+    units = Units.of(facts(found))
     settle, label = found["settle_periods"].values, found["label"].values
     end = np.where(settle >= 0, settle, found.attrs["max_periods"])
     end = end - _settling(found, pendulum.period)
@@ -193,7 +194,7 @@ def growth_on_saddle(
 
 def _settling(found: xr.Dataset, period: float) -> NDArray[np.int64]:
     """Return the number of periods in which each start approaches its attractor."""
-    rate = -Units.of(found.attrs).bare(found["exponent"].values, RATE) * period
+    rate = -Units.of(facts(found)).bare(found["exponent"].values, RATE) * period
     rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
     periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)
     label = found["label"].values.astype(np.int64)

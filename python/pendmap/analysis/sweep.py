@@ -14,7 +14,7 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import Grid, coordinate
-from pendmap.analysis.result import Field
+from pendmap.analysis.result import Field, Found, variable
 from pendmap.errors import (
     MOST_CELLS,
     InputError,
@@ -31,7 +31,7 @@ from pendmap.model.rig import Rig
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Hashable, Mapping, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -56,6 +56,8 @@ class Varied:
     """The values without dimensions."""
     unit: str
     """Unit of the values; empty where they have none."""
+    meaning: str
+    """Meaning of the parameter."""
 
     @property
     def kernel(self) -> tuple[str, list[float]]:
@@ -65,7 +67,7 @@ class Varied:
     @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of a quantity with these values."""
-        return {"units": self.unit or "1", "long_name": self.name}
+        return variable((), 0.0, self.unit or "1", self.meaning)[2]
 
     @property
     def coordinates(self) -> dict[str, Any]:
@@ -76,6 +78,11 @@ class Varied:
         half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
         edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
         return coordinate(self.name, x, edges, **self.attributes)
+
+    @property
+    def replaced(self) -> tuple[str, ...]:
+        """Names of the model's own parameter that this one replaces."""
+        return self.parameter, COUNTERPARTS.get(self.parameter, ("",))[0]
 
 
 def varied(
@@ -162,6 +169,7 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         plain = units.bare(factor * values, power)
         # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
+        meaning = LABELS[name].meaning
     else:
         bare, unit = name, ""
         which, parameter = name.split(".", 1)
@@ -174,11 +182,12 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         changed = ({**one.parameters, parameter: float(x)} for x in values)
         bared = [dataclasses.replace(one, parameters=mine).bare(units) for mine in changed]
         plain = np.array([effect.parameters[parameter] for effect in bared])
+        meaning = f"{parameter} of {which}: {effects[which].definition[parameter].meaning}"
         if units.si:
             unit = effects[which].definition[parameter].unit
     if known.count(bare) > 1:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
-    return Varied(name, values, bare, plain, unit)
+    return Varied(name, values, bare, plain, unit, meaning)
 
 
 def _values(name: str, given: object) -> Floats:
@@ -212,8 +221,8 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
-CHAOS_PERIODS = "periods for which the chaos was not captured; 0: no chaos"
-"""Comment of the variable ``chaos_periods``."""
+CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")
+"""Long name and comment of the variable ``chaos_periods``."""
 STARTS = 9  # Default number of initial conditions of a cell
 _SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746
@@ -336,26 +345,45 @@ def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
     return kinds, which
 
 
-def entries(raw: _core.ParameterMap, kind: Indices, units: Units) -> dict[str, Any]:
+def entries(
+    raw: _core.ParameterMap, kinds: NDArray[np.str_], kind: Indices, units: Units
+) -> dict[str, Any]:
     """Return all attractors, each with the index of its kind, over ``entry``."""
-    rate = {"units": units.of_rate}
-    speed = {"units": units.of_velocity}
+    one, rate, speed = "entry", units.of_rate, units.of_velocity
+    velocity = units.given(raw.velocity, VELOCITY)
+    growth, error = (units.given(each, RATE) for each in (raw.exponent, raw.exponent_stderr))
+    none, place = "0: no meaning", "cell of the whole result, row by row"
+    meanings = dict(enumerate(kinds.tolist()))
     return {
-        "entry_cell": ("entry", raw.cell, {"comment": "of the whole result, row by row"}),
-        "entry_kind": ("entry", kind.astype(np.int16), {"comment": "index into kind"}),
-        "entry_n": ("entry", raw.n, {"comment": "0: no meaning"}),
-        "entry_w": ("entry", raw.w),
-        "entry_theta": ("entry", raw.theta, {"units": "rad"}),
-        "entry_velocity": ("entry", units.given(raw.velocity, VELOCITY), speed),
-        "entry_exponent": ("entry", units.given(raw.exponent, RATE), rate),
-        "entry_exponent_stderr": ("entry", units.given(raw.exponent_stderr, RATE), rate),
-        "entry_share": ("entry", raw.share),
+        "entry_cell": variable(one, raw.cell, "1", place),
+        "entry_kind": variable(one, kind.astype(np.int16), "", "kind of attractor", flags=meanings),
+        "entry_n": variable(one, raw.n, "periods", "period n", none),
+        "entry_w": variable(one, raw.w, "turns", "net turns w over a period"),
+        "entry_theta": variable(one, raw.theta, "rad", "angle of a stroboscopic point"),
+        "entry_velocity": variable(one, velocity, speed, "velocity of this point"),
+        "entry_exponent": variable(one, growth, rate, "largest Lyapunov exponent"),
+        "entry_exponent_stderr": variable(one, error, rate, "standard error of the exponent"),
+        "entry_share": variable(one, raw.share, "1", "share of the starts"),
+    }
+
+
+def shares(
+    raw: _core.ParameterMap, dims: tuple[Hashable, ...], shape: tuple[int, ...]
+) -> dict[str, Any]:
+    """Return the shares of undecided and failed starts, and how long chaos was followed."""
+    lost, failed, watched = (
+        each.reshape(shape) for each in (raw.undecided, raw.failed, raw.chaos_periods)
+    )
+    return {
+        "undecided": variable(dims, lost, "1", "share of the starts that no attractor captured"),
+        "failed": variable(dims, failed, "1", "share of the starts that failed or diverged"),
+        "chaos_periods": variable(dims, watched, "periods", *CHAOS_PERIODS),
     }
 
 
 def chaos(attributes: Mapping[str, Any]) -> list[str]:
     """Return a summary line on how long chaos was followed, if there is any."""
-    periods = attributes["chaos_periods"]
+    periods = attributes["least_chaos_periods"]
     if not periods:
         return []
     line = (
@@ -368,17 +396,27 @@ def chaos(attributes: Mapping[str, Any]) -> list[str]:
 def undecided(attributes: Mapping[str, Any]) -> list[str]:
     """Return summary lines on the shares of undecided and failed starts."""
     return [
-        f"{100 * attributes[key]:.3g} % of the starts {word}."
+        f"{100 * attributes[f'{key}_share']:.3g} % of the starts {word}."
         for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
-        if attributes[key] > 0
+        if attributes[f"{key}_share"] > 0
     ]
 
 
 SEARCH = (
     Field("starts", "1", "initial conditions of each pendulum"),
-    Field("undecided", "1", "share of the starts that no attractor captured"),
-    Field("failed", "1", "share of the starts that failed or diverged"),
-    Field("chaos_periods", "periods", "least time for which chaos was not captured; 0: no chaos"),
+    Found(
+        "undecided",
+        "1",
+        "share of the starts that no attractor captured",
+        variable="undecided_share",
+    ),
+    Found("failed", "1", "share of the starts that failed or diverged", variable="failed_share"),
+    Found(
+        "chaos_periods",
+        "periods",
+        "least time for which chaos was not captured; 0: no chaos",
+        variable="least_chaos_periods",
+    ),
     *result.TIMED,
     result.REACHED,
     Field("undecided_at", "", "groups of cells with undecided starts", read=undecided_cells),
@@ -386,7 +424,7 @@ SEARCH = (
     result.SECTION,
     *result.BOX,
     result.TOL.hidden,
-    Field("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
+    Found("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
     result.SEED.hidden,
     *result.VERSIONS,
 )

@@ -15,11 +15,12 @@ from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
 from pendmap.analysis.sweep import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
+from pendmap.files import facts
 from pendmap.formatting import counted
-from pendmap.model import without_dimensions
+from pendmap.model import effects_of, without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
@@ -35,7 +36,8 @@ _Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Default frequencies and largest amplitude
 MOST_P = 100.0  # Largest allowed ``p_max``
-_OF_P = {"units": "1", "long_name": "amplitude of the drive over gravity"}
+_OF_P = "1", "amplitude of the drive over gravity"  # Unit and meaning of p
+_STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
 _TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
 _STRIP = 1e-6  # Width in p of a strip of stability below which a summary leaves it out
@@ -100,7 +102,8 @@ SCHEMA = Schema(
     *result.END,
     drawn_tongues,
     Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
-    Field("moved", "", "1 where a torque makes an orbit of rest", json=False),
+    Found("moved", result.FLAG, "whether a torque makes an orbit of rest", json=False),
+    Found("inverted_rest", result.FLAG, "whether upright is a rest", json=False),
     *result.OWN,
     *result.VERSIONS,
 )
@@ -174,8 +177,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         same without damping: ``undamped_index``, ``undamped_p``, ``undamped_multiplier`` over
         ``undamped``. Of inverted rest, which is unstable without drive: ``inverted_index``,
         ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
-        and the attribute ``inverted`` 0, where upright is no rest. Under a torque, when the
-        attribute ``moved`` is 1, there are no folds and none without damping. Over ``curve`` and
+        and ``inverted_rest`` is 0, where upright is no rest. Under a torque, when ``moved`` is 1,
+        there are no folds and none without damping. Over ``curve`` and
         ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
         (:mod:`pendmap.analysis.critical_curves`).
 
@@ -222,27 +225,27 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         undamped = [_NO_REST] * len(found)
     reach = 0.0 if moved else p_max
     asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
-    of_omega = {"asked": np.isin(frequencies, asked), "fold_sought": looked}
     variables = {
         **_variables(frequencies, found, undamped, upright),
-        **{name: ("omega", values.astype(np.int8)) for name, values in of_omega.items()},
-        "asymptotic": (("curve", "omega"), asymptotic, _OF_P),
-        "asymptotic_error": (("curve", "omega"), errors, {"units": "1"}),
+        "asked": flag("omega", np.isin(frequencies, asked), "whether the frequency was asked for"),
+        "fold_sought": flag("omega", looked, "whether a fold was sought here"),
+        "asymptotic": variable(("curve", "omega"), asymptotic, *_OF_P),
+        "asymptotic_error": variable(("curve", "omega"), errors, "1", "relative error of p"),
     }
     coords: dict[str, Any] = {
         "omega": variable("omega", frequencies, "1", "Omega/w0"),
-        "curve": ("curve", np.array(list(critical_curves.CURVES))),
+        "curve": variable("curve", np.array([*critical_curves.CURVES]), "", "by perturbation"),
     }
     if units.si:
         given = units.given(frequencies, RATE)
-        coords["Omega"] = ("omega", given, {"units": "rad/s"})
+        coords["Omega"] = variable("omega", given, "rad/s", "angular frequency of the drive")
     dataset = xr.Dataset(variables, coords=coords)
     values = {
         **numerics.provenance(),
         "plane": plane,
         "p_max": p_max,
         "moved": int(moved),
-        "inverted": int(upright[0].rest),
+        "inverted_rest": int(upright[0].rest),
         "own_p": bare.p,
         "own_omega": bare.omega,
     }
@@ -295,11 +298,12 @@ def _variables(
     """Return the tables of critical amplitudes, and the folds, at these frequencies."""
     folds = [row.fold or (np.nan, np.nan, np.nan) for row in found]
     fold, theta, velocity = np.array(folds).T
+    first = [row.stable[0] for row in found]
     variables: dict[str, Any] = {
-        "stable_at_first": ("omega", np.array([row.stable[0] for row in found], dtype=np.int8)),
-        "fold": ("omega", fold, _OF_P | {"comment": "of the oscillation born at the first loss"}),
-        "fold_theta": variable("omega", theta, "rad"),
-        "fold_velocity": variable("omega", velocity, "1", comment="d theta / d tau"),
+        "stable_at_first": flag("omega", first, "rest below the first amplitude", _STABLE),
+        "fold": variable("omega", fold, *_OF_P, "of the oscillation born at the first loss"),
+        "fold_theta": variable("omega", theta, "rad", "angle of a point of the fold"),
+        "fold_velocity": variable("omega", velocity, "1", "velocity dtheta/dtau of this point"),
     }
     for one, prefix, rows in (
         ("critical", "", found),
@@ -310,19 +314,19 @@ def _variables(
         p = np.array([p for row in rows for p in row.p], dtype=float)
         multiplier = np.array([m for row in rows for m in row.multiplier], dtype=np.int8)
         variables |= {
-            f"{prefix}index": variable(one, index, comment="place of its frequency in omega"),
-            f"{prefix}p": (one, p, _OF_P),
-            f"{prefix}multiplier": (one, multiplier),
-            f"{one}_omega": (one, omega[index]),
+            f"{prefix}index": variable(one, index, "1", "place of its frequency in omega"),
+            f"{prefix}p": variable(one, p, *_OF_P),
+            f"{prefix}multiplier": variable(one, multiplier, "1", "Floquet multiplier"),
+            f"{one}_omega": variable(one, omega[index], "1", "Omega/w0"),
         }
         if one != "undamped":
             above = [stable for row in rows for stable in row.stable[1:]]
-            variables[f"{prefix}stable_above"] = (one, np.array(above, dtype=np.int8))
+            variables[f"{prefix}stable_above"] = flag(one, above, "rest right above it", _STABLE)
     return variables
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a = dataset.attrs
+    a = facts(dataset)
     omega, asked = dataset["omega"].values, dataset["asked"].values.astype(bool)
     count = dataset.sizes["critical"]
     of_asked = int(asked[dataset["index"].values].sum())
@@ -334,7 +338,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     index, p = dataset["index"].values, dataset["p"].values
     first = [k for k in range(count) if k == 0 or index[k] != index[k - 1]]
     never = omega[(dataset["stable_at_first"].values == 0) & asked]
-    if a["gamma"] == 0 and a["effects"] == "[]":
+    if a["gamma"] == 0 and not effects_of(a):
         tips = [2 / k for k in range(1, _TIPS + 1)]
         never = np.array([tip for tip in tips if omega[0] <= tip <= omega[-1]])
     if never.size:
@@ -370,10 +374,11 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 def _inverted(dataset: xr.Dataset, asked: Mask) -> list[str]:
     """Return a summary line on the range in which inverted rest is stable."""
-    rest = "The orbit about inverted rest" if dataset.attrs["moved"] else "Inverted rest"
-    if not dataset.attrs["inverted"]:
+    a = facts(dataset)
+    rest = "The orbit about inverted rest" if a["moved"] else "Inverted rest"
+    if not a["inverted_rest"]:
         return []
-    omega, p_max = dataset["omega"].values, dataset.attrs["p_max"]
+    omega, p_max = dataset["omega"].values, a["p_max"]
     index, p = dataset["inverted_index"].values, dataset["inverted_p"].values
     wide = []
     for k in np.flatnonzero(dataset["inverted_stable_above"].values):
@@ -405,13 +410,14 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     for table, prefix in tables:
         mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]
         p = np.array(mine, dtype=float).reshape(-1, len(draws))
+        there = np.isfinite(p).mean(axis=1)
         _, _, low, high = interval(p)
         found = found.assign(
             {
-                f"{prefix}drawn_p": ((table, "draw"), p),
-                f"{prefix}p_low": (table, low),
-                f"{prefix}p_high": (table, high),
-                f"{prefix}exists": (table, np.isfinite(p).mean(axis=1)),
+                f"{prefix}drawn_p": variable((table, "draw"), p, *_OF_P),
+                f"{prefix}p_low": variable(table, low, "1", "lower end of 95 % of the draws"),
+                f"{prefix}p_high": variable(table, high, "1", "upper end of 95 % of the draws"),
+                f"{prefix}exists": variable(table, there, "1", "share of the draws that have it"),
             }
         )
     return draws.complete(found, _lowest(found))

@@ -12,7 +12,7 @@ from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Schema, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, summarised, variable
 from pendmap.errors import (
     MOST_PERIODS,
     MOST_SAMPLES,
@@ -23,6 +23,7 @@ from pendmap.errors import (
     check_whole,
     core_errors,
 )
+from pendmap.files import facts
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
@@ -49,7 +50,7 @@ _STRONGEST = 1e6  # Acceleration of the pivot over gravity up to which a traject
 _ALIGNMENT, _BATCHES = 0.1, 20
 """Fraction of a trajectory before the exponent is measured, number of batches; as in the core."""
 FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
-"""Formula of the energy, an attribute of datasets."""
+"""Formula of the energy, a comment in datasets."""
 
 
 def _last(name: str) -> Callable[[xr.Dataset], float]:
@@ -63,17 +64,17 @@ SCHEMA = Schema(
     Field("t", result.OF_TIME, "last time", read=lambda dataset: dataset.attrs["until"]),
     Field("theta", "rad", "angle at the end, not wrapped", read=_last("theta")),
     Field("velocity", result.OF_VELOCITY, "velocity at the end", read=_last("velocity")),
-    Field("stuck", "", "1 where friction holds the pendulum at the end", convert=bool),
-    Field("turns", "1", "full turns between start and end"),
+    Found("stuck", result.FLAG, "whether friction holds the pendulum at the end", convert=bool),
+    Found("turns", "1", "full turns between start and end"),
     result.TOL,
     Field(
         "tol_reached",
         "",
         "whether the tolerance was reached",
-        read=lambda dataset: bool(dataset.attrs["reached_error"] <= dataset.attrs["tol"]),
+        read=lambda dataset: bool(dataset["reached_error"] <= dataset.attrs["tol"]),
     ),
     result.REACHED,
-    Field("end_error", "1", "change of the end by a 16 times smaller error of each step"),
+    Found("end_error", "1", "change of the end by a 16 times smaller error of each step"),
     Field(
         "interrupted",
         "",
@@ -82,19 +83,19 @@ SCHEMA = Schema(
     ),
     Field("energy", "m g l", "energy at the end", read=_last("energy")),
     result.SIMD,
-    Field("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", None, when="lyapunov"),
+    Found("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", None, when="lyapunov"),
     Field(
         "stderr",
         result.OF_RATE,
         "its standard error",
-        read=lambda dataset: dataset.attrs.get("exponent_stderr"),
+        read=lambda dataset: facts(dataset).get("exponent_stderr"),
         when="lyapunov",
     ),
-    Field("exponent_from", result.OF_TIME, "when its measurement begins", None, when="lyapunov"),
-    Field("exponent_to", result.OF_TIME, "when its measurement ends", None, when="lyapunov"),
+    Found("exponent_from", result.OF_TIME, "when its measurement begins", None, when="lyapunov"),
+    Found("exponent_to", result.OF_TIME, "when its measurement ends", None, when="lyapunov"),
     result.MISSES,
     result.SUMMARY.hidden,
-    Field("exponent_stderr", result.OF_RATE, "standard error of the exponent", None, json=False),
+    Found("exponent_stderr", result.OF_RATE, "standard error of the exponent", None, json=False),
     Field("until", result.OF_TIME, "last time", json=False),
     Field("until_asked", result.OF_TIME, "last time that was asked for", None, json=False),
     Field("theta0", "rad", "angle at the start", json=False),
@@ -129,8 +130,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol : float
         The error of each step is tightened until a 16 times smaller one changes the state after 5
         periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
-        more, which the summary reports; 1e-13 to 1e-2. The attribute ``reached_error`` is the error
-        reached, ``end_error`` the difference at the end.
+        more, which the summary reports; 1e-13 to 1e-2. ``reached_error`` is the error reached,
+        ``end_error`` the difference at the end.
     samples : int, optional
         Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
         curve needs, up to 200,000 in all; fewer than 64 where that would be more than two million.
@@ -153,8 +154,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``theta`` (not wrapped), ``velocity`` and ``energy`` (over m g l, ``v^2 / 2 + 1 - cos
         theta``, 0 at rest) over ``time``; ``section_theta`` (wrapped to (-pi, pi]) and
         ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
-        stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding. The
-        attribute ``stuck`` is 1 if friction holds the pendulum at the end.
+        stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding.
+        ``stuck`` is 1 if friction holds the pendulum at the end.
 
     Raises
     ------
@@ -213,25 +214,24 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         once = once[:-1]  # the end, between two samples
     angle = raw.theta[once]
     wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
+    kinds, rate = np.array(raw.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
     dataset = xr.Dataset(
         {
             "theta": variable("time", raw.theta, "rad", "angle, not wrapped"),
             "velocity": variable("time", speed, units.of_velocity, units.derivative),
-            "energy": (
-                "time",
-                energy(raw.theta, speed, pendulum.attributes),
-                {"units": "1", "long_name": "energy over m g l", "formula": FORMULA},
+            "energy": variable(
+                "time", energy(raw.theta, speed, pendulum.attributes), "1", "energy", FORMULA
             ),
-            "section_theta": ("period", wrapped, {"units": "rad"}),
-            "section_velocity": ("period", speed[once], {"units": units.of_velocity}),
-            "section_time": ("period", time[once], {"units": units.of_time}),
-            "event_time": ("event", event_time, {"units": units.of_time}),
-            "event_kind": ("event", np.array(raw.event_kind, dtype="U14")),
-            "event_theta": ("event", raw.event_theta, {"units": "rad"}),
+            "section_theta": variable("period", wrapped, "rad", "angle, once a period"),
+            "section_velocity": variable("period", speed[once], *rate),
+            "section_time": variable("period", time[once], units.of_time, units.clock),
+            "event_time": variable("event", event_time, units.of_time, "time of the event"),
+            "event_kind": variable("event", kinds, long_name="turn, stick or release"),
+            "event_theta": variable("event", raw.event_theta, "rad", "angle of the event"),
         },
         coords={
-            "time": ("time", time, {"units": units.of_time, "long_name": units.clock}),
-            "period": ("period", np.arange(wrapped.size)),
+            "time": variable("time", time, units.of_time, units.clock),
+            "period": variable("period", np.arange(wrapped.size), "1", "number of the period"),
         },
     )
     values = {
@@ -278,7 +278,7 @@ def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, fl
 
 
 def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
-    a = dataset.attrs
+    a = facts(dataset)
     theta, velocity = (float(dataset[key].values[-1]) for key in ("theta", "velocity"))
     turns, lines = "", []
     if a["turns"]:

@@ -13,6 +13,7 @@ from pendmap.charts import legend, names, palette, plane
 from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
+from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import VELOCITY, Units
 
@@ -53,7 +54,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     """Return the leading layers: two, or three if the labels are unreliable; or one alone."""
     shown = (named(dataset, layer),) if layer else _leading(dataset)
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    units = Units.of(dataset.attrs)
+    units = Units.of(facts(dataset))
     listed = legend.entries(dataset)
     chaos = [entry for entry in listed if entry.chaotic and len(entry.points)]
     if "labels" not in shown and not finite_time(dataset):
@@ -80,7 +81,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     rows, columns = dataset["label"].shape
     return Chart(
         _title(dataset, shown),
-        f"{names.parameters(dataset.attrs)};   {columns} × {rows} cells",
+        f"{names.parameters(facts(dataset))};   {columns} × {rows} cells",
         [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )
@@ -97,7 +98,7 @@ def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
         every = [str(name) for name in dataset["attractor"].values]
         if every:
             return f"{every[0].capitalize()} takes every start"
-        return "No attractors" + (" without damping" if dataset.attrs.get("gamma") == 0 else "")
+        return "No attractors" + (" without damping" if facts(dataset).get("gamma") == 0 else "")
     fractal = not reliable(dataset) and "labels" not in shown[:1]
     return "Fractal basins of attraction" if fractal else "Basins of attraction"
 
@@ -211,7 +212,7 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
 
 def reliable(dataset: xr.Dataset) -> bool:
     """Return whether the labels agree with those at half the step and under mirroring."""
-    return bool(int(dataset.attrs.get("labels_reliable", 1)))
+    return bool(int(facts(dataset).get("labels_reliable", 1)))
 
 
 def finite_time(dataset: xr.Dataset) -> bool:
@@ -233,14 +234,14 @@ def settles(dataset: xr.Dataset) -> bool:
 
 def warning(dataset: xr.Dataset) -> str:
     """Return the warning that labels are unreliable."""
-    share = 100 * float(dataset.attrs.get("unreliable", math.nan))
+    share = 100 * float(facts(dataset).get("unreliable", math.nan))
     return f"labels unreliable: {share:.3g} % change under half the step or mirroring"
 
 
 def transients(dataset: xr.Dataset) -> str:
     """Return mean and longest settle time and the basin entropy in one line, if known."""
     keys = ("mean_settle", "longest_settle", "basin_entropy")
-    mean, longest, entropy = (float(dataset.attrs.get(key, math.nan)) for key in keys)
+    mean, longest, entropy = (float(facts(dataset).get(key, math.nan)) for key in keys)
     settle = [f"mean {mean:.3g}"] if mean >= 0 else []
     settle += [f"longest {longest:g}"] if longest >= 0 else []
     told = [f"settle time: {', '.join(settle)} periods"] if settle else []
@@ -257,7 +258,7 @@ def exponents(dataset: xr.Dataset) -> str:
     listed = ", ".join(f"{x:.3g}" for x in known)
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):
         listed = typographic(with_error(known[0], errors[0]))
-    return f"largest exponent {listed} {names.per_time(Units.of(dataset.attrs))}" if known else ""
+    return f"largest exponent {listed} {names.per_time(Units.of(facts(dataset)))}" if known else ""
 
 
 def layers(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -312,8 +313,8 @@ def what(dataset: xr.Dataset, layer: str) -> str:
 
 def unit(dataset: xr.Dataset, layer: str) -> str:
     """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
-    driven = float(dataset.attrs.get("p", 1.0)) != 0.0
-    units = Units.of(dataset.attrs)
+    driven = float(facts(dataset).get("p", 1.0)) != 0.0
+    units = Units.of(facts(dataset))
     own = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
     return {
         "settle": f"periods{own} to settle",

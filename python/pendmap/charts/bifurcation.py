@@ -12,6 +12,7 @@ from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
 from pendmap.errors import InputError
+from pendmap.files import facts
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     name = names.symbol(own, str(dataset[own].attrs.get("units", "1")))
     ends = plane.outer_edges(dataset, own)
     every = families(dataset)
-    units = Units.of(dataset.attrs)
+    units = Units.of(facts(dataset))
     theta = plane.angles(dataset, dataset["point_theta"].values)
     speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
     known = dataset["entry_exponent"].values
@@ -72,7 +73,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         Panel("exponent", "", Axis(name, ends), rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
-    fixed = names.parameters(dataset.attrs, [own])
+    fixed = names.parameters(facts(dataset), [own])
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import palette, plane
+from pendmap.files import facts
 from pendmap.formatting import MINUS, typographic, with_error
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
     if dataset.attrs.get("layers") == "finite_time" and not found:
         return found
     for i, name in ((0, "undecided"), (-1, "failed")):
-        share_of = float(dataset.attrs.get(name, 0.0))
+        share_of = float(facts(dataset).get(name, 0.0))
         if share_of > 0:
             found.append(Entry(i, name, name, percent(share_of), "", np.empty((0, 2))))
     return found

@@ -13,6 +13,7 @@ from pendmap.charts import names, palette
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
+from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error, written
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     if dataset.sizes["tail_begin"] > 1:
         panels.append(_tail(dataset))
     starts = counted(int(dataset.attrs["starts"]), "start")
-    subtitle = f"{names.parameters(dataset.attrs)};   {starts}"
+    subtitle = f"{names.parameters(facts(dataset))};   {starts}"
     size = (9.6 if len(panels) > 1 else 6.0, 4.6)
     return Chart(_title(dataset), subtitle, [panels], size=size).only(layer, (6.0, 4.6))
 
@@ -59,7 +60,7 @@ def curves(dataset: xr.Dataset) -> list[Curve]:
     """
     periods = dataset["elapsed"].values.astype(float)
     captured = dataset["captured"].values
-    a = dataset.attrs
+    a = facts(dataset)
     starts = int(a["starts"])
     if a["persistent"]:
         return [Curve("", "", np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
@@ -81,10 +82,12 @@ def _shares(count: npt.NDArray[np.int64], starts: int) -> Floats:
 
 def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
     """Return the fitted tail; empty without transient chaos, or if the tail begins later."""
-    a = dataset.attrs
+    a = facts(dataset)
     if not a["transient_chaos"]:
         return []
-    mean, error, begin = (float(a[key]) for key in ("mean_periods", "stderr", "from_period"))
+    mean, error, begin = (
+        float(a[key]) for key in ("mean_periods", "mean_periods_stderr", "from_period")
+    )
     last = whole.periods[-1]
     begin = max(begin, whole.periods[0])
     if begin > last:
@@ -105,13 +108,17 @@ def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
 
 
 def _title(dataset: xr.Dataset) -> str:
-    a = dataset.attrs
+    a = facts(dataset)
     if a["persistent"]:
         return f"Persistent chaos: {typeset(str(dataset['attractor'].values[0]))}"
     if a["transient_chaos"]:
-        mean, error = float(a["mean_periods"]), float(a["stderr"])
+        mean, error = float(a["mean_periods"]), float(a["mean_periods_stderr"])
         return f"Transient chaos: lives {written(mean, error)} periods on average"
-    return "No transient chaos" if math.isfinite(a["escape_rate"]) or a["captured"] else "Undecided"
+    return (
+        "No transient chaos"
+        if math.isfinite(a["escape_rate"]) or a["captured_starts"]
+        else "Undecided"
+    )
 
 
 def _survival(dataset: xr.Dataset) -> Panel:
@@ -136,10 +143,10 @@ def _tail(dataset: xr.Dataset) -> Panel:
     """Return the mean time left against the start of the tail; open points: not exponential."""
     begin, mean = dataset["tail_begin"].values.astype(float), dataset["tail_mean"].values
     error, chance = dataset["tail_stderr"].values, dataset["tail_exponential"].values
-    a = dataset.attrs
+    a = facts(dataset)
     marks: list[Mark] = []
     if a["transient_chaos"]:
-        middle, wide = float(a["mean_periods"]), SIGMAS * float(a["stderr"])
+        middle, wide = float(a["mean_periods"]), SIGMAS * float(a["mean_periods_stderr"])
         marks = [
             Span((middle - wide, middle + wide), axis="y", colour=_BAND),
             Level(middle, colour=_FIT, width=1.4, path="fitted", order=1.0),

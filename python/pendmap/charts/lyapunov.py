@@ -24,6 +24,7 @@ from pendmap.charts.marks import (
     Span,
     Steps,
 )
+from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
 
@@ -46,7 +47,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     else:
         panels.append(_sliding(dataset))
     attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
-    title, subtitle = _title(dataset), names.with_start(dataset.attrs)
+    title, subtitle = _title(dataset), names.with_start(facts(dataset))
     look: dict[str, Any] = {"recorded": [*panels, *attractor], "size": (_WIDTHS[len(panels)], 4.3)}
     return Chart(title, subtitle, [panels], **look).only(layer, (_WIDTHS[1], 4.3))
 
@@ -60,13 +61,13 @@ def _title(dataset: xr.Dataset) -> str:
         "undecided": "undecided",
         "failed": "the motion leaves the range of numbers",
     }
-    return f"{head}: {words[str(dataset.attrs['end'])]}"
+    return f"{head}: {words[str(dataset['end'].item())]}"
 
 
 def _value(dataset: xr.Dataset) -> str:
     """Return the exponent with its error and unit, or an empty string."""
-    a = dataset.attrs
-    exponent, error = float(a["exponent"]), float(a["stderr"])
+    a = facts(dataset)
+    exponent, error = float(a["largest_exponent"]), float(a["largest_exponent_stderr"])
     if not math.isfinite(exponent):
         return ""
     said = typographic(with_error(exponent, error))
@@ -80,11 +81,11 @@ def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
 
 
 def _rate(dataset: xr.Dataset) -> str:
-    return f"λ ({names.per_time(Units.of(dataset.attrs))})"
+    return f"λ ({names.per_time(Units.of(facts(dataset)))})"
 
 
 def _transient(dataset: xr.Dataset) -> list[Mark]:
-    periods = max(int(dataset.attrs["transient_periods"]), 0)
+    periods = max(int(dataset["transient_periods"]), 0)
     said = f"transient, {counted(periods, 'period')}"
     return [Span((0, periods), colour=_TRANSIENT, name=said), ZERO] if periods else [ZERO]
 
@@ -95,24 +96,24 @@ def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
-    value = float(dataset.attrs["exponent"])
+    value = float(dataset["largest_exponent"])
     known = math.isfinite(value)
     look = _mean_look(dataset)
     return [Level(value, axis=axis, order=2.0, path="value", **look)] if known else []
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
-    a, periods, growth = dataset.attrs, dataset["elapsed"].values, dataset["growth"].values
+    a, periods, growth = facts(dataset), dataset["elapsed"].values, dataset["growth"].values
     marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
     look = _mean_look(dataset)
-    if math.isfinite(rate) and math.isfinite(a["stderr"]):
+    if math.isfinite(rate) and math.isfinite(a["largest_exponent_stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.
         last = growth[-1] if transient else rate * periods[-1]
         line = last + rate * (periods[begin:] - periods[-1])
         marks.append(Line(periods[begin:], line, **look))
-    elif math.isfinite(float(a["exponent"])):
+    elif math.isfinite(float(a["largest_exponent"])):
         marks.append(Line(NONE, NONE, **look))
     across = Axis("periods since the start", _elapsed(dataset))
     up = Axis("ln |δx|", holding(growth, 0.0))
@@ -121,11 +122,11 @@ def _growth(dataset: xr.Dataset) -> Panel:
 
 def _average(dataset: xr.Dataset) -> Panel:
     """Return the mean over all trajectories against the periods averaged, with its band."""
-    a, periods = dataset.attrs, dataset["averaged"].values.astype(float)
+    a, periods = facts(dataset), dataset["averaged"].values.astype(float)
     mean, error = dataset["running_exponent"].values, dataset["running_stderr"].values
     marks: list[Mark] = []
     shown = [mean]
-    if math.isfinite(a["stderr"]):
+    if math.isfinite(a["largest_exponent_stderr"]):
         low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
         said = f"±{_SIGMAS} standard errors of the mean"
         marks.append(Band(periods, low, high, colour=_BAND, name=said, path="band"))
@@ -144,7 +145,7 @@ def _average(dataset: xr.Dataset) -> Panel:
 
 def _sliding(dataset: xr.Dataset) -> Panel:
     """Return exponents over ``window`` periods of the start's own trajectory."""
-    a = dataset.attrs
+    a = facts(dataset)
     growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
     width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
     # In a selection only windows whose first period is selected too have an exponent.
@@ -155,7 +156,7 @@ def _sliding(dataset: xr.Dataset) -> Panel:
     marks = [*_transient(dataset), *_level(dataset)]
     marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
     across = Axis("periods since the start, last of each", _elapsed(dataset))
-    up = Axis(_rate(dataset), holding(rates, 0.0, float(a["exponent"]), margin=0.08))
+    up = Axis(_rate(dataset), holding(rates, 0.0, float(a["largest_exponent"]), margin=0.08))
     title = f"exponent over {a['window']} periods"
     return Panel("average", title, across, up, marks, root="exponent")
 
@@ -183,5 +184,5 @@ def _attractor(dataset: xr.Dataset) -> Panel:
     at = plane.copies(dataset, points, *theta)
     size = 2.0 if kind.endswith("chaos") else 7.0
     spots = Points(*at.T, colour=palette.colour(name, kind), size=size, path="points")
-    across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(dataset.attrs))
+    across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
     return Panel("attractor", "attractor, once a period", across, up, [spots])

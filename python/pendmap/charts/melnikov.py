@@ -9,6 +9,7 @@ import numpy as np
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import INK, QUIET, Band, Dash, Line, Mark, Points, Text
+from pendmap.files import facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +27,7 @@ _LOOKS: Final[dict[str, tuple[str, Dash]]] = {
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the threshold of each branch and the pendulum's own parameters as a point."""
     del cells
-    a = dataset.attrs
+    a = facts(dataset)
     omega, p = dataset["omega"].values, dataset["p_melnikov"].values
     own = (float(a["own_omega"]), abs(float(a["own_p"])))
     top = _highest(p, own[1])
@@ -60,7 +61,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     up = Axis("p = YΩ²/g", (0.0, top))
     panel = Panel("melnikov", "", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
-    return Chart(title, names.parameters(a), [[panel]], ratio=0.68).only(layer)
+    return Chart(
+        title, names.parameters(a | {"omega": a["own_omega"]}), [[panel]], ratio=0.68
+    ).only(layer)
 
 
 def _highest(p: np.ndarray, own: float) -> float:

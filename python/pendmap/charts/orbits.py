@@ -12,6 +12,7 @@ from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Chart, Panel
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import DASHED, INK, NONE, QUIET, Line, Mark, Points, together
+from pendmap.files import facts
 from pendmap.formatting import counted, typographic
 from pendmap.units import VELOCITY, Units
 
@@ -26,7 +27,7 @@ MOST: Final = 16  # Greatest number of named orbits; a legend gives the number o
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the orbits: full lines and points if stable, broken lines and open points if not."""
     del cells
-    units = Units.of(dataset.attrs)
+    units = Units.of(facts(dataset))
     points = plane.points(dataset)
     paths = [_path(dataset, dataset["path_orbit"].values == i) for i in dataset["id"].values]
     every = np.concatenate([points, *paths])
@@ -49,7 +50,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     low, high = (units.bare(end, VELOCITY) for end in velocity)
     return Chart(
         _title(dataset),
-        names.parameters(dataset.attrs) + over,
+        names.parameters(facts(dataset)) + over,
         [[Panel("phase", "", across, up, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
         remark="" if dataset.sizes["orbit"] else "No orbit was found.",

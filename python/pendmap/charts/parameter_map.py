@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from pendmap.analysis.parameter_map import sets
 from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
+from pendmap.files import facts
 from pendmap.formatting import typographic
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -66,11 +68,6 @@ class Kind:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"  # noqa: PLR2004
-
-
-def sets(dataset: xr.Dataset) -> list[list[str]]:
-    """Return the kinds of attractor of each regime."""
-    return [json.loads(str(text)) for text in dataset["regime_kinds"].values]
 
 
 def kinds(dataset: xr.Dataset) -> list[Kind]:
@@ -165,7 +162,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         title = LAYERS.get(one, one) + ("; stripes: they coexist" if one == "kinds" else "")
         image = _image(dataset, one, across, up, cells)
         panels.append(Panel(one, title, *sides, [image, *lines]))
-    fixed = names.parameters(dataset.attrs, varied)
+    fixed = names.parameters(facts(dataset), varied)
     shape: tuple[Any, ...] = dataset["regime"].shape
     starts = int(dataset.attrs["starts"])
     size = f"{shape[1]} × {shape[0]} cells, {starts} starts each"
@@ -228,7 +225,7 @@ def _said(dataset: xr.Dataset, name: str) -> str:
     unit = ""
     if name == "exponent":
         none = "" if np.isfinite(dataset["exponent"].values).all() else "; grey: none"
-        unit = f" ({dataset['exponent'].attrs['units'].replace('tau', chr(0x3C4))}{none})"
+        unit = f" ({'1/s' if Units.of(facts(dataset)).si else '1 per τ'}{none})"
     if name == "period":
         unit = " (drive's; grey: none)"
     return LAYERS[name] + unit

@@ -12,6 +12,7 @@ import numpy as np
 
 from pendmap.charts import plane
 from pendmap.errors import InputError
+from pendmap.files import facts, with_facts
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
     "lyapunov": {"growth": ("elapsed",), "kind": ("attractor",)},
     "melnikov": {"p_melnikov": ("omega", "branch")},
     "orbits": {"kind": ("orbit",), "point_theta": ("point",)},
-    "parameter_map": {"kind": ("kind",), "regime_kinds": ("set",)},
+    "parameter_map": {"kind": ("kind",), "regime_has": ("set", "kind")},
     "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
     "trajectory": {"theta": ("time",), "section_time": ("period",)},
 }
@@ -47,7 +48,7 @@ _CELLS = {
 """Variables over the axes of an image."""
 
 _OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
-"""Prefixes of attributes that hold for a whole map alone."""
+"""Prefixes of facts that hold for a whole map alone."""
 
 _BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is never converted whole
 
@@ -137,18 +138,23 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
     fraction = share[ids + 1]
     error = np.sqrt(fraction * (1 - fraction) / label.size)
     part = dataset.assign(fraction=("attractor", fraction), stderr=("attractor", error))
-    part.attrs = {k: v for k, v in part.attrs.items() if not str(k).startswith(_OF_THE_WHOLE)} | {
-        "cells": label.size,
-        "failed": float(share[0]),
-        "undecided": float(share[1]),
-        "mean_settle": total / settled if settled else -1.0,
-        "longest_settle": longest,
-    }
+    gone = [name for name in facts(part) if name.startswith(_OF_THE_WHOLE)]
+    part = part.drop_vars(gone, errors="ignore")
+    part.attrs = {name: value for name, value in part.attrs.items() if name not in gone}
+    part = with_facts(
+        part,
+        cells=label.size,
+        failed=float(share[0]),
+        undecided=float(share[1]),
+        mean_settle=total / settled if settled else -1.0,
+        longest_settle=longest,
+    )
     return _note_selection(part, f"{counted(label.size, 'cell')} of {whole}")
 
 
 def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
     """Recompute the shares of a part of a map over two parameters from its cells."""
+    _refuse_kinds(dataset)
     regime = dataset["regime"]
     whole = int(dataset.attrs["cells"])
     if "set" in dataset.indexes:
@@ -160,9 +166,15 @@ def _parameter_map(dataset: xr.Dataset) -> xr.Dataset:
         regime=regime.copy(data=place.reshape(regime.shape).astype(np.int16)),
         regime_share=("set", count / regime.size),
     )
-    shares = {key: float(part[key].mean()) for key in ("undecided", "failed")}
-    part.attrs = part.attrs | {"cells": regime.size} | shares
+    shares = {f"{key}_share": float(part[key].mean()) for key in ("undecided", "failed")}
+    part = with_facts(part, cells=regime.size, **shares)
     return _note_selection(part, f"{counted(regime.size, 'cell')} of {whole}")
+
+
+def _refuse_kinds(dataset: xr.Dataset) -> None:
+    """Raise InputError for a selection of kinds, without which regimes and entries are wrong."""
+    if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
+        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
 
 
 def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
@@ -171,8 +183,7 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     values = dataset[name].values
     if "entry_value" not in dataset:  # from an earlier version, and whole
         return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
-    if dataset["entry_kind"].values.max(initial=-1) != dataset.sizes["kind"] - 1:
-        raise InputError("kind: a selection of kinds cannot be drawn; it must be one of values")
+    _refuse_kinds(dataset)
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)

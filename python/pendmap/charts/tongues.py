@@ -14,6 +14,7 @@ from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
 from pendmap.errors import InputError
+from pendmap.files import facts
 from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def chart(
     panels = [_panel(dataset, plane, marks) for plane in order]
     return Chart(
         title,
-        names.parameters({k: v for k, v in dataset.attrs.items() if k not in _DRIVE}),
+        names.parameters({k: v for k, v in facts(dataset).items() if k not in _DRIVE}),
         [panels[:1]],
         recorded=panels,
         ratio=0.72,
@@ -76,7 +77,7 @@ def chart(
 
 
 def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, str]]) -> Panel:
-    omega, attrs = dataset["omega"].values, dataset.attrs
+    omega, attrs = dataset["omega"].values, facts(dataset)
     p_max = float(attrs["p_max"])
     x, top = window(omega, p_max, plane)
 

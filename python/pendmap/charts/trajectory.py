@@ -11,6 +11,7 @@ from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import QUIET, Level, Line, Mark, Points, Span
+from pendmap.files import facts
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ _EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the four parts; late parts of curves are dark."""
     del cells
-    clock, time = names.clock(Units.of(dataset.attrs)), dataset["time"].values
+    clock, time = names.clock(Units.of(facts(dataset))), dataset["time"].values
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
     rows = [
         [_history(dataset, Axis(clock if layer else "", ends))],
@@ -43,7 +44,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         [_phase(dataset), _section(dataset)],
     ]
     look: dict[str, Any] = {"heights": (0.32, 0.2, 0.48), "size": (8.6, 8.2)}
-    chart = Chart("Trajectory", names.with_start(dataset.attrs), rows, **look)
+    chart = Chart("Trajectory", names.with_start(facts(dataset)), rows, **look)
     return chart.only(layer, _SIZES.get(layer or "", (5.6, 5.3)))
 
 
@@ -63,7 +64,7 @@ def _wide(values: Floats) -> tuple[float, float]:
 
 
 def _energy(dataset: xr.Dataset, clock: Axis) -> Panel:
-    values = energy(dataset["theta"].values, dataset["velocity"].values, dataset.attrs)
+    values = energy(dataset["theta"].values, dataset["velocity"].values, facts(dataset))
     marks, ends, title = _against_time(dataset, values), _wide(values), "energy"
     if ends[0] < UPSIDE_DOWN < ends[1]:  # above it the pendulum can rotate
         marks.append(Level(UPSIDE_DOWN, colour=QUIET, width=0.8, dash=(4.0, 3.0), order=0.0))
@@ -107,14 +108,14 @@ def _phase(dataset: xr.Dataset) -> Panel:
     for part, colour, width in parts:
         curve = plane.broken_at_wrap(theta[part], velocity[part])
         marks.append(Line(*curve.T, colour=colour, width=width))
-    if (dataset.attrs.get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
+    if (facts(dataset).get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
         marks.append(Points(plane.wrapped(theta[-1:]), velocity[-1:], colour=_LATE, size=3.5))
     return Panel("phase", f"phase plane{which}", *_sides(dataset), marks)
 
 
 def _sides(dataset: xr.Dataset) -> tuple[Axis, Axis]:
     speeds = plane.padded(dataset["velocity"].values)
-    return names.phase_plane((-math.pi, math.pi), speeds, Units.of(dataset.attrs))
+    return names.phase_plane((-math.pi, math.pi), speeds, Units.of(facts(dataset)))
 
 
 def _section(dataset: xr.Dataset) -> Panel:

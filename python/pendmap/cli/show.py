@@ -8,6 +8,7 @@ import functools
 import importlib
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -178,9 +179,10 @@ def keep_inputs(
 
 def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
     """Write the files asked for, then JSON or the summary to stdout."""
-    from pendmap.files.dataset import save
+    from pendmap.files.dataset import history, save
 
-    written = write_all(outputs.files(dataset, functools.partial(save, dataset)))
+    made = dataset.assign_attrs(history=history("pendmap " + shlex.join(sys.argv[1:])))
+    written = write_all(outputs.files(dataset, functools.partial(save, made)))
     lines = (dataset.attrs[name] for name in ("title", "summary"))
     outputs.finish(written, lambda: schema.json(dataset), lines)
 

@@ -10,6 +10,7 @@ from pendmap.files.atomic import (
     whole_file,
     whole_folder,
 )
+from pendmap.files.scalars import facts, with_facts
 from pendmap.files.toml import read_toml, toml_text
 
 __all__ = [
@@ -17,10 +18,12 @@ __all__ = [
     "STOPS",
     "check_regular",
     "check_room",
+    "facts",
     "held_interrupts",
     "read_toml",
     "read_whole",
     "toml_text",
     "whole_file",
     "whole_folder",
+    "with_facts",
 ]

@@ -7,28 +7,40 @@ import json
 import math
 import os
 import re
+import time
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import xarray as xr
 
-from pendmap import ANALYSES
+from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
-FORMAT_VERSION: Final = 1  # Version of the layout, in the attribute ``format_version``
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
+_UPGRADE: Final = "pendmap.analysis.version_1"  # Module that knows the schemas, for old files alone
+_TEXT: Final = "_name"
+"""Suffix of a coordinate of text in a file: by CF those named as their dimension are numbers."""
 _LARGE: Final = 4096  # Number of values above which a variable is compressed
+_AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
+"""How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
 # Names of files in a Zarr store: metadata and chunks
 _ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a result; the file is complete or absent.
+    """Write a result by the CF conventions 1.11; the file is complete or absent.
+
+    The attribute ``history`` is added, unless the result has one: UTC time (or that of the
+    environment variable ``SOURCE_DATE_EPOCH``), version, and the function or command.
 
     Parameters
     ----------
@@ -64,18 +76,38 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
             f"{target}: dataset is not a result of pendmap: it must be one of the "
             f"datasets that {', '.join(sorted(made))} return"
         )
+    if target.suffix.lower() == ".zarr" and importlib.util.find_spec("zarr") is None:
+        raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works")
+    if "history" not in dataset.attrs:
+        made_by = " or ".join(f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
+        dataset = dataset.assign_attrs(history=history(made_by))
+    texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
+    dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
+    # Coordinates have no missing values.
+    encoding: dict[Hashable, dict[str, Any]] = {
+        name: {"_FillValue": None}
+        for name, each in dataset.coords.items()
+        if each.dtype.kind == "f"
+    }
     if target.suffix.lower() != ".zarr":
-        large = [name for name, values in dataset.data_vars.items() if values.size > _LARGE]
-        encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in large}
+        for name, values in dataset.data_vars.items():
+            if values.size > _LARGE:
+                encoding[name] = {"zlib": True, "complevel": 1, "shuffle": True}
         with whole_file(target, SUFFIXES) as part:
             dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
         return target
-    if importlib.util.find_spec("zarr") is None:
-        raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works")
     check_replaceable(target)
     with whole_folder(target) as part:
-        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True)
+        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True, encoding=encoding)
     return target
+
+
+def history(made_by: str) -> str:
+    """Return the line of the attribute ``history``."""
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = time.gmtime(int(given) if given.isdecimal() else None)
+    at = time.strftime("%Y-%m-%dT%H:%M:%SZ", now)
+    return f"{at} pendmap {_core.__version__}: {made_by}"
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:
@@ -129,17 +161,38 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         check_regular(source)
     try:
         dataset: xr.Dataset = (
-            xr.open_zarr(source, consolidated=True)
+            xr.open_zarr(source, consolidated=True, **_AS_STORED)
             if zarr
-            else xr.open_dataset(source, engine="netcdf4")
+            else xr.open_dataset(source, engine="netcdf4", **_AS_STORED)
         )
         with dataset:
             _check_result(dataset, source)
-            return dataset.load()
+            dataset = _restored(dataset.load())
+        if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
+            dataset = importlib.import_module(_UPGRADE).upgraded(dataset)
     except InputError:
         raise
     except Exception as error:  # a damaged file may raise any error
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+    return dataset
+
+
+def _restored(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset read as it is stored with the types and names that it had."""
+    for each in dataset.variables.values():
+        missing = each.attrs.pop("_FillValue", None)
+        if missing is not None and each.dtype.kind in "iu":
+            each.attrs["_FillValue"] = each.dtype.type(missing)
+        if "flag_values" in each.attrs:  # one alone, or a list, became another type
+            flags = np.atleast_1d(each.attrs["flag_values"]).astype(each.dtype)
+            each.attrs["flag_values"] = flags
+        if "bounds" in each.encoding:
+            each.attrs["bounds"] = each.encoding.pop("bounds")
+    texts = {f"{name}{_TEXT}": name for name in dataset.dims if f"{name}{_TEXT}" in dataset}
+    named = {
+        name: (name, dataset[text].values, dataset[text].attrs) for text, name in texts.items()
+    }
+    return dataset.drop_vars([*texts]).assign_coords(named)
 
 
 def _check_result(dataset: xr.Dataset, source: Path) -> None:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pendmap.errors import InputError, check_type
-from pendmap.files import toml_text, whole_file
-from pendmap.model.pendulum import Pendulum
+from pendmap.files import whole_file
+from pendmap.model.pendulum import Pendulum, model_text
 from pendmap.model.rig import Rig
-from pendmap.model.tables import EFFECT, FORMAT, check_notes, read_model
+from pendmap.model.tables import read_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-
-    from pendmap.model.effects import Effect
 
 
 def load_model(
@@ -93,27 +91,10 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
     """
     if not isinstance(model, Rig):
         check_type("model", model, Pendulum, "Pendulum(p=0.6)")
-    numbers = {name: getattr(model, name) for name in model.numbers()}
-    if isinstance(model, Rig) and model.Omega == 0:
-        del numbers["Omega"]  # nothing is driven
-    content: dict[str, Any] = {"format_version": FORMAT, "pendulum": numbers}
-    formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
-    if formulas:
-        content["formula"] = formulas
-    if model.effects:
-        content["effect"] = [_table(effect) for effect in model.effects]
     try:
-        check_notes(model.notes)
-        text = toml_text(content | dict(model.notes))
+        text = model_text(model)
     except (TypeError, ValueError) as error:
         raise InputError(f"{os.fspath(path)}: notes: {error}") from None
     with whole_file(path, (".toml",)) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
     return Path(path)
-
-
-def _table(effect: Effect) -> dict[str, Any]:
-    """Return an effect as a table without empty keys."""
-    said = {key: getattr(effect, key) for key in EFFECT}
-    said["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
-    return {key: value for key, value in said.items() if value is not None}

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
+import tomllib
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
+from pendmap.files import toml_text
 from pendmap.model.covariance import misses
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula
 from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.tables import read_model
+from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in, read_model
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -194,22 +194,45 @@ def attributes_of(
     pendulum: Pendulum,
     further: tuple[str, ...] = (),
 ) -> dict[str, float | str]:
-    """Return a model's attributes, with ``further`` ones of the pendulum without dimensions.
+    """Return a model's facts in a result, with ``further`` ones of the pendulum without dimensions.
 
-    Effects are a list of names and parameters in JSON, formulas with their terms; ``angle`` is
-    ``line`` where an effect counts turns.
+    ``model`` is the text of its model file; ``angle`` is ``line`` where an effect counts turns.
     """
     numbers = {name: getattr(model, name) for name in model.numbers()}
     bare = {name: getattr(pendulum, name) for name in further}
-    effects = [
-        {"name": e.name, "parameters": dict(e.parameters)}
-        | ({} if e.formula is None else {"formula": e.formula.table})
-        for e in model.effects
-    ]
+    try:
+        text = model_text(model)
+    except (TypeError, ValueError):  # notes that no file can hold
+        text = model_text(dataclasses.replace(model, notes={}))
     angle = {"angle": "line"} if pendulum.counts_turns else {}
-    found = {"units": model.units.name} | numbers | bare | {"effects": json.dumps(effects)} | angle
+    found = {"units": model.units.name} | numbers | bare | {"model": text} | angle
     ratio = misses(model.notes)
     return found | ({"misses_record": ratio} if math.isfinite(ratio) else {})
+
+
+def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
+    """Return the text of a model file, which reads back as the same model.
+
+    Raises TypeError or ValueError for notes that a file cannot hold.
+    """
+    numbers = {name: getattr(model, name) for name in model.numbers()}
+    if numbers.get("Omega") == 0:
+        del numbers["Omega"]  # nothing is driven
+    content: dict[str, Any] = {"format_version": FORMAT, "pendulum": numbers}
+    formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
+    if formulas:
+        content["formula"] = formulas
+    if model.effects:
+        content["effect"] = [_table(effect) for effect in model.effects]
+    check_notes(model.notes)
+    return toml_text(content | dict(model.notes))
+
+
+def _table(effect: Effect) -> dict[str, Any]:
+    """Return an effect as a table without empty keys."""
+    said = {key: getattr(effect, key) for key in EFFECT}
+    said["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
+    return {key: value for key, value in said.items() if value is not None}
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
@@ -218,19 +241,14 @@ def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
 
 
 def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:
-    """Return the effects that a result's attributes name, formulas included.
+    """Return the effects of the model that a result's attributes contain, formulas included.
 
     Examples
     --------
     >>> effects_of(Pendulum(effects=(Effect("quadratic_drag", {"q": 0.01}),)).attributes)[0].values
     [0.01]
     """
-    found = []
-    for entry in json.loads(attributes.get("effects", "[]")):
-        table = entry.get("formula")
-        own = None if table is None else Formula(**table)
-        found.append(Effect(entry["name"], entry["parameters"], formula=own))
-    return tuple(found)
+    return effects_in(tomllib.loads(attributes.get("model", "")))
 
 
 PRESETS: Final = {

@@ -209,7 +209,7 @@ class Rig:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """The parameters as a dataset's attributes, in SI; effects as JSON.
+        """The parameters as facts of a result, in SI, and the text of the model file.
 
         ``gamma``, ``omega``, ``phase`` and ``theta_r`` are among them, and ``misses_record``,
         residual over noise, of a model that misses the record it was fitted to.

@@ -20,7 +20,7 @@ from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
-from pendmap.model.formula import Formula, each_table, formulas_of
+from pendmap.model.formula import each_table, formulas_of
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
@@ -62,7 +62,7 @@ def read_model(
         table = content.get("pendulum")
         if not isinstance(table, dict):
             raise InputError("has no table [pendulum]")
-        effects = _effects(content.get("effect", []), formulas_of(content.get("formula", [])))
+        effects = effects_in(content)
         notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
         in_si = _is_si(table)
         numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
@@ -166,9 +166,10 @@ def _bare_numbers(
     return zeros | numbers
 
 
-def _effects(tables: object, formulas: Mapping[str, Formula]) -> tuple[Effect, ...]:
-    effects = []
-    for where, table in each_table("effect", tables, EFFECT, _EXAMPLES):
+def effects_in(content: Mapping[str, Any]) -> tuple[Effect, ...]:
+    """Return the effects of a model file, with its formulas."""
+    effects, formulas = [], formulas_of(content.get("formula", []))
+    for where, table in each_table("effect", content.get("effect", []), EFFECT, _EXAMPLES):
         name = table["name"]
         formula = formulas.get(name) if isinstance(name, str) else None
         try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import Line, Points
+from pendmap.files import facts
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _INK = "#1d3557"
 
 def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
     """Return time history, phase plane and Poincare section, from the first instant."""
-    gammas = sorted({float(run.attrs["gamma"]) for run in runs})
+    gammas = sorted({float(run["gamma"]) for run in runs})
     damping = ", ".join(f"{gamma:g}" for gamma in gammas)
     periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]
     shared = (
@@ -37,7 +38,7 @@ def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:
     """Return time history, phase plane and section of a trajectory."""
-    attrs, units = run.attrs, Units.of(run.attrs)
+    attrs, units = facts(run), Units.of(facts(run))
     point = f"p = {attrs['p']:g}, ω = {attrs['omega']:g}"
     part, whole = _first(run, HISTORY), _first(run, CURVE)
     time, theta = part["time"].values, part["theta"].values

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from pendmap.charts import basins as layering
 from pendmap.charts import legend, palette, plane
 from pendmap.charts import names as axis_names
+from pendmap.files import facts
 from pendmap.formatting import typographic
 from pendmap.units import Units
 from pendmap.viewer import frame
@@ -78,7 +79,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 def _frame(dataset: xr.Dataset) -> frame.Frame:
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
+    return frame.Frame.phase(theta, velocity, Units.of(facts(dataset)))
 
 
 def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame.Frame | None:
@@ -87,7 +88,7 @@ def _around_attractors(dataset: xr.Dataset, listed: list[legend.Entry]) -> frame
     if not (layering.finite_time(dataset) and len(points)):
         return None
     theta, velocity = plane.angles(dataset, points[:, 0]), plane.padded(points[:, 1])
-    return frame.Frame.phase(theta, velocity, Units.of(dataset.attrs))
+    return frame.Frame.phase(theta, velocity, Units.of(facts(dataset)))
 
 
 def _title(dataset: xr.Dataset, layer: str) -> str:
@@ -257,7 +258,7 @@ def _tint(colour: tuple[int, int, int]) -> tuple[int, int, int]:
 
 def _legend(dataset: xr.Dataset, listed: list[legend.Entry]) -> str:
     """Return the legend as a table."""
-    lines = [f"**{axis_names.parameters(dataset.attrs)}**", ""]
+    lines = [f"**{axis_names.parameters(facts(dataset))}**", ""]
     if not layering.reliable(dataset):
         lines += [f"**{layering.warning(dataset)}**", ""]
     if not listed:

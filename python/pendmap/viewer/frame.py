@@ -13,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.charts import names, plane
-from pendmap.files import whole_file
+from pendmap.files import facts, whole_file
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -33,12 +33,14 @@ SHORT = 8  # Greatest number of letters of an axis name beside the ticks
 
 TIMELINE = "sim_time"
 
+_OF_A_RUN = ("seconds", "summary", "history")  # Facts that differ between equal results
+
 
 def identifier(dataset: xr.Dataset) -> str:
     """Return an identifier of a dataset's content."""
-    attrs = {str(k): v for k, v in dataset.attrs.items() if k not in ("seconds", "summary")}
+    attrs = {str(k): v for k, v in facts(dataset).items() if k not in _OF_A_RUN}
     content = hashlib.blake2b(repr(sorted(attrs.items())).encode(), digest_size=12)
-    known = ("label", "regime", "entry_theta", "theta", "theta_point", "p", "p_melnikov")
+    known = ("label", "regime", "entry_theta", "theta", "theta_point", "p_melnikov", "p")
     telling = next(name for name in (*known, *dataset.data_vars) if name in dataset)
     content.update(np.ascontiguousarray(dataset[telling].values).data)
     for name in sorted(map(str, dataset.indexes)):  # identifies the selected part of a result
@@ -98,14 +100,15 @@ def save(  # noqa: PLR0913 (what it is, and how it is shown)
 
 
 def properties(dataset: xr.Dataset) -> dict[str, float | str]:
-    """Return the attributes of a dataset that are text or numbers, without its summary.
+    """Return the facts of a dataset that are text or numbers, without summary and history.
 
     A property keeps one type in all recordings of a process, so whole numbers become floats.
     """
     return {
         str(name): value if isinstance(value, str) else float(value)
-        for name, value in dataset.attrs.items()
-        if name != "summary" and isinstance(value, (str, bool, int, float, np.generic))
+        for name, value in facts(dataset).items()
+        if name not in ("summary", "history")
+        and isinstance(value, (str, bool, int, float, np.generic))
     }
 
 

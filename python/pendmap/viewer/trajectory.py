@@ -13,6 +13,7 @@ import rerun.blueprint as rrb
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
 from pendmap.errors import InputError
+from pendmap.files import facts
 from pendmap.units import TIME, Units
 from pendmap.viewer import columns, frame
 from pendmap.viewer.columns import FASTEST, LATEST, Look
@@ -62,7 +63,8 @@ def motion_of(dataset: xr.Dataset) -> Floats:
 
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: pendulum and summary left; phase plane, section and state right."""
-    return layout(dataset.attrs, frame_of(dataset.attrs, dataset["velocity"].values))
+    attrs = facts(dataset)
+    return layout(attrs, frame_of(attrs, dataset["velocity"].values))
 
 
 def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
@@ -99,7 +101,7 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log everything in columns, on the timeline ``sim_time`` and, once a period, ``period``."""
-    attrs, motion = dataset.attrs, motion_of(dataset)
+    attrs, motion = facts(dataset), motion_of(dataset)
     time, _, velocity = motion
     refuse_beyond(time, velocity)
     still(stream, attrs, frame_of(attrs, velocity))
@@ -123,7 +125,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log the summary of the trajectory, and the part shown of a long one."""
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
-    units = Units.of(dataset.attrs)
+    units = Units.of(facts(dataset))
     if units.si:
         clock = "The time of the viewer is that of the rig."
     time, parts = dataset["time"].values, [clock]

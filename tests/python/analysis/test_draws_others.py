@@ -61,7 +61,7 @@ def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
     model = damped(0.2, 0.02)
     ranges = {"p": (0.14, 0.26, 7), "omega": (2.0, 2.0, 1)}
     result = pendmap.parameter_map(model, ranges, draws=16, seed=SEED)
-    rests = np.array(["rest" in json.loads(str(text)) for text in result.outcome_kinds.values])
+    rests = result["outcome_has"].sel(outcome_kind="rest").values.astype(bool)
     probability = result.probability.values[rests].sum(axis=0)[0]
     gammas = result.drawn.values[:, 0]
     exact = [np.mean([growth(g, p) < 1 for g in gammas]) for p in result.p.values]
@@ -70,7 +70,7 @@ def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
     assert result.probability.values.sum(axis=0) == pytest.approx(1)
     counted = result.drawn_share.values.mean(axis=1)
     assert result.share_mean.values == pytest.approx(counted)
-    assert result.attrs["sure_cells"] == pytest.approx((result.certainty.values >= 0.95).mean())
+    assert result["sure_cells"].item() == pytest.approx((result.certainty.values >= 0.95).mean())
 
 
 def test_orbits_over_draws_have_the_multipliers_of_each_draw() -> None:
@@ -117,14 +117,14 @@ def test_a_lifetime_has_the_interval_of_its_draws() -> None:
     model = damped(1.2, 0.005)
     result = pendmap.lifetime(model, starts=1500, draws=4, seed=SEED)
     means = [
-        pendmap.lifetime(Pendulum(gamma=g, p=1.2), starts=1500, seed=SEED).attrs["mean_periods"]
+        pendmap.lifetime(Pendulum(gamma=g, p=1.2), starts=1500, seed=SEED)["mean_periods"].item()
         for g in result.drawn.values[:, 0]
     ]
     assert result.drawn_mean_periods.values == pytest.approx(means)
     assert len(set(means)) == 4
-    ends = [result.attrs[f"mean_periods_{end}"] for end in ("low", "high")]
+    ends = [result[f"mean_periods_{end}"].item() for end in ("low", "high")]
     assert ends == pytest.approx(np.quantile(means, [0.025, 0.975]))
-    assert result.attrs["transient_share"] == 1
+    assert result["transient_share"].item() == 1
 
 
 COMMANDS = {

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Pendulum, Rig, render
+from pendmap.files import facts
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -38,20 +39,24 @@ def settled() -> xr.Dataset:
 
 def test_chaos_against_the_reference(chaos: xr.Dataset, truths: dict[str, Any]) -> None:
     entry = truths["lyapunov"]["w2.0_p2.0"]
-    a = chaos.attrs
+    a = facts(chaos)
     assert a["end"] == "chaotic"
-    assert 0 < a["stderr"] < 0.002 * a["exponent"]
-    assert abs(a["exponent"] - entry["lle_per_tau"]) < 3 * math.hypot(a["stderr"], entry["se"])
-    assert a["per_period"] == pytest.approx(a["exponent"] * math.pi)
-    assert a["second_exponent"] + a["exponent"] == pytest.approx(-0.1)
+    assert 0 < a["largest_exponent_stderr"] < 0.002 * a["largest_exponent"]
+    assert abs(a["largest_exponent"] - entry["lle_per_tau"]) < 3 * math.hypot(
+        a["largest_exponent_stderr"], entry["se"]
+    )
+    assert a["per_period"] == pytest.approx(a["largest_exponent"] * math.pi)
+    assert a["second_exponent"] + a["largest_exponent"] == pytest.approx(-0.1)
     assert abs(a["kaplan_yorke_dimension"] - entry["D_KY_map"]) < 2e-3
-    assert float(chaos["exponent"][0]) == a["exponent"]
+    assert float(chaos["exponent"][0]) == a["largest_exponent"]
 
 
 def test_the_error_is_that_of_independent_trajectories(chaos: xr.Dataset) -> None:
     each = chaos["finite_time_exponent"].values.mean(axis=1)
-    assert chaos.attrs["exponent"] == pytest.approx(each.mean(), rel=1e-9)
-    assert chaos.attrs["stderr"] == pytest.approx(each.std(ddof=1) / math.sqrt(each.size))
+    assert chaos["largest_exponent"].item() == pytest.approx(each.mean(), rel=1e-9)
+    assert chaos["largest_exponent_stderr"].item() == pytest.approx(
+        each.std(ddof=1) / math.sqrt(each.size)
+    )
     # Blocks of one trajectory scatter as independent ones: correlations are shorter than a block.
     blocks = chaos["finite_time_exponent"].values[:, :200].reshape(each.size, 10, -1).mean(axis=2)
     within = blocks.std(axis=1, ddof=1).mean() / math.sqrt(10)
@@ -83,19 +88,19 @@ def test_growth_along_the_start_is_the_tangents_of_scipy(settled: xr.Dataset) ->
 def test_transient_chaos_has_the_exponent_of_the_attractor_that_captures_it(
     settled: xr.Dataset,
 ) -> None:
-    a = settled.attrs
+    a = facts(settled)
     assert a["end"] == "captured"
     assert a["transient_periods"] > 30
     assert settled["growth"].values.max() > 15
-    assert a["exponent"] == pytest.approx(-0.05, abs=1e-9)
-    assert (a["stderr"], a["trajectories"]) == (0.0, 0)
+    assert a["largest_exponent"] == pytest.approx(-0.05, abs=1e-9)
+    assert (a["largest_exponent_stderr"], a["trajectories"]) == (0.0, 0)
     assert a["second_exponent"] == pytest.approx(-0.05, abs=1e-9)
     assert "reached after" in a["summary"]
     assert "rounding decides" in a["summary"]
 
 
 def test_the_transient_agrees_with_the_growth_of_its_trajectory(settled: xr.Dataset) -> None:
-    a, growth = settled.attrs, settled["growth"].values
+    a, growth = facts(settled), settled["growth"].values
     at = a["transient_periods"]
     assert growth.size == at + 101
     # After the capture deviations shrink at the attractor's rate; before it they grow.
@@ -107,44 +112,46 @@ def test_the_transient_agrees_with_the_growth_of_its_trajectory(settled: xr.Data
 
 def test_regular_motion_without_damping_has_the_growth_of_tau_and_no_error() -> None:
     # In a free pendulum the distance of neighbours grows in proportion to time.
-    a = pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 2.0).attrs
-    assert a["exponent"] == pytest.approx(a["regular"], rel=0.1)
-    assert math.isnan(a["stderr"])
+    a = facts(pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 2.0))
+    assert a["largest_exponent"] == pytest.approx(a["regular"], rel=0.1)
+    assert math.isnan(a["largest_exponent_stderr"])
     assert "not significantly different from 0" in a["summary"]
-    chaotic = pendmap.lyapunov(Pendulum(gamma=0.0, p=1.0), 2.0).attrs
-    assert chaotic["exponent"] > 50 * chaotic["regular"]
-    assert 0 < chaotic["stderr"] < 0.01 * chaotic["exponent"]
+    chaotic = facts(pendmap.lyapunov(Pendulum(gamma=0.0, p=1.0), 2.0))
+    assert chaotic["largest_exponent"] > 50 * chaotic["regular"]
+    assert 0 < chaotic["largest_exponent_stderr"] < 0.01 * chaotic["largest_exponent"]
 
 
 @pytest.mark.parametrize("name", ["fig2a", "fig2b", "fig2c"])
 def test_the_points_of_figure_2_are_tumbling_chaos(name: str) -> None:
     found = pendmap.lyapunov(pendmap.PRESETS[name], precision=0.01)
     assert [str(kind) for kind in found["kind"].values] == ["tumbling_chaos"]
-    assert found.attrs["exponent"] > 20 * found.attrs["stderr"]
+    assert found["largest_exponent"].item() > 20 * found["largest_exponent_stderr"].item()
 
 
 def test_the_seed_changes_the_sample_and_threads_do_not(chaos: xr.Dataset) -> None:
     few = pendmap.lyapunov(CHAOS, precision=0.01, threads=1)
     same = pendmap.lyapunov(CHAOS, precision=0.01, threads=2)
     other = pendmap.lyapunov(CHAOS, precision=0.01, seed=1)
-    assert few.attrs["exponent"] == same.attrs["exponent"]
-    assert few.attrs["exponent"] != other.attrs["exponent"]
-    apart = few.attrs["exponent"] - other.attrs["exponent"]
-    assert abs(apart) < 4 * math.hypot(few.attrs["stderr"], other.attrs["stderr"])
-    assert few.attrs["stderr"] > chaos.attrs["stderr"]
+    assert few["largest_exponent"].item() == same["largest_exponent"].item()
+    assert few["largest_exponent"].item() != other["largest_exponent"].item()
+    apart = few["largest_exponent"].item() - other["largest_exponent"].item()
+    assert abs(apart) < 4 * math.hypot(
+        few["largest_exponent_stderr"].item(), other["largest_exponent_stderr"].item()
+    )
+    assert few["largest_exponent_stderr"].item() > chaos["largest_exponent_stderr"].item()
 
 
 def test_a_pendulum_held_by_friction_has_no_exponent() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2))
-    assert found.attrs["end"] == "captured"
+    assert found["end"].item() == "captured"
     assert str(found["attractor"].values[0]) == "rest"
-    assert math.isnan(found.attrs["exponent"])
+    assert math.isnan(found["largest_exponent"].item())
     assert "Friction holds it permanently" in found.attrs["summary"]
 
 
 def test_a_cycle_with_turns_under_friction_has_the_sum_of_its_turns() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.0, omega=0.87, theta_r=0.01))
-    a = found.attrs
+    a = facts(found)
     assert str(found["kind"].values[0]) == "oscillation"
     # Each turning point shrinks phase area in addition to viscous damping.
     assert -0.12 < a["exponent_sum"] < -0.101
@@ -153,26 +160,28 @@ def test_a_cycle_with_turns_under_friction_has_the_sum_of_its_turns() -> None:
 def test_exponents_of_a_rig_are_per_second(chaos: xr.Dataset) -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=2.0, Omega=10.0)
     si = pendmap.lyapunov(rig)
-    assert si.attrs["exponent"] == pytest.approx(5 * chaos.attrs["exponent"], rel=1e-9)
-    assert si.attrs["per_period"] == pytest.approx(chaos.attrs["per_period"], rel=1e-9)
+    assert si["largest_exponent"].item() == pytest.approx(
+        5 * chaos["largest_exponent"].item(), rel=1e-9
+    )
+    assert si["per_period"].item() == pytest.approx(chaos["per_period"].item(), rel=1e-9)
     assert "per second" in si.attrs["summary"]
     assert si["running_exponent"].attrs["units"] == "1/s"
 
 
 def test_without_damping_or_drive() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.0, p=0.0), 0.5)
-    assert found.attrs["end"] == "undamped"
-    assert abs(found.attrs["exponent"]) < 5e-3
+    assert found["end"].item() == "undamped"
+    assert abs(found["largest_exponent"].item()) < 5e-3
     found = pendmap.lyapunov(Pendulum(p=0.0))
-    assert (str(found["kind"].values[0]), found.attrs["end"]) == ("rest", "captured")
-    assert found.attrs["exponent"] == pytest.approx(-0.05)
+    assert (str(found["kind"].values[0]), found["end"].item()) == ("rest", "captured")
+    assert found["largest_exponent"].item() == pytest.approx(-0.05)
 
 
 def test_effects_act_and_unmappable_ones_are_refused() -> None:
     drag = Effect("quadratic_drag", {"q": 0.3})
     found = pendmap.lyapunov(Pendulum(p=1.0, effects=(drag,)))
-    assert found.attrs["end"] == "captured"
-    assert found.attrs["exponent_sum"] < -0.101
+    assert found["end"].item() == "captured"
+    assert found["exponent_sum"].item() < -0.101
     ever = Pendulum(p=1.0, effects=(Effect("drive_chirp", {"r": 0.001}),))
     with pytest.raises(pendmap.InputError, match="drive_chirp"):
         pendmap.lyapunov(ever)

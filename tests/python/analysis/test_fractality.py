@@ -155,11 +155,11 @@ def test_below_the_homoclinic_tangency_the_boundary_is_smooth_and_above_fractal(
     threshold = 4 * 0.1 * math.sinh(math.pi * 3 / 2) / (math.pi * 9)
     below, above = (pendmap.basins(Pendulum(p=p, omega=3.0), Grid.square(600)) for p in (0.7, 1.2))
     assert 0.7 < threshold < 1.2
-    low, high = (below.attrs[f"uncertainty_exponent_{end}"] for end in ("low", "high"))
+    low, high = (below[f"uncertainty_exponent_{end}"].item() for end in ("low", "high"))
     assert low <= 1 <= high
     assert high - low < 0.9
     smooth = pendmap.uncertainty_exponent(below)
-    assert smooth.value == below.attrs["uncertainty_exponent"]
+    assert smooth.value == below["uncertainty_exponent"].item()
     fractal = pendmap.uncertainty_exponent(above)
     assert fractal.ci95[1] < 0.3
     assert fractal.ci95[0] > 0.05
@@ -181,13 +181,13 @@ def test_the_boundary_of_an_undriven_pendulum_is_smooth(seed: int) -> None:
 def test_three_basins_of_the_paper_s_kind_pass_the_log2_criterion() -> None:
     result = pendmap.basins(Pendulum(p=1.0), Grid.square(200))
     again = pendmap.basin_entropy(result.label.values)
-    assert again.value == result.attrs["basin_entropy"]
-    assert again.boundary == result.attrs["boundary_basin_entropy"]
+    assert again.value == result["basin_entropy"].item()
+    assert again.boundary == result["boundary_basin_entropy"].item()
     assert again.is_fractal
     assert "log 2 criterion" in result.attrs["summary"]
     assert "basin stability" in result.attrs["summary"]
     threads = pendmap.basins(Pendulum(p=1.0), Grid.square(200), threads=1)
-    assert threads.attrs["uncertainty_exponent"] == result.attrs["uncertainty_exponent"]
+    assert threads["uncertainty_exponent"].item() == result["uncertainty_exponent"].item()
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_three_basins_of_the_paper_s_kind_pass_the_log2_criterion() -> None:
 )
 def test_maps_without_meaningful_labels_have_no_exponent(model: Pendulum) -> None:
     result = pendmap.basins(model, Grid.square(20))
-    assert "uncertainty_exponent" not in result.attrs
+    assert "uncertainty_exponent" not in result
     with pytest.raises(InputError, match="uncertain"):
         pendmap.uncertainty_exponent(result)
 

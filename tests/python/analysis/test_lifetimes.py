@@ -13,6 +13,7 @@ import pendmap
 from drawn import made, named
 from pendmap import Effect, Pendulum, Rig
 from pendmap.analysis import survival
+from pendmap.files import facts
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -78,39 +79,39 @@ def long() -> xr.Dataset:
 @pytest.mark.parametrize("p", [1.2, 1.8])
 def test_against_the_reference(p: float, truths: dict[str, Any]) -> None:
     found = pendmap.lifetime(Pendulum(gamma=0.1, p=p, omega=2.0))
-    a = found.attrs
+    a = facts(found)
     assert (a["persistent"], a["transient_chaos"]) == (0, 1)
     assert min(a["tail_weibull"], a["tail_steady"]) > 0.05
     for known in truths["transient_lifetime_periods"][f"w2.0_p{p}"]["tail"]:
         gap = abs(a["mean_periods"] - known["mean"])
-        assert gap < 3 * math.hypot(a["stderr"], known["stderr"]), known
+        assert gap < 3 * math.hypot(a["mean_periods_stderr"], known["stderr"]), known
 
 
 def test_the_error_is_the_spread_over_seeds() -> None:
-    found = [pendmap.lifetime(Pendulum(p=1.2), starts=6000, seed=seed).attrs for seed in range(20)]
+    found = [facts(pendmap.lifetime(Pendulum(p=1.2), starts=6000, seed=k)) for k in range(20)]
     means = np.array([a["mean_periods"] for a in found])
-    errors = np.array([a["stderr"] for a in found])
+    errors = np.array([a["mean_periods_stderr"] for a in found])
     spread = (((means - np.average(means, weights=errors**-2)) / errors) ** 2).sum()
     # Chi squared with 19 degrees of freedom: outside once in five hundred.
     assert 5.5 < spread < 43, spread
 
 
 def test_the_tail_is_that_of_the_starts(long: xr.Dataset) -> None:
-    a = long.attrs
+    a = facts(long)
     begin = a["from_period"]
     times = long["capture_period"].values
     beyond = times[times > begin] - begin
     assert a["tail_captured"] == beyond.size
     assert a["mean_periods"] == pytest.approx(beyond.mean())
-    assert long["captured"].values[:, -1].sum() == a["captured"] == (times >= 0).sum()
+    assert long["captured"].values[:, -1].sum() == a["captured_starts"] == (times >= 0).sum()
     chosen = pendmap.lifetime(Pendulum(gamma=0.1, p=1.8, omega=2.0), from_period=600)
-    assert chosen.attrs["from_period"] == 600
+    assert chosen["from_period"].item() == 600
     early = pendmap.lifetime(Pendulum(gamma=0.1, p=1.8, omega=2.0), from_period=5)
     assert "IS NOT EXPONENTIAL" in early.attrs["summary"]
 
 
 def test_on_the_saddle_deviations_grow_faster_than_trajectories_leave(long: xr.Dataset) -> None:
-    a = long.attrs
+    a = facts(long)
     assert a["escape_rate"] == pytest.approx(1 / a["mean_periods"], rel=0.01)
     assert 0.3 < a["exponent_per_period"] < 0.8
     assert a["entropy"] == pytest.approx(a["exponent_per_period"] - a["escape_rate"])
@@ -120,7 +121,7 @@ def test_on_the_saddle_deviations_grow_faster_than_trajectories_leave(long: xr.D
 @pytest.mark.parametrize("p", [0.0, 0.3, 0.5, 0.6])
 def test_smooth_basins_have_no_transient_chaos(p: float) -> None:
     found = pendmap.lifetime(Pendulum(gamma=0.1, p=p, omega=2.0))
-    a = found.attrs
+    a = facts(found)
     assert (a["persistent"], a["transient_chaos"]) == (0, 0)
     assert math.isnan(a["mean_periods"])
     assert a["summary"].startswith("No transient chaos")
@@ -129,24 +130,24 @@ def test_smooth_basins_have_no_transient_chaos(p: float) -> None:
 @pytest.mark.thorough
 def test_chaos_that_persists() -> None:
     found = pendmap.lifetime(pendmap.PRESETS["fig2b"], starts=2000)
-    a = found.attrs
-    assert (a["persistent"], a["captured"]) == (1, 0)
-    assert a["exponent"] == pytest.approx(0.1454, abs=0.003)
+    a = facts(found)
+    assert (a["persistent"], a["captured_starts"]) == (1, 0)
+    assert a["chaos_exponent"] == pytest.approx(0.1454, abs=0.003)
     assert a["summary"].startswith("Persistent: tumbling chaos")
     # The only attractors are two chaotic ones, mirror images of one another.
     pair = pendmap.lifetime(Pendulum(p=1.808), starts=1000)
-    assert (pair.attrs["persistent"], pair.sizes["attractor"]) == (1, 2)
+    assert (pair["persistent"].item(), pair.sizes["attractor"]) == (1, 2)
     assert "rotating chaos -" in pair.attrs["summary"]
     assert made(pair).axes
     # If there are other attractors, the starts that end on the chaotic one are left out.
-    beside = pendmap.lifetime(Pendulum(p=1.52, omega=1.1), starts=4000).attrs
+    beside = facts(pendmap.lifetime(Pendulum(p=1.52, omega=1.1), starts=4000))
     assert beside["persistent"] == 0
     assert 0.02 < beside["chaotic_share"] < 0.06
 
 
 def test_weak_friction_ends_persistent_chaos() -> None:
     found = pendmap.lifetime(Pendulum(p=2.0, theta_r=0.05), starts=2000)
-    a = found.attrs
+    a = facts(found)
     assert (a["persistent"], a["transient_chaos"]) == (0, 1)
     assert {str(kind) for kind in found["kind"].values} <= {"rest", "inverted_rest"}
     assert a["mean_periods"] > 500
@@ -154,14 +155,14 @@ def test_weak_friction_ends_persistent_chaos() -> None:
 
 def test_without_damping_nothing_is_captured() -> None:
     found = pendmap.lifetime(Pendulum(gamma=0.0), starts=500)
-    assert (found.attrs["persistent"], found.attrs["captured"]) == (0, 0)
+    assert (found["persistent"].item(), found["captured_starts"].item()) == (0, 0)
     assert "Without damping" in found.attrs["summary"]
 
 
 def test_in_si_the_time_is_in_seconds() -> None:
-    bare = pendmap.lifetime(Pendulum(gamma=0.1, p=1.2, omega=2.0), starts=4000).attrs
+    bare = facts(pendmap.lifetime(Pendulum(gamma=0.1, p=1.2, omega=2.0), starts=4000))
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.2, Omega=10.0)
-    si = pendmap.lifetime(rig, starts=4000).attrs
+    si = facts(pendmap.lifetime(rig, starts=4000))
     # About one start in a thousand is so chaotic that rounding of the velocities changes its time.
     assert si["mean_periods"] == pytest.approx(bare["mean_periods"], rel=0.1)
     assert si["mean_time"] == pytest.approx(si["mean_periods"] * 2 * math.pi / 10)
@@ -173,9 +174,9 @@ def test_the_result_depends_on_starts_and_not_on_threads() -> None:
     one = pendmap.lifetime(model, starts=2000, threads=1)
     two = pendmap.lifetime(model, starts=2000, threads=2)
     assert one["capture_period"].equals(two["capture_period"])
-    assert one.attrs["mean_periods"] == two.attrs["mean_periods"]
+    assert one["mean_periods"].item() == two["mean_periods"].item()
     same = pendmap.lifetime(model, one["start_theta"].values, one["start_velocity"].values)
-    assert same.attrs["mean_periods"] == one.attrs["mean_periods"]
+    assert same["mean_periods"].item() == one["mean_periods"].item()
     assert not one["capture_period"].equals(
         pendmap.lifetime(model, starts=2000, seed=1)["capture_period"]
     )
@@ -214,7 +215,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
 def test_the_figure_names_the_attractors(long: xr.Dataset) -> None:
     said = " ".join(named(made(long)))
     assert "rotation 8:+8 captures" in said
-    assert f"tail from period {long.attrs['from_period']}: mean lifetime" in said
+    assert f"tail from period {long['from_period'].item()}: mean lifetime" in said
 
 
 @pytest.mark.usefixtures("strict_recordings")

@@ -19,6 +19,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from interrupted import started
 from pendmap import Axis, Grid, InputError, Pendulum, cli
+from pendmap.files import facts
 
 
 def independent_labels(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -59,8 +60,8 @@ def test_a_map_has_its_model_numerics_and_summary_in_its_attributes(smooth: Any)
     assert smooth.theta.attrs["units"] == "rad"
     assert smooth.theta.values[0] == pytest.approx(-math.pi + math.pi / 60)
     for key in ("gamma", "p", "omega", "phase", "torque", "tol", "pendmap_version"):
-        assert key in smooth.attrs
-    assert smooth.attrs["reached_error"] <= smooth.attrs["tol"]
+        assert key in facts(smooth)
+    assert smooth["reached_error"].item() <= smooth.attrs["tol"]
     labels, counts = np.unique(smooth.label.values, return_counts=True)
     assert labels.tolist() == [1, 2, 3]
     assert counts.sum() == smooth.attrs["cells"] == 3600
@@ -70,8 +71,8 @@ def test_a_map_has_its_model_numerics_and_summary_in_its_attributes(smooth: Any)
     )
     assert smooth.twin.values.tolist() == [1, 3, 2]
     assert (smooth.settle_periods.values > 0).all()
-    assert smooth.attrs["labels_reliable"] == 1
-    assert smooth.attrs["unreliable"] == 0
+    assert smooth["labels_reliable"].item() == 1
+    assert smooth["unreliable"].item() == 0
 
 
 def test_multipliers_multiply_to_the_damping(smooth: Any) -> None:  # noqa: ANN401
@@ -130,14 +131,14 @@ def test_without_damping_there_are_no_attractors() -> None:
     result = pendmap.basins(Pendulum(gamma=0, p=0.5), Grid.square(20))
     assert result.sizes["attractor"] == 0
     assert result.attrs["layers"] == "finite_time"
-    assert result.attrs["undecided"] == 1
+    assert result["undecided"].item() == 1
     assert "there are no attractors" in result.attrs["summary"]
 
 
 def test_unreliable_labels_are_reported() -> None:
     result = pendmap.basins(Pendulum(p=1.7), Grid.square(60))
-    assert result.attrs["unreliable"] > 0.05
-    assert result.attrs["labels_reliable"] == 0
+    assert result["unreliable"].item() > 0.05
+    assert result["labels_reliable"].item() == 0
     for words in ("NOT RELIABLE", "equal shares by symmetry", "hardly better than chance"):
         assert words in result.attrs["summary"]
 
@@ -334,7 +335,7 @@ def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) 
 def test_hard_attractors_are_found(parameters: dict[str, float], name: str) -> None:
     result = pendmap.basins(Pendulum(**({"p": 1.0, "omega": 1.0} | parameters)), Grid.square(60))
     assert name in result.attractor.values.tolist()
-    assert result.attrs["undecided"] == 0
+    assert result["undecided"].item() == 0
 
 
 @pytest.mark.thorough
@@ -345,7 +346,7 @@ def test_slow_settling_is_not_called_chaos(p: float) -> None:
         Pendulum(gamma=1e-6, p=p, torque=0.1), Grid.square(24), max_periods=1000
     )
     assert not [kind for kind in result.kind.values.tolist() if "chaos" in kind]
-    assert result.attrs["undecided"] > 0.5
+    assert result["undecided"].item() > 0.5
 
 
 def test_starts_on_an_unstable_rest_are_named() -> None:

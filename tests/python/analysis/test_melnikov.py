@@ -16,6 +16,7 @@ import pendmap
 from drawn import made, named
 from pendmap import Effect, Pendulum, Rig
 from pendmap.analysis.melnikov import loop
+from pendmap.files import facts
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -34,13 +35,13 @@ def formula(gamma: float, omega: float, theta_r: float = 0.0, torque: float = 0.
 def test_the_reference_values_to_1e_9(truths: dict[str, Any]) -> None:
     for omega, p in truths["melnikov"]["p_M_gamma0p1"].items():
         found = pendmap.melnikov(Pendulum(gamma=0.1, omega=float(omega)), [1.0])
-        assert abs(found.attrs["p_melnikov"] - float(p)) < 1e-9
+        assert abs(found["own_p_melnikov"].item() - float(p)) < 1e-9
 
 
 def test_the_true_tangency_is_near(truths: dict[str, Any]) -> None:
     # Computed from the manifolds: they differ at second order in gamma.
     for row, omega in zip(truths["melnikov"]["tangency"].values(), (0.87, 2.0), strict=True):
-        found = pendmap.melnikov(Pendulum(gamma=0.1, omega=omega), [1.0]).attrs["p_melnikov"]
+        found = pendmap.melnikov(Pendulum(gamma=0.1, omega=omega), [1.0])["own_p_melnikov"].item()
         assert abs(found / row["p_c"] - 1) < 0.01
 
 
@@ -50,9 +51,9 @@ def test_friction_and_torque_as_the_formula_says(omega: float) -> None:
     found = pendmap.melnikov(model, [omega])
     for branch, torque in (("forward", 0.02), ("backward", -0.02)):
         expected = formula(0.07, omega, 0.03, torque)
-        assert abs(found.attrs[f"p_{branch}"] - expected) < 1e-9
+        assert abs(found[f"p_{branch}"].item() - expected) < 1e-9
         assert abs(float(found["p_melnikov"].sel(branch=branch)[0]) - expected) < 1e-9
-    assert found.attrs["p_melnikov"] == found.attrs["p_forward"]
+    assert found["own_p_melnikov"].item() == found["p_forward"].item()
 
 
 def test_the_formula_by_quadrature_of_the_integral() -> None:
@@ -86,14 +87,14 @@ def test_the_formula_by_quadrature_of_the_integral() -> None:
     by_quadrature = -lost / -best.fun
     assert abs(by_quadrature / formula(gamma, omega, theta_r) - 1) < 1e-9
     own = pendmap.melnikov(Pendulum(gamma=gamma, omega=omega, theta_r=theta_r), [omega])
-    assert abs(own.attrs["p_melnikov"] - by_quadrature) < 1e-9
+    assert abs(own["own_p_melnikov"].item() - by_quadrature) < 1e-9
 
 
 def test_drag_loses_its_work_along_the_separatrix() -> None:
     # The integral of |th'|^3 along the separatrix is 8 * pi/2.
     plain, drag = 0.1, 0.02
     model = Pendulum(gamma=plain, omega=1.0, effects=(Effect("quadratic_drag", {"q": drag}),))
-    found = pendmap.melnikov(model, [1.0]).attrs["p_melnikov"]
+    found = pendmap.melnikov(model, [1.0])["own_p_melnikov"].item()
     lost = 8 * plain + drag * 4 * math.pi
     expected = lost * math.sinh(math.pi / 2) / (2 * math.pi)
     assert abs(found - expected) < 1e-9
@@ -133,8 +134,8 @@ def test_the_loop_agrees_with_scipy(seed: int) -> None:
     model = Pendulum(gamma=gamma, omega=omega, theta_r=theta_r, torque=torque, phase=0.4)
     found = pendmap.melnikov(model, [omega])
     expected, far = loop_by_scipy(gamma, omega, theta_r, abs(torque))
-    assert abs(found.attrs["p_loop"] / expected - 1) < 1e-9, (torque, gamma, omega, theta_r)
-    assert found.attrs["p_melnikov"] == found.attrs["p_loop"]
+    assert abs(found["p_loop"].item() / expected - 1) < 1e-9, (torque, gamma, omega, theta_r)
+    assert found["own_p_melnikov"].item() == found["p_loop"].item()
     orbit = loop(torque)
     assert abs(np.ptp(orbit.theta) - far) < 1e-8
     # Its energy equals that of the saddle everywhere.
@@ -215,15 +216,15 @@ def test_the_manifolds_touch_at_the_computed_threshold() -> None:
     assert low < 0 < high
     touching = 0.0672 - low * 0.0008 / (high - low)
     found = pendmap.melnikov(Pendulum(gamma=0.02, omega=2.0, torque=0.5), [2.0])
-    assert found.attrs["p_melnikov"] == pytest.approx(touching, rel=2e-3)
+    assert found["own_p_melnikov"].item() == pytest.approx(touching, rel=2e-3)
 
 
 def test_a_torque_that_sustains_rotation_tilts_the_potential() -> None:
     found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=0.2), [2.0])
     assert found["branch"].values.tolist() == ["loop", "forward", "backward"]
-    assert abs(found.attrs["p_melnikov"] - 0.34596) < 1e-5
+    assert abs(found["own_p_melnikov"].item() - 0.34596) < 1e-5
     # Forward manifolds of neighbouring saddles touch at 0.2142, by integration with scipy.
-    assert abs(found.attrs["p_forward"] / 0.2142 - 1) < 0.03
+    assert abs(found["p_forward"].item() / 0.2142 - 1) < 0.03
     assert "sustains the rotation forward" in found.attrs["summary"]
     assert "heteroclinic" in found.attrs["summary"]
 
@@ -231,20 +232,20 @@ def test_a_torque_that_sustains_rotation_tilts_the_potential() -> None:
 def test_a_bias_torque_equals_the_model_s_torque_and_a_weak_one_is_a_perturbation() -> None:
     bias = (Effect("bias_torque", {"torque": 0.2}),)
     own, other = (
-        pendmap.melnikov(model, [1.0]).attrs
+        facts(pendmap.melnikov(model, [1.0]))
         for model in (Pendulum(torque=0.2), Pendulum(effects=bias))
     )
-    assert other["p_melnikov"] == pytest.approx(own["p_melnikov"], rel=1e-9)
+    assert other["own_p_melnikov"] == pytest.approx(own["own_p_melnikov"], rel=1e-9)
     drag = (Effect("quadratic_drag", {"q": 0.05}),)
     tilted, damped = (
-        pendmap.melnikov(Pendulum(torque=0.4, omega=2.0, effects=effects), [1.0]).attrs["p_loop"]
+        pendmap.melnikov(Pendulum(torque=0.4, omega=2.0, effects=effects), [1.0])["p_loop"].item()
         for effects in (drag, ())
     )
     assert tilted > damped
     # As the torque tends to 0 with damping, the threshold tends to that without torque.
     for torque in (1e-3, 1e-6, 1e-9):
         found = pendmap.melnikov(Pendulum(gamma=0.1, omega=2.0, torque=torque), [1.0])
-        assert found.attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0), rel=10 * torque)
+        assert found["own_p_melnikov"].item() == pytest.approx(formula(0.1, 2.0), rel=10 * torque)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -254,16 +255,16 @@ def test_a_weak_torque_has_both_thresholds(seed: int) -> None:
     torque = 4 * gamma / math.pi * float(random.uniform(0.1, 1.0)) * (-1) ** seed
     found = pendmap.melnikov(Pendulum(gamma=gamma, omega=omega, torque=torque), [omega])
     expected, _ = loop_by_scipy(gamma, omega, 0.0, abs(torque))
-    assert found.attrs["p_loop"] == pytest.approx(expected, rel=1e-8)
-    assert found.attrs["p_melnikov"] < found.attrs["p_loop"]
+    assert found["p_loop"].item() == pytest.approx(expected, rel=1e-8)
+    assert found["own_p_melnikov"].item() < found["p_loop"].item()
     assert found["branch"].values.tolist() == ["forward", "backward"]
     assert "perturbation" in found.attrs["summary"]
 
 
 def test_losses_that_a_torque_compensates_remain_losses() -> None:
     made_up = Pendulum(gamma=0.1, omega=2.0, torque=0.4 / math.pi)
-    said = pendmap.melnikov(made_up, [2.0]).attrs
-    assert said["p_melnikov"] == pytest.approx(0.0, abs=1e-12)
+    said = facts(pendmap.melnikov(made_up, [2.0]))
+    assert said["own_p_melnikov"] == pytest.approx(0.0, abs=1e-12)
     assert "fractal" in said["summary"]
     assert "Without damping" not in said["summary"]
     free = pendmap.melnikov(Pendulum(gamma=0.0, omega=2.0, torque=0.3), [2.0])
@@ -287,16 +288,16 @@ def test_a_torque_without_a_rest_is_refused(torque: float) -> None:
 
 def test_thresholds_that_rounding_hides_are_not_given() -> None:
     fast = pendmap.melnikov(Pendulum(gamma=0.1, omega=14.0), [14.0, 30.0])
-    assert fast.attrs["p_melnikov"] == pytest.approx(formula(0.1, 14.0), rel=1e-6)
+    assert fast["own_p_melnikov"].item() == pytest.approx(formula(0.1, 14.0), rel=1e-6)
     assert np.isnan(fast["p_melnikov"].values[1]).all()
-    said = pendmap.melnikov(Pendulum(gamma=0.1, omega=30.0), [1.0]).attrs
-    assert math.isnan(said["p_melnikov"])
+    said = facts(pendmap.melnikov(Pendulum(gamma=0.1, omega=30.0), [1.0]))
+    assert math.isnan(said["own_p_melnikov"])
     assert "below rounding errors" in said["summary"]
 
 
 def test_results_in_si_agree() -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
-    assert pendmap.melnikov(rig, [1.0]).attrs["p_melnikov"] == pytest.approx(formula(0.1, 2.0))
+    assert pendmap.melnikov(rig, [1.0])["own_p_melnikov"].item() == pytest.approx(formula(0.1, 2.0))
 
 
 def test_invalid_models_are_refused() -> None:
@@ -328,6 +329,6 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
 
 def test_without_damping_any_drive_tangles_and_there_are_no_basins() -> None:
     found = pendmap.melnikov(Pendulum(gamma=0.0, p=1.0))
-    assert found.attrs["p_melnikov"] == 0
+    assert found["own_p_melnikov"].item() == 0
     assert "from p = 0 on" in found.attrs["summary"]
     assert "no attractors and no basins" in found.attrs["summary"]

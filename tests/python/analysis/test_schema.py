@@ -10,6 +10,7 @@ import pytest
 import pendmap
 from pendmap import InputError, Pendulum
 from pendmap.analysis.numerics import Numerics
+from pendmap.files import facts
 
 DRIVEN = Pendulum(gamma=0.1, p=0.6, omega=2.0)
 RESULTS = {
@@ -25,6 +26,8 @@ RESULTS = {
     "trajectory": lambda: pendmap.simulate(DRIVEN, 1.0, 0.0, 10.0),
 }
 
+OF_ALL = ("Conventions", "comment", "source", "references")
+
 
 @pytest.mark.parametrize("kind", pendmap.ANALYSES)
 def test_attributes_and_json_follow_from_the_schema(kind: str) -> None:
@@ -34,8 +37,8 @@ def test_attributes_and_json_follow_from_the_schema(kind: str) -> None:
     assert all(field.meaning for field in schema.fields)
     alone = pendmap.ANALYSES[kind][1][0]  # a function that needs only a model
     result = RESULTS.get(kind, lambda: getattr(pendmap, alone)(DRIVEN))()
-    own = set(result.attrs) - {"kind", "title"} - set(DRIVEN.attributes)
-    assert own <= set(names)
+    own = set(facts(result)) - set(DRIVEN.attributes) - {"kind", "title", *OF_ALL}
+    assert own <= {field.place for field in schema.fields}
     json = schema.json(result)
     assert list(json) == [f.name for f in schema.fields if f.json and f.name in json]
     assert not {f.name for f in schema.fields if not f.json} & set(json)

@@ -142,7 +142,7 @@ def test_hanging_rest_alone_is_computed_where_upright_is_no_rest() -> None:
     push = Formula("push", "k*(1 - cos(theta))", {"k": 2})
     pushed = Pendulum(gamma=0.1, effects=(push(k=0.1),))
     found = pendmap.tongues(pushed, 6.0, 20.0)
-    assert found.attrs["inverted"] == 0
+    assert found["inverted_rest"].item() == 0
     assert found.sizes["inverted"] == 0
     assert found.sizes["critical"] > 0
     assert "nverted" not in found.attrs["summary"]

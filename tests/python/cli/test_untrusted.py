@@ -133,7 +133,7 @@ def test_a_small_result_does_not_unpack_to_more_than_the_memory(tmp_path: Path) 
         pendmap.load(file)
 
 
-@pytest.mark.parametrize("version", [0, 2, 1.5, "1", "x", float("nan"), [1, 2]])
+@pytest.mark.parametrize("version", [0, 3, 1.5, "1", "x", float("nan"), [1, 2]])
 def test_an_unknown_format_is_refused(tmp_path: Path, version: object) -> None:
     attrs = {"format_version": version, "kind": "basins"}
     xr.Dataset({"x": ("t", [1.0])}, attrs=attrs).to_netcdf(tmp_path / "r.nc", engine="netcdf4")

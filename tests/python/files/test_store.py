@@ -38,7 +38,7 @@ def test_written_results_are_read_back(
             pendmap.save(result, file)
         again = pendmap.load(file)
         xr.testing.assert_equal(again, result)
-        assert again.attrs == pytest.approx(result.attrs) or set(again.attrs) == set(result.attrs)
+        assert again.attrs == result.attrs | {"history": again.attrs["history"]}
         assert [p.name for p in tmp_path.iterdir()] == [file.name]
         if suffix == ".nc":
             file.unlink()
@@ -67,9 +67,9 @@ def _touched(path: Path) -> Path:
 
 
 def test_a_later_format_is_refused(tmp_path: Path, results: list[xr.Dataset]) -> None:
-    later = results[3].assign_attrs(format_version=2)
+    later = results[3].assign_attrs(format_version=3)
     pendmap.save(later, tmp_path / "later.nc")
-    with pytest.raises(InputError, match="has format 2"):
+    with pytest.raises(InputError, match="has format 3"):
         pendmap.load(tmp_path / "later.nc")
 
 

@@ -44,7 +44,7 @@ def test_a_formula_gives_the_map_of_the_library_s_effect() -> None:
     a, b = (pendmap.basins(model, grid) for model in (library, own))
     assert (a.label.values == b.label.values).all()
     assert list(a.attractor.values) == list(b.attractor.values)
-    assert json.loads(b.attrs["effects"])[0]["formula"]["term"] == "-q*v*abs(v)"
+    assert tomllib.loads(b.attrs["model"])["formula"][0]["term"] == "-q*v*abs(v)"
 
 
 @pytest.mark.parametrize(("formula", "values"), [(ROOT, {"k": 0.3}), (POWER, {"q": 0.1, "n": 1.7})])

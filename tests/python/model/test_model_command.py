@@ -11,6 +11,7 @@ import pytest
 import pendmap
 from models import EXAMPLE, written
 from pendmap import Rig, load_model
+from pendmap.files import facts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,13 +79,13 @@ def test_typed_parameters_replace_those_of_the_file(
         "simulate", "--model", "model.toml", *words, "--until", 1, "--json", "--out", "run.nc"
     )
     assert run.returncode == 0, run.stderr
-    attrs = pendmap.load(tmp_path / "run.nc").attrs
+    attrs = facts(pendmap.load(tmp_path / "run.nc"))
     if "--frequency-hz" in words:
         numbers |= {"Omega": 4 * math.pi}
     for name in Rig.numbers():
         wanted = numbers.get(name, getattr(rig, name))
         assert attrs[name] == pytest.approx(wanted, rel=1e-14), name
-    assert "quadratic_drag" in attrs["effects"]
+    assert "quadratic_drag" in attrs["model"]
 
 
 @pytest.mark.parametrize(

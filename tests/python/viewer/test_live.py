@@ -17,6 +17,7 @@ import pendmap
 from conftest import COMMAND
 from interrupted import started
 from pendmap import Pendulum, viewer
+from pendmap.files import facts
 from pendmap.viewer import window
 from pendmap.viewer.trajectory import behind
 from recordings import ReadBack
@@ -92,7 +93,7 @@ def test_the_sent_data_are_the_trajectory(tmp_path: Path) -> None:
     trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
     assert np.allclose(trail[:, -1], bob)
     # Blocks join: the trail behind the first samples of a block is in the preceding one.
-    ago = behind(run.attrs, run["time"].values)
+    ago = behind(facts(run), run["time"].values)
     later = np.arange(ago[0], len(bob))
     assert np.allclose(trail[later], bob[later[:, None] - ago])
     assert "/phase/data/curve" in back.static

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.numerics import part
-from pendmap.analysis.result import Field
+from pendmap.analysis.result import Field, indices, variable
 from pendmap.analysis.sweep import with_values
 from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
 from pendmap.formatting import counted
@@ -69,11 +69,12 @@ class Draws:
         head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
         found.attrs |= {"draws": len(self), "draws_seed": self.seed}
         found.attrs["summary"] = "\n".join([found.attrs["summary"], head, *lines])
-        comment = {"comment": "parameters of each draw, in the units of the model"}
-        return found.assign(
-            drawn=(("draw", "parameter"), self.values, comment),
-            parameter=("parameter", np.array(self.names, dtype=str)),
+        text, comment = "parameters of each draw", "each in the units of the model"
+        found = found.assign(
+            drawn=variable(("draw", "parameter"), self.values, "", text, comment),
+            parameter=variable("parameter", np.array(self.names, dtype=str), long_name="name"),
         )
+        return found.assign_coords(indices(found))
 
 
 def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
@@ -163,25 +164,25 @@ def outcomes(
     Shapes are (outcome, M, N) and (outcome, D).
     """
     mean, _, low, high = interval(share)
-    one = {"units": "1"}
+    certain = probability.max(axis=0)
+    of_share = "of the outcome's share of the cells over the draws"
+    likely, own = "probability of the most likely outcome", "share of the cells in each draw"
     return {
-        "probability": (("outcome", *dims), probability, one),
-        "certainty": (dims, probability.max(axis=0), one),
-        "drawn_share": (("outcome", "draw"), share, one),
-        "share_mean": ("outcome", mean, one),
-        "share_low": ("outcome", low, one),
-        "share_high": ("outcome", high, one),
+        "probability": variable(("outcome", *dims), probability, "1", "probability"),
+        "certainty": variable(dims, certain, "1", likely),
+        "drawn_share": variable(("outcome", "draw"), share, "1", own),
+        "share_mean": variable("outcome", mean, "1", f"mean {of_share}"),
+        "share_low": variable("outcome", low, "1", f"lower end of 95 % {of_share}"),
+        "share_high": variable("outcome", high, "1", f"upper end of 95 % {of_share}"),
+        "sure_cells": variable(
+            (), (certain >= _SURE).mean(), "1", "share of the cells with a sure outcome"
+        ),
     }
 
 
-def sure_cells(found: xr.Dataset) -> float:
-    """Return the share of the cells whose most likely outcome is sure."""
-    return float((found["certainty"].values >= _SURE).mean())
-
-
 def sure_line(found: xr.Dataset, what: str) -> str:
-    """Return a summary line on the attribute ``sure_cells``."""
+    """Return a summary line on the share of sure cells."""
     return (
-        f"{100 * found.attrs['sure_cells']:.1f} % of the cells have {what} with a probability of "
+        f"{100 * float(found['sure_cells']):.1f} % of the cells have {what} with a probability of "
         f"{100 * _SURE:g} % or more."
     )

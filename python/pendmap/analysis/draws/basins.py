@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.draws import drawn_field, outcomes, sure_cells, sure_line
+from pendmap.analysis.draws import drawn_field, outcomes, sure_line
 from pendmap.analysis.fractality import BOX
 from pendmap.analysis.orbit_table import matched, plain, points_of
-from pendmap.analysis.result import rows
+from pendmap.analysis.result import rows, variable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -48,15 +48,14 @@ def basins_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     ``drawn_share`` (outcome, D), ``exists`` (the share of the draws that have it), ``share_mean``,
     ``share_low``, ``share_high`` (the 95 % interval over the draws); over the cells ``certainty``,
     the probability of the most likely outcome, and ``label_entropy``, in nat; over boxes
-    ``doubt_start`` and ``doubt_parameters``, in nat, whose means are attributes; ``drawn``
-    (D, parameter). Attribute ``sure_cells``: the share of the cells with a certainty of 95 % or
-    more.
+    ``doubt_start`` and ``doubt_parameters``, in nat, and their means ``doubt_start_mean`` and
+    ``doubt_parameters_mean``; ``drawn`` (D, parameter); ``sure_cells``, the share of the cells with
+    a certainty of 95 % or more.
     """
     ends, start, known = _counted(dataset, draws.each(run))
     found = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
-    found.attrs["sure_cells"] = sure_cells(found)
-    for name in _DOUBT:
-        found.attrs[name] = float(found[name].values.mean())
+    means = {f"{name}_mean": found[name].mean(keep_attrs=True) for name in _DOUBT}
+    found = found.assign(means)
     return draws.complete(found, _summary(found))
 
 
@@ -68,7 +67,8 @@ def drawn_basins(dataset: xr.Dataset) -> dict[str, Any]:
         for name, mean, low, high, exists in rows(dataset, *_SHARES)
     ]
     return {"attractors": attractors} | {
-        name: dataset.attrs[name] for name in ("sure_cells", *_DOUBT)
+        name: float(dataset[place])
+        for name, place in [("sure_cells", "sure_cells"), *((x, f"{x}_mean") for x in _DOUBT)]
     }
 
 
@@ -143,15 +143,25 @@ def _variables(
     start = start / known
     boxes = _in_boxes(own, own.values > 0)
     over_boxes = tuple(f"box_{name}" for name in dims)
-    nat = {"units": "nat"}
+    label = _entropy(probability).sum(axis=0, dtype=np.float32)
+    reduced, there = np.maximum(total - start, 0.0), "share of the draws that have it"
+    known_too = "entropy of the end that remains where the parameters are known"
     return {
-        "outcome": ("outcome", np.array(names, dtype=str)),
+        "outcome": variable("outcome", np.array(names, dtype=str), long_name="end of a start"),
         **outcomes(dims, probability, share),
-        "label_entropy": (dims, _entropy(probability).sum(axis=0, dtype=np.float32), nat),
-        "exists": ("outcome", exists, {"comment": "share of the draws that have it"}),
-        "doubt_start": (over_boxes, start, nat),
-        "doubt_parameters": (over_boxes, np.maximum(total - start, 0.0), nat),
-        **{f"box_{name}": (f"box_{name}", boxes[name].values) for name in dims},
+        "label_entropy": variable(dims, label, "nat", "entropy of the end over the draws"),
+        "exists": variable("outcome", exists, "1", there),
+        "doubt_start": variable(over_boxes, start, "nat", known_too),
+        "doubt_parameters": variable(over_boxes, reduced, "nat", "entropy due to the parameters"),
+        **{
+            f"box_{name}": variable(
+                f"box_{name}",
+                boxes[name].values,
+                own[name].attrs.get("units", "1"),
+                f"centre of a box: {name}",
+            )
+            for name in dims
+        },
     }
 
 
@@ -167,7 +177,8 @@ def _entropy(part: NDArray[Any]) -> NDArray[Any]:
 
 
 def _summary(found: xr.Dataset) -> list[str]:
-    a, lines = found.attrs, []
+    lines: list[str] = []
+    start, parameters = (float(found[f"{name}_mean"]) for name in _DOUBT)
     for name, mean, low, high, exists in rows(found, *_SHARES):
         there = "" if exists == 1 or name in _UNKNOWN else f", in {100 * exists:.3g} % of them"
         lines.append(
@@ -175,10 +186,9 @@ def _summary(found: xr.Dataset) -> list[str]:
             f"[{100 * low:.2f}, {100 * high:.2f}] %{there}."
         )
     lines.append(sure_line(found, "an end"))
-    both = a["doubt_start"] + a["doubt_parameters"]
     lines.append(
-        f"Entropy of the end in a box of {BOX} x {BOX} cells: {both:.3f} nat = "
-        f"{a['doubt_start']:.3f} from the position of the start in the box + "
-        f"{a['doubt_parameters']:.3f} from the parameters."
+        f"Entropy of the end in a box of {BOX} x {BOX} cells: {start + parameters:.3f} nat = "
+        f"{start:.3f} from the position of the start in the box + "
+        f"{parameters:.3f} from the parameters."
     )
     return lines

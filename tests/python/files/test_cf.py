@@ -1,0 +1,206 @@
+"""Results by the CF conventions 1.11, their alignment, and files of the format 1."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import time
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import pendmap
+from pendmap import Effect, Grid, Pendulum, Rig, render
+from pendmap.charts import parameter_map
+from pendmap.files import facts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+SI = Rig(
+    w0=6.2,
+    c_over_m=0.6,
+    Tr=0.1,
+    p=0.9,
+    Omega=12.0,
+    effects=(Effect("quadratic_drag", {"q": 0.012}),),
+)
+NOTES = {"covariance": {"names": ["c_over_m", "p"], "matrix": [[1e-4, 0.0], [0.0, 1e-4]]}}
+DRAWN = Rig(w0=6.2, c_over_m=0.6, p=1.2, Omega=12.4, notes=NOTES)
+BARE = Pendulum(p=0.6)
+PLANE = {"p": (0.3, 1.2, 2), "omega": (1.8, 2.0, 2)}
+RESULTS: dict[str, Callable[[], xr.Dataset]] = {
+    "basins": lambda: pendmap.basins(DRAWN, Grid.square(10, 6.2), draws=2),
+    "basins of a list": lambda: pendmap.basins_of(SI, [0.0, 1.0], [0.1, 2.5]),
+    "basins without damping": lambda: pendmap.basins(Pendulum(gamma=0), 8),
+    "bifurcation": lambda: pendmap.bifurcation(SI, {"stroke_mm": (20, 40, 3)}, starts=2),
+    "lifetime": lambda: pendmap.lifetime(DRAWN, starts=100, draws=2),
+    "lyapunov": lambda: pendmap.lyapunov(SI),
+    "lyapunov of chaos": lambda: pendmap.lyapunov(Pendulum(p=2.0), precision=0.1),
+    "melnikov": lambda: pendmap.melnikov(BARE, [1.0, 2.0]),
+    "orbits": lambda: pendmap.orbit(DRAWN, 1, 1, Grid.square(20, 6.2), draws=2),
+    "parameter_map": lambda: pendmap.parameter_map(DRAWN, PLANE, starts=2, draws=2, curves=True),
+    "map over a parameter of an effect": lambda: pendmap.parameter_map(
+        SI, {"quadratic_drag.q": (0.01, 0.02, 2), "Tr": (0.0, 0.2, 2)}, starts=2
+    ),
+    "tongues": lambda: pendmap.tongues(DRAWN, [1.9, 2.0], draws=2),
+    "trajectory": lambda: pendmap.simulate(SI, 1.0, 0.0, 3.0, lyapunov=True),
+}
+UNITS = {"1", "rad", "rad/s", "rad/s2", "1/s", "1/rad", "s", "m/s2", "mm"}
+"""Units of results; UDUNITS-2 reads each."""
+WORD = re.compile(r"[A-Za-z0-9_.@+-]+")  # A meaning of a flag, by CF
+
+
+@pytest.fixture(scope="module", params=RESULTS)
+def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Any:  # noqa: ANN401
+    """Return a result of each kind, and its file."""
+    result = RESULTS[request.param]()
+    return result, pendmap.save(result, tmp_path_factory.mktemp("cf") / "result.nc")
+
+
+def stored(file: Path) -> xr.Dataset:
+    """Return a file as it is stored."""
+    with xr.open_dataset(file, decode_cf=False) as found:
+        return found.load()
+
+
+def test_a_file_says_what_it_is(saved: tuple[xr.Dataset, Path]) -> None:
+    a = stored(saved[1]).attrs
+    assert a["Conventions"] == "CF-1.11"
+    assert a["source"] == f"pendmap {pendmap.__version__}"
+    assert "doi:10.1098/rsta.2007.2126" in a["references"]
+    assert all(a[name] for name in ("title", "history", "comment"))
+    for value in a.values():
+        assert isinstance(value, str | int | float | np.number)
+        assert not isinstance(value, str) or not value.startswith(("{", "["))
+    tomllib.loads(a["model"])
+
+
+def test_variables_have_units_and_meanings(saved: tuple[xr.Dataset, Path]) -> None:
+    found = stored(saved[1])
+    bounds = {each.attrs.get("bounds") for each in found.variables.values()}
+    for name, each in found.variables.items():
+        if name in bounds:
+            assert not set(each.attrs) & {"units", "long_name", "_FillValue"}, name
+            continue
+        assert each.attrs["long_name"], name
+        if "flag_values" in each.attrs:
+            words = each.attrs["flag_meanings"].split(" ")
+            values = np.atleast_1d(each.attrs["flag_values"])
+            assert values.dtype == each.dtype, name
+            assert len(words) == values.size, name
+            assert all(WORD.fullmatch(word) for word in words), words
+            assert set(np.unique(each.values)) <= set(values.tolist()), name
+        elif each.dtype.kind in "iuf" and name != "drawn":  # its parameters have units of their own
+            assert each.attrs["units"] in UNITS, (name, each.attrs["units"])
+        fill = each.attrs.get("_FillValue")
+        assert fill is None or np.asarray(fill).dtype == each.dtype, name
+
+
+def test_coordinates_are_numbers_without_gaps(saved: tuple[xr.Dataset, Path]) -> None:
+    found = stored(saved[1])
+    for name in found.dims:
+        if name in found.variables:
+            assert found[name].dtype.kind in "iuf", name
+            assert "_FillValue" not in found[name].attrs, name
+            steps = np.diff(found[name].values)
+            assert (steps > 0).all() or (steps < 0).all(), name
+        else:
+            assert f"{name}_name" in found.variables or name in ("bound", "eigenvalue", "part")
+
+
+def test_a_file_is_read_back_bit_by_bit(saved: tuple[xr.Dataset, Path]) -> None:
+    result, file = saved
+    again = pendmap.load(file)
+    assert set(again.coords) == set(result.coords)
+    for name, each in result.variables.items():
+        assert again[name].variable.identical(each), name
+        assert again[name].dtype == each.dtype or each.dtype.kind == "U", name
+    assert again.attrs.keys() - result.attrs.keys() == {"history"}
+
+
+def test_other_tools_see_that_a_start_never_settled(tmp_path: Path) -> None:
+    result = pendmap.basins(Pendulum(gamma=0), 8)
+    with xr.open_dataset(pendmap.save(result, tmp_path / "a.nc")) as found:
+        assert np.isnan(found["settle_periods"].values).all()
+    assert (pendmap.load(tmp_path / "a.nc")["settle_periods"] == -1).all()
+
+
+def test_the_history_is_reproducible(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = pendmap.melnikov(BARE, [1.0])
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1234567890")
+    said = f"2009-02-13T23:31:30Z pendmap {pendmap.__version__}: pendmap.melnikov"
+    again = pendmap.load(pendmap.save(result, tmp_path / "a.nc"))
+    assert again.attrs["history"] == said
+    monkeypatch.delenv("SOURCE_DATE_EPOCH")
+    # The history of a result is that of its first file.
+    assert pendmap.load(pendmap.save(again, tmp_path / "b.nc")).attrs["history"] == said
+    fresh = pendmap.load(pendmap.save(result, tmp_path / "c.nc")).attrs["history"]
+    assert fresh[:4] == time.strftime("%Y", time.gmtime())
+
+
+def test_results_are_joined_along_a_parameter() -> None:
+    values = [0.6, 0.7, 1.7]
+    single = [pendmap.basins(Pendulum(p=p), 10) for p in values]
+    joined = xr.concat(single, dim="p", join="outer")
+    assert joined["p"].values.tolist() == values
+    assert joined["gamma"].item() == 0.1
+    assert joined["label"].dims == ("p", "velocity", "theta")
+    for k, one in enumerate(single):
+        assert joined["undecided"].values[k] == one["undecided"].item()
+        assert joined["basin_entropy"].values[k] == one["basin_entropy"].item()
+        for name in one["attractor"].values:
+            own = joined["fraction"].sel(attractor=name).values[k]
+            assert own == one["fraction"].sel(attractor=name).item()
+    runs = [pendmap.lyapunov(Pendulum(p=p)) for p in values]
+    wanted = [run["largest_exponent"].item() for run in runs]
+    found = xr.concat([run[["largest_exponent"]] for run in runs], dim="p")
+    assert found["largest_exponent"].values == pytest.approx(wanted, nan_ok=True)
+
+
+def test_the_text_of_the_model_is_a_model_file(tmp_path: Path) -> None:
+    for model in (SI, BARE):
+        text = pendmap.simulate(model, 1.0, 0.0, 1.0).attrs["model"]
+        (tmp_path / "again.toml").write_text(text, encoding="utf-8")
+        assert pendmap.load_model(tmp_path / "again.toml") == model
+
+
+@pytest.mark.parametrize("kind", ["basins", "parameter_map", "tongues"])
+def test_files_of_the_format_1_are_upgraded(kind: str, tmp_path: Path) -> None:
+    packed = Path(__file__).with_name("version_1") / f"{kind}.nc.gz"
+    file = tmp_path / f"{kind}.nc"
+    file.write_bytes(gzip.decompress(packed.read_bytes()))
+    old, found = stored(file), pendmap.load(file)
+    rig = Rig(w0=6.2, c_over_m=0.6, Tr=0.3, p=1.2, Omega=12.4, notes=NOTES)
+    today = {
+        "basins": lambda: pendmap.basins(SI, Grid.square(8, 6.2)),
+        "parameter_map": lambda: pendmap.parameter_map(rig, PLANE, starts=2, draws=2),
+        "tongues": lambda: pendmap.tongues(BARE, [1.9, 2.0]),
+    }[kind]()
+    assert old.attrs["format_version"] == 1
+    assert found.attrs["format_version"] == 2
+    assert set(found.variables) == set(today.variables)
+    assert set(found.attrs) == set(today.attrs)
+    for name, each in found.variables.items():
+        assert each.dims == today[name].dims, name
+        assert each.attrs.get("units", "1") == today[name].attrs.get("units", "1"), name
+    known = facts(found)
+    renamed = {"doubt_start", "doubt_parameters", "effects", "format_version", "inverted"}
+    renamed |= {"undecided", "failed", "chaos_periods"} if kind == "parameter_map" else set()
+    varied = {"p", "omega", "Omega"} if kind != "basins" else set()
+    for name in set(old.attrs) - renamed - varied - {"coordinates"}:
+        assert known[name] == old.attrs[name], name
+    if kind == "parameter_map":
+        regimes = parameter_map.sets(found)
+        assert [str(kinds).replace("'", '"') for kinds in regimes] == list(
+            old["regime_kinds"].values
+        )
+    if kind == "basins":
+        assert known["model"] == today.attrs["model"]
+    assert render.draw(found, tmp_path / "a.svg").stat().st_size > packed.stat().st_size
+    pendmap.save(found, tmp_path / "again.nc")
+    assert set(pendmap.load(tmp_path / "again.nc").variables) == set(found.variables)
