@@ -324,7 +324,8 @@ def _measures(
 
 def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
-    a, units = facts(dataset), Units.of(facts(dataset))
+    a = facts(dataset)
+    units = Units.of(a)
     lines: list[str] = []
     exponent = f"{with_error(a['chaos_exponent'], a['chaos_exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
@@ -361,7 +362,8 @@ def _shares(found: xr.Dataset) -> str:
 
 
 def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
-    a, units = facts(dataset), Units.of(facts(dataset))
+    a = facts(dataset)
+    units = Units.of(a)
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
     mean = with_error(a["mean_periods"], a["mean_periods_stderr"])
     said = (

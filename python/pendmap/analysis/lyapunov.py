@@ -275,7 +275,8 @@ def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) ->
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a, units = facts(dataset), Units.of(facts(dataset))
+    a = facts(dataset)
+    units = Units.of(a)
     name = str(dataset["attractor"].values[0]) if dataset.sizes["attractor"] else ""
     lines = [*_ended(dataset, name)]
     value, per = a["largest_exponent"], units.per_time
@@ -317,7 +318,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     """Return summary lines on how the start's trajectory ended."""
-    a, units = facts(dataset), Units.of(facts(dataset))
+    a = facts(dataset)
+    units = Units.of(a)
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
     if a["end"] == "captured":

@@ -200,7 +200,8 @@ def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[s
 
 
 def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list[str]:
-    a, units = facts(dataset), Units.of(facts(dataset))
+    a = facts(dataset)
+    units = Units.of(a)
     stable = int(dataset["stable"].sum())
     count = dataset.sizes["orbit"]
     own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"

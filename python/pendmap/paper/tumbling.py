@@ -38,7 +38,8 @@ def chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
 
 def _column(run: xr.Dataset, k: int) -> list[Panel]:
     """Return time history, phase plane and section of a trajectory."""
-    attrs, units = facts(run), Units.of(facts(run))
+    attrs = facts(run)
+    units = Units.of(attrs)
     point = f"p = {attrs['p']:g}, ω = {attrs['omega']:g}"
     part, whole = _first(run, HISTORY), _first(run, CURVE)
     time, theta = part["time"].values, part["theta"].values
