@@ -11,7 +11,7 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, records, summarised, variable
+from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
 from pendmap.analysis.summary import box_said
 from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import facts
@@ -153,7 +153,6 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     loose_speed = units.given(loose["velocity"], VELOCITY)
     way = np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])
     kind, meanings = which[ends[:, 0]].astype(np.int16), dict(enumerate(kinds.tolist()))
-    angle, rate = "angle of a stroboscopic point", "velocity of this point"
     on = "entry of the attractor that the sweep {} is on"
     data: dict[str, Any] = {
         **sweep.entries(raw, kinds, which, units),
@@ -165,15 +164,13 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
         "point_entry": variable("point", owner, "1", "entry of the attractor"),
         "point_value": ("point", value[owner], axis.attributes),
-        "point_theta": variable("point", raw.point_theta, "rad", angle),
-        "point_velocity": variable("point", speed, units.of_velocity, rate),
+        **point("point", raw.point_theta, speed, units.of_velocity, "point_{}"),
         "up": variable(axis.name, raw.up.on, "1", on.format("up"), "-1: none", missing=-1),
         "down": variable(axis.name, raw.down.on, "1", on.format("down"), "-1: none", missing=-1),
         **sweep.shares(raw, (axis.name,), axis.values.shape),
         "loose_sweep": variable("loose", way, "", "sweep", flags={-1: "down", 1: "up"}),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
-        "loose_theta": variable("loose", loose["theta"], "rad", angle),
-        "loose_velocity": variable("loose", loose_speed, units.of_velocity, rate),
+        **point("loose", loose["theta"], loose_speed, units.of_velocity, "loose_{}"),
     }
     coordinates = {
         **axis.coordinates,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.result import records, variable
+from pendmap.analysis.result import point, records, variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -55,18 +55,14 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
         "kind": variable(one, names["kind"], long_name=f"kind of {one}"),
         "n": variable(one, whole("n"), "periods", "period n", none),
         "w": variable(one, whole("w"), "turns", "net turns w over a period"),
-        "theta_point": variable(one, theta, "rad", "angle of a stroboscopic point"),
-        "velocity_point": variable(one, speed, units.of_velocity, "velocity of this point"),
+        **point(one, theta, speed, units.of_velocity, "{}_point"),
         "period": variable(one, measured("period", TIME), units.of_time, "period as a time"),
         "exponent": variable(one, rate, units.of_rate, "largest Lyapunov exponent"),
         "exponent_stderr": variable(one, error, units.of_rate, "standard error of the exponent"),
         "twin": variable(one, whole("twin"), "1", "number of the mirror image", image),
         "multipliers": variable((one, "eigenvalue", "part"), multipliers, "1", multiplier),
         f"point_{one}": variable("point", flat[:, 0].astype(np.int32), "1", owner),
-        "point_theta": variable("point", flat[:, 1], "rad", "angle of a stroboscopic point"),
-        "point_velocity": variable(
-            "point", flat[:, 2], units.of_velocity, "velocity of this point"
-        ),
+        **point("point", flat[:, 1], flat[:, 2], units.of_velocity, "point_{}"),
     }
 
 

@@ -283,8 +283,7 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     single, each, part = "orbit", ("orbit", "draw"), dataset["multipliers"].attrs["long_name"]
     of = "standard deviation over the draws of"
     found = dataset.assign(
-        drawn_theta=variable(each, state[:, 0], "rad", "angle of a stroboscopic point"),
-        drawn_velocity=variable(each, state[:, 1], speed, "velocity of this point"),
+        **result.point(each, state[:, 0], state[:, 1], speed, "drawn_{}"),
         drawn_multipliers=variable((*dims, "draw"), multipliers, "1", part),
         theta_spread=variable(single, spread[:, 0], "rad", f"{of} the angle"),
         velocity_spread=variable(single, spread[:, 1], speed, f"{of} the velocity"),

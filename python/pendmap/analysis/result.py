@@ -236,6 +236,20 @@ def flag(
     return variable(dims, np.asarray(values, dtype=np.int8), "", long_name, flags=flags)
 
 
+def point(
+    dims: Hashable | tuple[Hashable, ...],
+    theta: Any,  # noqa: ANN401 (an array)
+    velocity: Any,  # noqa: ANN401 (an array)
+    unit: str,
+    name: str,
+) -> dict[str, Any]:
+    """Return stroboscopic points as two variables, named by a format like ``entry_{}``."""
+    return {
+        name.format("theta"): variable(dims, theta, "rad", "angle of a stroboscopic point"),
+        name.format("velocity"): variable(dims, velocity, unit, "velocity of this point"),
+    }
+
+
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
     """Return a JSON object for each index of a dimension, from variables named by its keys."""
     return [dict(zip(variables, row, strict=True)) for row in rows(dataset, *variables.values())]

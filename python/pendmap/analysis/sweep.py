@@ -14,7 +14,7 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import Grid, coordinate
-from pendmap.analysis.result import Field, Found, variable
+from pendmap.analysis.result import Field, Found, point, variable
 from pendmap.errors import (
     MOST_CELLS,
     InputError,
@@ -359,8 +359,7 @@ def entries(
         "entry_kind": variable(one, kind.astype(np.int16), "", "kind of attractor", flags=meanings),
         "entry_n": variable(one, raw.n, "periods", "period n", none),
         "entry_w": variable(one, raw.w, "turns", "net turns w over a period"),
-        "entry_theta": variable(one, raw.theta, "rad", "angle of a stroboscopic point"),
-        "entry_velocity": variable(one, velocity, speed, "velocity of this point"),
+        **point(one, raw.theta, velocity, speed, "entry_{}"),
         "entry_exponent": variable(one, growth, rate, "largest Lyapunov exponent"),
         "entry_exponent_stderr": variable(one, error, rate, "standard error of the exponent"),
         "entry_share": variable(one, raw.share, "1", "share of the starts"),
