@@ -98,6 +98,11 @@ pub enum Error {
         /// Bytes that are free, where the system says it.
         free: Option<f64>,
     },
+    /// Bytes from a store that are damaged, or from another version.
+    Stored {
+        /// What they should be.
+        what: &'static str,
+    },
     /// Motions leave the range of numbers.
     Diverges,
     /// The caller asked to stop.
@@ -160,6 +165,9 @@ impl fmt::Display for Error {
                     Some(free) => write!(f, "{:.3} GB are free: they must be fewer", free / 1e9),
                     None => f.write_str("more than is free: they must be fewer"),
                 }
+            }
+            Self::Stored { what } => {
+                write!(f, "{what} must be what this version has stored, got other bytes")
             }
             Self::Diverges => f.write_str(
                 "the motion leaves the range of numbers: it begins too fast, or a torque or effect of \

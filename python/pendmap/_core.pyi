@@ -9,7 +9,7 @@ from pendmap.model.formula import FormulaKey
 
 __all__ = [
     "Attractor",
-    "BasinMap",
+    "BasinPlan",
     "Bifurcation",
     "CriticalAmplitudes",
     "Diverged",
@@ -18,18 +18,21 @@ __all__ = [
     "FitPoint",
     "FittedRun",
     "Followed",
+    "LabelledStarts",
     "Lyapunov",
     "Orbit",
     "OrbitSearch",
     "ParameterMap",
+    "Reliability",
+    "Survey",
     "Texture",
+    "TextureSum",
     "Trajectory",
+    "Uncertainty",
     "WindowRows",
     "__version__",
     "acceleration",
     "advance",
-    "basins_grid",
-    "basins_list",
     "bifurcation",
     "bounds",
     "choose_steps",
@@ -51,7 +54,7 @@ __all__ = [
     "simd",
     "simd_available",
     "simulate",
-    "texture",
+    "thinned",
     "tongues",
 ]
 
@@ -118,33 +121,66 @@ class Texture:
     boundary_boxes: int
     neighbours_agree: float
     chance: float
+    @staticmethod
+    def without_cells(labelled: bool) -> Texture: ...
 
 @final
-class BasinMap:
-    attractors: list[Attractor]
-    undecided: float
-    failed: float
-    mean_periods: float
+class BasinPlan:
+    state: bytes
     plane: str
-    chaos_bound: int
-    searched_starts: int
     layer_periods: int
     bound: int
+    chaos_bound: int
+    searched_starts: int
     steps_per_period: int
     reached_error: float
     simd: str
-    texture: Texture
-    uncertainty_eps: _Floats
-    uncertain: NDArray[np.uint64]
-    uncertainty_tried: NDArray[np.uint64]
-    unreliable: float
-    unreliable_half_step: float
-    unreliable_mirror: float | None
-    labels_sampled: int
+    def __new__(
+        cls,
+        model: Pendulum,
+        starts: tuple[_Axis, _Axis] | tuple[_Floats, _Floats],
+        choices: _Choices,
+        state: bytes | None = None,
+        progress: _Progress | None = None,
+    ) -> BasinPlan: ...
+    def label(self, first: int, last: int, progress: _Progress | None = None) -> LabelledStarts: ...
+    def label_again(
+        self, picks: NDArray[np.int64], progress: _Progress | None = None
+    ) -> LabelledStarts: ...
+    def further(self, theta: _Floats, velocity: _Floats) -> NDArray[np.int16] | None: ...
+    def checked_starts(self) -> NDArray[np.int64]: ...
+    def reliability(self, labels: NDArray[np.int16]) -> Reliability: ...
+    def uncertainty(self, labels: NDArray[np.int16], columns: int) -> Uncertainty | None: ...
+    def finish(self, counts: NDArray[np.int64]) -> tuple[list[Attractor], NDArray[np.int16]]: ...
+
+@final
+class LabelledStarts:
     label: NDArray[np.int16]
     settle: NDArray[np.int32]
     turns: NDArray[np.int32]
     finite_time_exponent: NDArray[np.float32] | None
+    work: int
+    open_theta: _Floats
+    open_velocity: _Floats
+
+@final
+class Reliability:
+    unreliable: float
+    unreliable_half_step: float
+    unreliable_mirror: float | None
+    labels_sampled: int
+
+@final
+class Uncertainty:
+    eps: _Floats
+    uncertain: NDArray[np.uint64]
+    tried: NDArray[np.uint64]
+
+@final
+class TextureSum:
+    def __new__(cls, columns: int, rows: int) -> TextureSum: ...
+    def add(self, labels: NDArray[np.int16]) -> None: ...
+    def total(self) -> Texture: ...
 
 @final
 class Trajectory:
@@ -192,6 +228,48 @@ class Bifurcation(ParameterMap):
     point_velocity: _Floats
     up: Followed
     down: Followed
+
+@final
+class Survey:
+    def __new__(
+        cls,
+        model: Pendulum,
+        axes: Sequence[_Range],
+        theta: _Floats,
+        velocity: _Floats,
+        each: int,
+        tol: float,
+        bound: int | None,
+        threads: int,
+        state: bytes | None = None,
+    ) -> Survey: ...
+    @property
+    def state(self) -> bytes: ...
+    @property
+    def blocks(self) -> int: ...
+    @property
+    def passes(self) -> int: ...
+    def cells(self, block: int) -> list[int]: ...
+    def around(self, block: int) -> list[int]: ...
+    def search(
+        self, block: int, threads: int | None = None, progress: _Progress | None = None
+    ) -> bytes: ...
+    def exchange(
+        self,
+        pass_number: int,
+        block: int,
+        known: dict[int, bytes],
+        threads: int | None = None,
+        progress: _Progress | None = None,
+    ) -> bytes | None: ...
+    def gained(self, pass_number: int, block: int, found: bytes) -> bool: ...
+    def result(self, blocks: Sequence[bytes]) -> ParameterMap: ...
+    def diagram(
+        self,
+        blocks: Sequence[bytes],
+        first: tuple[float, float] | None = None,
+        threads: int | None = None,
+    ) -> Bifurcation: ...
 
 @final
 class Lyapunov:
@@ -292,21 +370,7 @@ def simulate(
     lyapunov: bool,
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
 ) -> Trajectory: ...
-def basins_grid(
-    model: Pendulum,
-    theta: _Axis,
-    velocity: _Axis,
-    choices: _Choices,
-    progress: _Progress | None = None,
-) -> BasinMap: ...
-def basins_list(
-    model: Pendulum,
-    theta: _Floats,
-    velocity: _Floats,
-    choices: _Choices,
-    progress: _Progress | None = None,
-) -> BasinMap: ...
-def texture(labels: NDArray[np.int16], columns: int) -> Texture: ...
+def thinned(count: int, others: int) -> NDArray[np.int64]: ...
 def orbits(
     model: Pendulum,
     winding: tuple[int, int],

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
 
 use super::chaos::ChaoticSet;
 use super::kind::Kind;
@@ -18,7 +19,7 @@ use crate::orbit::symmetry::Mirror;
 const EXACT: f64 = 1e-9;
 
 /// An attractor.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Attractor {
     /// Its kind.
     pub kind: Kind,

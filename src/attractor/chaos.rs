@@ -6,6 +6,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::{Deserialize, Serialize};
+
 use super::capture::{self, Outcome, Traps};
 use super::effort::Effort;
 use super::groups::Groups;
@@ -37,7 +39,7 @@ const NEUTRAL: f64 = 2e-3;
 const LEAST_TURNS: f64 = 0.02;
 
 /// A set of trajectories that share a region and never leave it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ChaoticSet {
     /// Kind of chaos, or quasi-periodic rotation.
     pub kind: Kind,

@@ -1,8 +1,10 @@
 //! The budget of a search for attractors.
 
+use serde::{Deserialize, Serialize};
+
 /// The budget of a search for attractors: thorough for a single plane of starts, brisk for each of many
 /// thousand pendulums.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Whether orbits are refined on the precise map, to rounding of the exact motion. Otherwise
     /// they are orbits of the integration steps, with the error of these.
@@ -28,7 +30,7 @@ pub struct Effort {
 }
 
 /// Sampling of the extent of an ellipse.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
     /// Points of a cycle that get an ellipse: a trajectory passes each once a cycle.
     pub points: usize,

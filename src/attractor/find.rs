@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::{Deserialize, Serialize};
+
 use super::capture::{self, Fate, Outcome, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::ChaoticSet;
@@ -32,12 +34,14 @@ pub enum Ending {
     Failed,
 }
 
-/// The results of a search.
-#[derive(Clone, Debug)]
+/// The results of a search; stored without what [`Catalogue::restored`] derives again.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Catalogue {
     /// The attractors, sorted and named.
+    #[serde(skip)]
     pub attractors: Vec<Attractor>,
     /// The trapping regions; indices are those of `attractors`.
+    #[serde(skip)]
     pub traps: Traps,
     /// Longest time to capture in the searches, in periods.
     pub longest_settle: u32,
@@ -66,6 +70,13 @@ impl Catalogue {
         };
         empty.rebuild(&strobe.pendulum);
         empty
+    }
+
+    /// A stored catalogue, with its attractors and traps.
+    #[must_use]
+    pub fn restored(mut self, pendulum: &Pendulum) -> Self {
+        self.rebuild(pendulum);
+        self
     }
 
     /// Searches from `starts`; see [`Catalogue::endings`]. Returns whether anything new was found.

@@ -1,7 +1,9 @@
 //! Kinds of motions.
 
+use serde::{Deserialize, Serialize};
+
 /// The kind of a motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Kind {
     /// Hanging at rest.
     Rest,

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
+use serde::{Deserialize, Serialize};
+
 use crate::integrate::State;
 use crate::model::{Angle, Pendulum};
 
@@ -10,7 +12,7 @@ use crate::model::{Angle, Pendulum};
 const SHARED: f64 = 0.2;
 
 /// Cells of equal size that contain stroboscopic points.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Region {
     cells: BTreeSet<[i32; 2]>,
     /// Cells per radian and per unit of velocity.

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::effort::Sampling;
 use crate::integrate::accuracy::wrapped;
@@ -19,7 +20,7 @@ use crate::model::Angle;
 use crate::orbit::PeriodicOrbit;
 
 /// An ellipse around one point of an attractor: inside where `y1^2 + y2^2 < 1`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Ellipse {
     /// Centre.
     pub centre: State,
@@ -179,7 +180,7 @@ fn safe_radius(
 }
 
 /// A band around a running state: a curve `v = g(theta)` that attracts trajectories.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Band {
     /// `g` at the centres of equal cells of [-pi, pi).
     pub curve: Vec<f64>,

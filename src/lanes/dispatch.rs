@@ -4,13 +4,14 @@ use std::fmt;
 use std::str::FromStr;
 
 use pulp::{Scalar, Simd, WithSimd};
+use serde::{Deserialize, Serialize};
 
 use super::isa::Isa;
 use crate::error::Error;
 
 /// An instruction set of the kernel. All give the same results within rounding; AVX-512 and AVX2 give the
 /// same bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum InstructionSet {
     /// AVX-512: 96 lanes in twelve registers.
     Avx512,

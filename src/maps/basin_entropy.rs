@@ -1,9 +1,10 @@
 //! Basin entropy: a measure of how finely basins are interwoven.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::label::{Labels, UNDECIDED};
-use super::starts::Starts;
+use super::label::UNDECIDED;
 
 /// Side of the boxes of the basin entropy, in cells.
 const BOX: usize = 5;
@@ -47,58 +48,102 @@ impl Texture {
             chance: 1.0,
         }
     }
-}
 
-/// The entropies of the labels of a grid; zeros for a list of starts, which has no neighbours.
-#[must_use]
-pub fn texture(labels: &Labels, starts: &Starts, pool: &rayon::ThreadPool) -> Texture {
-    let Starts::Grid { theta, .. } = starts else {
-        return Texture { neighbours_agree: 0.0, chance: 0.0, ..Texture::plain() };
-    };
-    of_cells(&labels.label, theta.count, pool)
+    /// The values of a list of starts, which have no neighbours.
+    #[must_use]
+    pub const fn of_list() -> Self {
+        Self { neighbours_agree: 0.0, chance: 0.0, ..Self::plain() }
+    }
 }
 
 /// The entropies of labels in rows of `columns` cells.
 #[must_use]
-pub fn of_cells(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Texture {
-    let rows = cells.len() / columns.max(1);
-    if rows == 0 {
-        return Texture::plain();
+pub fn texture(cells: &[i16], columns: usize, pool: &rayon::ThreadPool) -> Texture {
+    let mut sum = TextureSum::new(columns, cells.len() / columns.max(1));
+    sum.add(cells, pool);
+    sum.total()
+}
+
+/// The texture of a plane whose rows come in parts, from the first to the last.
+#[derive(Debug)]
+pub struct TextureSum {
+    columns: usize,
+    rows: usize,
+    /// Rows counted so far.
+    done: usize,
+    bands: Vec<Band>,
+}
+
+impl TextureSum {
+    /// No rows yet, of a plane of `rows` rows with `columns` cells each.
+    #[must_use]
+    pub const fn new(columns: usize, rows: usize) -> Self {
+        Self { columns, rows, done: 0, bands: Vec::new() }
     }
-    // Bands of one box's height, summed in their order: the result does not depend on threads.
-    let bands: Vec<Band> = pool.install(|| {
-        let tops: Vec<usize> = (0..rows).step_by(BOX).collect();
-        tops.into_par_iter().map(|top| band(cells, columns, rows, top)).collect()
-    });
-    let mut all: Vec<(i16, usize)> = Vec::new();
-    for (label, number) in bands.iter().flat_map(|b| &b.counts) {
-        count(&mut all, *label, *number);
+
+    /// Whether a part may begin with this row: one with which a row of boxes begins.
+    #[must_use]
+    pub const fn may_begin(row: usize) -> bool {
+        row.is_multiple_of(BOX)
     }
-    let pairs = rows * (columns - 1) + columns * (rows - 1);
-    let same: usize = bands.iter().map(|b| b.same).sum();
-    let boxes: usize = bands.iter().map(|b| b.boxes).sum();
-    let mixed: Vec<f64> = bands.into_iter().flat_map(|b| b.mixed).collect();
-    // The sum of nothing is -0.
-    let (sum, number) = (0.0 + mixed.iter().sum::<f64>(), mixed.len() as f64);
-    let mean = if mixed.is_empty() { 0.0 } else { sum / number };
-    let spread = mixed.iter().map(|s| (s - mean).powi(2)).sum::<f64>();
-    let several = mixed.len() > 1;
-    Texture {
-        basin_entropy: sum / boxes.max(1) as f64,
-        boundary_basin_entropy: mean,
-        boundary_stderr: if several {
-            (spread / (number - 1.0) / number).sqrt()
-        } else {
-            f64::INFINITY
-        },
-        boxes,
-        boundary_boxes: mixed.len(),
-        neighbours_agree: same as f64 / pairs.max(1) as f64,
-        chance: all.iter().map(|(_, c)| (*c as f64 / cells.len() as f64).powi(2)).sum(),
+
+    /// Adds the labels of the next rows, and of the row after them unless it is beyond the last; the
+    /// next part begins with that row, which a row of boxes must begin with.
+    pub fn add(&mut self, cells: &[i16], pool: &rayon::ThreadPool) {
+        let given = cells.len() / self.columns.max(1);
+        let last = self.done + given == self.rows;
+        let own = if last { given } else { given.saturating_sub(1) };
+        let tall = self.rows >= BOX;
+        // Bands of one box's height, summed in their order: the result does not depend on threads.
+        let bands: Vec<Band> = pool.install(|| {
+            let tops: Vec<usize> = (0..own).step_by(BOX).collect();
+            tops.into_par_iter()
+                .map(|top| band(cells, [self.columns, given], top..(top + BOX).min(own), tall))
+                .collect()
+        });
+        self.bands.extend(bands);
+        self.done += own;
+    }
+
+    /// The texture of all rows.
+    #[must_use]
+    pub fn total(&self) -> Texture {
+        let Self { columns, rows, ref bands, .. } = *self;
+        if rows == 0 {
+            return Texture::plain();
+        }
+        let cells = (rows * columns) as f64;
+        let mut all: Vec<(i16, usize)> = Vec::new();
+        for (label, number) in bands.iter().flat_map(|b| &b.counts) {
+            count(&mut all, *label, *number);
+        }
+        let pairs = rows * (columns - 1) + columns * (rows - 1);
+        let same: usize = bands.iter().map(|b| b.same).sum();
+        let boxes: usize = bands.iter().map(|b| b.boxes).sum();
+        let mixed: Vec<f64> = bands.iter().flat_map(|b| &b.mixed).copied().collect();
+        // The sum of nothing is -0.
+        let (sum, number) = (0.0 + mixed.iter().sum::<f64>(), mixed.len() as f64);
+        let mean = if mixed.is_empty() { 0.0 } else { sum / number };
+        let spread = mixed.iter().map(|s| (s - mean).powi(2)).sum::<f64>();
+        let several = mixed.len() > 1;
+        Texture {
+            basin_entropy: sum / boxes.max(1) as f64,
+            boundary_basin_entropy: mean,
+            boundary_stderr: if several {
+                (spread / (number - 1.0) / number).sqrt()
+            } else {
+                f64::INFINITY
+            },
+            boxes,
+            boundary_boxes: mixed.len(),
+            neighbours_agree: same as f64 / pairs.max(1) as f64,
+            chance: all.iter().map(|(_, c)| (*c as f64 / cells).powi(2)).sum(),
+        }
     }
 }
 
 /// The contribution of a row of boxes.
+#[derive(Debug)]
 struct Band {
     /// Entropies of the boxes that hold more than one label.
     mixed: Vec<f64>,
@@ -107,9 +152,10 @@ struct Band {
     counts: Vec<(i16, usize)>,
 }
 
-fn band(cells: &[i16], columns: usize, rows: usize, top: usize) -> Band {
-    let bottom = (top + BOX).min(rows);
-    let whole = bottom - top == BOX.min(rows);
+/// The boxes in these rows of `cells`; `tall` tells whether the plane has a whole box's height.
+fn band(cells: &[i16], [columns, rows]: [usize; 2], within: Range<usize>, tall: bool) -> Band {
+    let Range { start: top, end: bottom } = within;
+    let whole = bottom - top == BOX || !tall;
     let mut band = Band { mixed: Vec::new(), boxes: 0, same: 0, counts: Vec::new() };
     let mut counts: Vec<(i16, usize)> = Vec::new();
     for left in (0..columns).step_by(BOX) {

@@ -72,27 +72,46 @@ pub fn bifurcation(
     request: &Request,
     control: &Control,
 ) -> Result<Diagram, Error> {
-    // A plane of one row: any parameter serves as the constant one.
-    let other = if request.axis.index == PHASE { 0 } else { PHASE };
-    let value = base.parameters()[other].1;
-    let axes = [request.axis.clone(), Range { index: other, values: vec![value] }];
-    let asked = MapRequest {
-        axes,
-        starts: request.starts.clone(),
-        each: request.each,
-        tol: request.tol,
-        bound: request.bound,
-        kept: KEPT,
-        threads: request.threads,
-    };
+    let asked = request.of_map(base);
     let map = parameter_map(base, &asked, control)?;
     let plane = Plane { base, axes: &asked.axes };
+    pool(request.threads)?.install(|| followed(map, &plane, request.first, control))
+}
+
+impl Request {
+    /// The request of the map: a plane of one row.
+    #[must_use]
+    pub fn of_map(&self, base: &Pendulum) -> MapRequest {
+        // Any parameter serves as the constant one.
+        let other = if self.axis.index == PHASE { 0 } else { PHASE };
+        let value = base.parameters()[other].1;
+        MapRequest {
+            axes: [self.axis.clone(), Range { index: other, values: vec![value] }],
+            starts: self.starts.clone(),
+            each: self.each,
+            tol: self.tol,
+            bound: self.bound,
+            kept: KEPT,
+            threads: self.threads,
+        }
+    }
+}
+
+/// The diagram of a map of one row, followed on the threads of the current pool; see [`Request`].
+///
+/// # Errors
+/// [`Error::Interrupted`] if `control` was cancelled.
+pub fn followed(
+    map: ParameterMap,
+    plane: &Plane,
+    first: Option<State>,
+    control: &Control,
+) -> Result<Diagram, Error> {
     let offset = offsets(&map.cells);
-    let sweep = |order: Vec<usize>| follow(&map, &plane, &offset, order, request.first, control);
+    let sweep = |order: Vec<usize>| follow(&map, plane, &offset, order, first, control);
     let count = map.cells.len();
-    let (up, down) = pool(request.threads)?.install(|| {
-        rayon::join(|| sweep((0..count).collect()), || sweep((0..count).rev().collect()))
-    });
+    let (up, down) =
+        rayon::join(|| sweep((0..count).collect()), || sweep((0..count).rev().collect()));
     Ok(Diagram { up: up?, down: down?, map })
 }
 

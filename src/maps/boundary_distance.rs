@@ -1,6 +1,42 @@
 //! Distances of a map's cells from the nearest change of label.
 
-use super::starts::Axis;
+/// Largest number of cells whose distances are computed: their memory is 12 bytes each.
+const MOST_CELLS: usize = 1 << 24;
+
+/// The labels of every `k`-th cell of every `k`-th row of a map, `k` so large that there are at most
+/// 2^24: all cells of a map up to 4096 x 4096.
+#[derive(Debug)]
+pub struct Thinned {
+    /// Labels, rows of `columns`.
+    pub labels: Vec<i16>,
+    /// Number of columns.
+    pub columns: usize,
+}
+
+impl Thinned {
+    /// The labels of a map in rows of `columns` cells.
+    #[must_use]
+    pub fn new(cells: &[i16], columns: usize) -> Self {
+        let rows = cells.len() / columns;
+        let mut thin = Self { labels: Vec::new(), columns: Self::picks(columns, rows, 0).len() };
+        for row in Self::picks(rows, columns, 0) {
+            thin.labels.extend(Self::picks(columns, rows, row * columns).map(|k| cells[k]));
+        }
+        thin
+    }
+
+    /// Indices, from `first` on, of the cells of a side of `count` cells that are kept; the map's other
+    /// side has `others`.
+    #[must_use]
+    pub fn picks(
+        count: usize,
+        others: usize,
+        first: usize,
+    ) -> impl ExactSizeIterator<Item = usize> {
+        let k = (((count * others) as f64 / MOST_CELLS as f64).sqrt().ceil() as usize).max(1);
+        (0..count / k).map(move |i| first + i * k + k / 2)
+    }
+}
 
 /// Cells of a map, nearest to a change of label first.
 #[derive(Debug)]
@@ -13,11 +49,13 @@ pub struct Nearness {
 }
 
 impl Nearness {
-    /// Sorts the cells with these labels, rows of `columns`.
+    /// Sorts the cells of a map.
     ///
     /// A cell with another label next to it, or at the edge of the map, has the distance 0.
     #[must_use]
-    pub fn new(labels: &[i16], columns: usize) -> Self {
+    pub fn new(map: &Thinned) -> Self {
+        let Thinned { labels, columns } = map;
+        let columns = *columns;
         let rows = labels.len() / columns;
         let changes = |k: usize| {
             let (i, j) = (k % columns, k / columns);
@@ -68,9 +106,9 @@ impl Nearness {
 
     /// A point in the cell of rank `rank`, in sides of the window; `part` is that in the cell.
     #[must_use]
-    pub fn place(&self, rank: usize, part: [f64; 2], window: [&Axis; 2]) -> [f64; 2] {
+    pub fn place(&self, rank: usize, part: [f64; 2]) -> [f64; 2] {
         let cell = self.order[rank] as usize;
-        let [columns, rows] = window.map(|axis| axis.count as f64);
+        let [columns, rows] = [self.columns, self.order.len() / self.columns].map(|n| n as f64);
         let (i, j) = ((cell % self.columns) as f64, (cell / self.columns) as f64);
         [(i + part[0]) / columns, (j + part[1]) / rows]
     }

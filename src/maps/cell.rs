@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
+use serde::{Deserialize, Serialize};
+
 use super::bounds::cell_periods;
 use crate::attractor::chaos::spread;
 use crate::attractor::rest::balances;
@@ -23,7 +25,7 @@ const MOST_HINTS: usize = 16;
 pub const HINTED: usize = 4;
 
 /// An attractor of a cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Found {
     /// The attractor.
     pub attractor: Attractor,
@@ -32,7 +34,7 @@ pub struct Found {
 }
 
 /// The attractors of one pendulum.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Cell {
     /// Its attractors.
     pub found: Vec<Found>,

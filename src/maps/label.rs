@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicI16, AtomicI32, AtomicUsize, Ordering};
 
 use super::control::Control;
+use super::finite_time::FiniteTime;
 use super::starts::Starts;
 use crate::attractor::Catalogue;
 use crate::attractor::capture::{self, Fate, Outcome, Source};
@@ -36,6 +37,43 @@ pub struct Labels {
     pub open: Vec<(usize, State)>,
     /// Total number of integrated periods.
     pub work: u64,
+}
+
+impl Labels {
+    /// The labels of a plane without basins: all chaotic, or all undecided.
+    pub(super) fn unlabelled(layers: &FiniteTime, chaotic: bool, periods: u32) -> Self {
+        let count = layers.turns.len();
+        let label = layers
+            .exponent
+            .iter()
+            .map(|e| if e.is_finite() { i16::from(chaotic) } else { FAILED })
+            .collect();
+        Self {
+            label,
+            settle: vec![NEVER; count],
+            turns: layers.turns.clone(),
+            open: Vec::new(),
+            work: count as u64 * u64::from(periods),
+        }
+    }
+
+    /// Replaces each label `k + 1` by entry `k` of `moved`.
+    pub(super) fn rename(&mut self, moved: &[i16]) {
+        for label in self.label.iter_mut().filter(|l| **l > UNDECIDED) {
+            *label = moved[*label as usize - 1];
+        }
+    }
+
+    /// Puts the results for `picks` in their places.
+    pub(super) fn replace(&mut self, picks: &[usize], again: Self) {
+        for (k, index) in picks.iter().enumerate() {
+            self.label[*index] = again.label[k];
+            self.settle[*index] = again.settle[k];
+            self.turns[*index] = again.turns[k];
+        }
+        self.open = again.open.into_iter().map(|(k, s)| (picks[k], s)).collect();
+        self.work += again.work;
+    }
 }
 
 struct Shared<'a> {

@@ -5,7 +5,7 @@
 //! spread. A chaotic transient has a positive exponent too: the result is that of the attractor
 //! that captures it.
 
-use super::basins::SEARCH_SAMPLE;
+use super::basin_plan::SEARCH_SAMPLE;
 use super::bounds::{chaos_periods, max_periods, search_periods};
 use super::control::{Control, pool};
 use super::ensemble::{Ensemble, NEAR, ROUND, Run};

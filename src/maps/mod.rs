@@ -1,16 +1,16 @@
 //! Results over whole planes, on all threads.
 //!
 //! - [`starts`]: the grid or list of initial conditions
-//! - [`basins`]: basins of attraction; [`label`]: the attractor that captures each start
+//! - [`basins`]: basins of attraction; [`basin_plan`]: what their starts share; [`label`]: the attractor that captures each start
 //! - [`finite_time`]: turns and exponents over a fixed time
-//! - [`basin_entropy`], [`uncertainty`]: fractality of basins, with distances from `boundary_distance`
+//! - [`basin_entropy`], [`uncertainty`]: fractality of basins, with distances from [`boundary_distance`]
 //! - [`reliability`]: the part of labels that half the step or mirroring changes
 //! - [`lyapunov`]: the largest exponent of the attractor that a start reaches; [`ensemble`], [`tangent_growth`]:
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
 //!   Newton's method
-//! - [`parameter_map`]: the attractors over a plane of two parameters; [`cell`], [`resolution`]: one pendulum of
-//!   it, and its step length
+//! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
+//!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
 //! - [`tongues`]: critical amplitudes of the stability of rest, by `chebyshev`; `continuation`:
 //!   under a torque
@@ -20,9 +20,10 @@
 
 pub mod advance;
 pub mod basin_entropy;
+pub mod basin_plan;
 pub mod basins;
 pub mod bifurcation;
-mod boundary_distance;
+pub mod boundary_distance;
 pub mod bounds;
 pub mod cell;
 mod chebyshev;
@@ -38,6 +39,7 @@ pub mod parameter_map;
 pub mod reliability;
 pub mod resolution;
 pub mod starts;
+pub mod survey;
 pub mod tangent_growth;
 pub mod tongues;
 pub mod uncertainty;

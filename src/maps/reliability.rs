@@ -1,9 +1,9 @@
 //! Reliability of labels: the shares that half the step, or mirroring, changes.
 
+use super::basin_plan::Plan;
 use super::control::Control;
-use super::label::{Labels, label};
+use super::label::label;
 use super::starts::Starts;
-use crate::attractor::Catalogue;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::symmetry::Mirror;
@@ -24,31 +24,35 @@ pub struct Reliability {
     pub sampled: usize,
 }
 
+/// Indices of the starts that are labelled again.
+#[must_use]
+pub fn sample(starts: &Starts, seed: u64) -> Vec<usize> {
+    starts.sample(SAMPLE, seed.wrapping_add(1))
+}
+
 /// Labels a sample of the starts again with half the step, and from the mirrored start.
 ///
 /// The arithmetic of the kernel is odd in the state, bit for bit, so a mirrored start would repeat
 /// every rounding error; it is shifted by one unit in the last place, like the result of any other
 /// arithmetic.
 ///
+/// `own` are the labels of [`sample`].
+///
 /// # Errors
 /// [`Error::Interrupted`] if `control` was cancelled.
-#[allow(clippy::too_many_arguments)] // the parts of a map
 pub fn reliability(
-    strobe: &Strobe,
-    catalogue: &Catalogue,
+    plan: &Plan,
     starts: &Starts,
-    labels: &Labels,
-    bound: u32,
+    own: &[i16],
     seed: u64,
     pool: &rayon::ThreadPool,
     control: &Control,
 ) -> Result<Reliability, Error> {
-    let picks = starts.sample(SAMPLE, seed.wrapping_add(1));
-    let states: Vec<State> = picks.iter().map(|i| starts.get(*i)).collect();
+    let Plan { strobe, catalogue, facts } = plan;
+    let states: Vec<State> = sample(starts, seed).iter().map(|i| starts.get(*i)).collect();
     let again = |strobe: &Strobe, states: Vec<State>| {
-        label(strobe, catalogue, &Starts::List(states), None, bound, pool, control)
+        label(strobe, catalogue, &Starts::List(states), None, facts.bound, pool, control)
     };
-    let own: Vec<i16> = picks.iter().map(|i| labels.label[*i]).collect();
     let halved = again(&strobe.refined(2), states.clone())?.label;
     let mirrored = if let Some(mirror) = Mirror::of(&strobe.pendulum) {
         let image = |s: &State| mirror.image(*s).map(f64::next_up);

@@ -1,5 +1,7 @@
 //! Step lengths over a plane of parameters.
 
+use serde::{Deserialize, Serialize};
+
 use super::parameter_map::Plane;
 use crate::error::Error;
 use crate::integrate::accuracy::{choose, error_reached};
@@ -11,7 +13,7 @@ use crate::model::Pendulum;
 const MEASURED: usize = 9;
 
 /// The step length times the root of the greatest load, by cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Resolution {
     columns: Vec<usize>,
     rows: Vec<usize>,
@@ -67,6 +69,15 @@ impl Resolution {
             }
         }
         Ok(all)
+    }
+
+    /// This one on another instruction set, if it was measured on this plane.
+    #[must_use]
+    pub fn restored(self, plane: &Plane, simd: InstructionSet) -> Option<Self> {
+        let places = [&self.columns, &self.rows];
+        let own = places.into_iter().zip(plane.size()).all(|(own, size)| *own == spread(size));
+        (own && self.step.len() == self.columns.len() * self.rows.len())
+            .then_some(Self { simd, ..self })
     }
 
     /// The stroboscopic map of the cell at this column and row.

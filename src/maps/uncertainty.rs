@@ -2,7 +2,7 @@
 
 use std::f64::consts::{LN_2, TAU};
 
-use super::boundary_distance::Nearness;
+use super::boundary_distance::{Nearness, Thinned};
 use super::label::UNDECIDED;
 use super::starts::Axis;
 use crate::error::Error;
@@ -55,8 +55,8 @@ pub struct Uncertainty {
     pub tried: Vec<u64>,
 }
 
-/// The shares of uncertain starts in a window of angle and velocity whose map has the labels `map`;
-/// `label` labels starts.
+/// The shares of uncertain starts in a window of angle and velocity with this map; `label` labels
+/// starts.
 ///
 /// A pilot determines the distances at which enough starts are uncertain, and the number of starts
 /// that each needs; it is not included in the counts. Empty if it meets no boundary.
@@ -65,11 +65,11 @@ pub struct Uncertainty {
 /// Errors of `label`.
 pub fn uncertainty(
     window: [&Axis; 2],
-    map: &[i16],
+    map: &Thinned,
     seed: u64,
     mut label: impl FnMut(Vec<State>) -> Result<Vec<i16>, Error>,
 ) -> Result<Uncertainty, Error> {
-    let near = Nearness::new(map, window[0].count);
+    let near = Nearness::new(map);
     let mut draw = Draw { state: seed };
     let mut counted = |plan: &[(i32, usize)], part: f64| -> Result<Vec<Counts>, Error> {
         let mut states = Vec::new();
@@ -82,7 +82,7 @@ pub fn uncertainty(
                     let rank = stratum.first + (draw.next() * stratum.cells as f64) as usize;
                     let last = stratum.first + stratum.cells - 1;
                     let part = [draw.next(), draw.next()];
-                    let at = near.place(rank.min(last), part, window);
+                    let at = near.place(rank.min(last), part);
                     states.extend(draw.around(window, at, eps));
                 }
             }
@@ -100,7 +100,7 @@ pub fn uncertainty(
         }
         Ok(counts)
     };
-    let labels = (LABELS[1] * map.len() as f64).clamp(LABELS[0], LABELS[2]);
+    let labels = (LABELS[1] * map.labels.len() as f64).clamp(LABELS[0], LABELS[2]);
     let mut planned = |widest: i32| -> Result<(Vec<(i32, usize)>, f64), Error> {
         let pilot: Vec<(i32, usize)> =
             (SCALES[1]..=widest).rev().step_by(2).map(|scale| (scale, PILOT)).collect();

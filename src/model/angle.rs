@@ -2,11 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use serde::{Deserialize, Serialize};
+
 use crate::lanes::Lane;
 use crate::lanes::sine;
 
 /// The circle, where a turn makes no difference, or the line, where an effect counts turns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Angle {
     /// Angles in [-pi, pi].
     #[default]

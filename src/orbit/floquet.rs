@@ -1,12 +1,13 @@
 //! Floquet multipliers of a periodic orbit.
 
 use nalgebra::{Complex, Matrix2};
+use serde::{Deserialize, Serialize};
 
 /// The eigenvalues of the derivative of `P^n`, the larger first.
 ///
 /// Their product is `exp(-gamma n T)` whatever the orbit, since damping alone shrinks phase area; with
 /// friction times the ratios of the accelerations after and before each turn, and 0 after a stick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Multipliers(pub [Complex<f64>; 2]);
 
 impl Multipliers {

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
 
 use super::floquet::{Multipliers, multipliers};
 use super::poincare::PoincareMap;
@@ -22,7 +23,7 @@ const PROMISING: usize = 5;
 const SAME_POINT: f64 = 1e-8;
 
 /// A periodic orbit of the stroboscopic map.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PeriodicOrbit {
     /// Smallest period, in forcing periods, modulo a turn.
     pub n: usize,

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Matrix2;
+use serde::{Deserialize, Serialize};
 
 use crate::integrate::State;
 use crate::integrate::kernel::general::{Own, Running, STEP as ALL_STAGES, Stages, Stepping};
@@ -22,7 +23,7 @@ const RESIDUAL: f64 = 1e-12;
 const FASTEST: f64 = 200.0;
 
 /// A rotation of the undriven pendulum: the velocity repeats after one turn.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Rotation {
     /// Velocity at the hanging position (`theta = 0`).
     pub velocity: f64,

@@ -13,6 +13,7 @@ mod model;
 mod motion;
 mod orbits;
 mod parameter_maps;
+mod surveys;
 mod tongues;
 
 use pendmap::error::Error;
@@ -100,13 +101,14 @@ mod _core {
         exponents::{Ensemble, Lyapunov, growth, lyapunov},
         fit::{Fit, FitPoint, FittedRun, WindowRows, fit_rows, fit_runs, replay},
         library::{effects, formula, roles},
-        maps::{BasinMap, Texture, basins_grid, basins_list, texture},
+        maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
         motion::{Trajectory, acceleration, advance, choose_steps, simulate},
         orbits::{Orbit, OrbitSearch, orbits},
         parameter_maps::{
             Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,
         },
         period, reckon, simd, simd_available,
+        surveys::Survey,
         tongues::{CriticalAmplitudes, tongues},
     };
 

@@ -2,17 +2,25 @@
 
 use numpy::PyReadonlyArray1;
 use pendmap::error::Error;
-use pendmap::maps::basin_entropy::{Texture as Entropies, of_cells};
-use pendmap::maps::basins::{BasinMap as Found, Labelling, Options, basins};
+use pendmap::maps::basin_entropy::{Texture as Entropies, TextureSum as Sum};
+use pendmap::maps::basin_plan::{Labelling, Options, Plan};
+use pendmap::maps::basins::LEAST_CELLS;
+use pendmap::maps::boundary_distance::Thinned;
+use pendmap::maps::bounds::chaos_periods;
 use pendmap::maps::control::pool;
+use pendmap::maps::finite_time::FiniteTime;
+use pendmap::maps::label::Labels;
+use pendmap::maps::reliability::{reliability, sample};
 use pendmap::maps::starts::{Axis, Starts};
-use pendmap::maps::uncertainty::Uncertainty;
+use pendmap::maps::uncertainty::{Uncertainty as Uncertain, uncertainty};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use super::convert::{Array, Attractor, array, states};
 use super::long_calls::watched;
 use super::model::Model;
-use super::{raise, reckon};
+use super::raise;
 
 /// `(low, high, count)` as Python passes it.
 pub type AxisTuple = (f64, f64, usize);
@@ -69,133 +77,326 @@ impl Texture {
     }
 }
 
-/// Basins of attraction; arrays have one entry for each start.
+#[pymethods]
+impl Texture {
+    /// The values of a list of starts, which have no neighbours; without labels, those of a plane
+    /// without basins.
+    #[staticmethod]
+    fn without_cells(labelled: bool) -> Self {
+        Self::new(&if labelled { Entropies::of_list() } else { Entropies::plain() })
+    }
+}
+
+/// Starts of a basin map as Python passes them: the axes of a grid, or angles and velocities.
+#[derive(FromPyObject)]
+pub enum GivenStarts<'py> {
+    Grid((AxisTuple, AxisTuple)),
+    List((PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>)),
+}
+
+impl GivenStarts<'_> {
+    fn starts(self) -> PyResult<Starts> {
+        match self {
+            Self::Grid((theta, velocity)) => {
+                let [theta, velocity] = axes(theta, velocity)?;
+                Ok(Starts::Grid { theta, velocity })
+            }
+            Self::List((theta, velocity)) => {
+                let states = states(&theta, &velocity)?;
+                if let Some(value) = states.iter().flatten().find(|x| !x.is_finite()) {
+                    let allowed = "a finite number";
+                    return Err(raise(Error::Range { name: "start", value: *value, allowed }));
+                }
+                Ok(Starts::List(states))
+            }
+        }
+    }
+}
+
+/// What the starts of a basin map share: step length, attractors and bounds.
+#[pyclass(module = "pendmap._core")]
+pub struct BasinPlan {
+    plan: Plan,
+    starts: Starts,
+    seed: u64,
+    threads: usize,
+}
+
+/// Labels of some starts; arrays have one entry for each.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
-pub struct BasinMap {
-    attractors: Vec<Py<Attractor>>,
-    /// Shares of the starts that are undecided, and that failed.
-    undecided: f64,
-    failed: f64,
-    mean_periods: f64,
-    /// `basins`, `conservative` or `only_chaos`.
-    plane: &'static str,
-    chaos_bound: u32,
-    searched_starts: usize,
-    layer_periods: u32,
-    bound: u32,
-    steps_per_period: usize,
-    reached_error: f64,
-    simd: &'static str,
-    texture: Py<Texture>,
-    uncertainty_eps: Array<f64>,
-    uncertain: Array<u64>,
-    uncertainty_tried: Array<u64>,
-    unreliable: f64,
-    unreliable_half_step: f64,
-    unreliable_mirror: Option<f64>,
-    labels_sampled: usize,
+pub struct LabelledStarts {
     label: Array<i16>,
     settle: Array<i32>,
     turns: Array<i32>,
     finite_time_exponent: Option<Array<f32>>,
+    /// Number of periods integrated.
+    work: u64,
+    /// States of the undecided starts at the bound.
+    open_theta: Array<f64>,
+    open_velocity: Array<f64>,
 }
 
-impl BasinMap {
-    fn new(py: Python<'_>, map: Found) -> PyResult<Self> {
-        let each = map.attractors.iter().zip(&map.fractions);
-        let attractors = each.map(|(one, fraction)| Py::new(py, Attractor::new(one, *fraction)));
-        let Uncertainty { eps, uncertain, tried } = map.uncertainty.clone().unwrap_or_default();
-        Ok(Self {
-            attractors: attractors.collect::<PyResult<_>>()?,
-            undecided: if map.labelling == Labelling::Conservative { 1.0 } else { map.share(0) },
-            failed: map.share(-1),
-            mean_periods: map.mean_periods(),
-            plane: match map.labelling {
-                Labelling::Basins => "basins",
-                Labelling::Conservative => "conservative",
-                Labelling::OnlyChaos => "only_chaos",
-            },
-            chaos_bound: map.chaos_bound,
-            searched_starts: map.searched,
-            layer_periods: map.layer_periods,
-            bound: map.bound,
-            steps_per_period: map.steps,
-            reached_error: map.reached_error,
-            simd: map.simd.name(),
-            texture: Py::new(py, Texture::new(&map.texture))?,
-            uncertainty_eps: array(py, eps),
-            uncertain: array(py, uncertain),
-            uncertainty_tried: array(py, tried),
-            unreliable: map.reliability.either,
-            unreliable_half_step: map.reliability.half_step,
-            unreliable_mirror: map.reliability.mirror,
-            labels_sampled: map.reliability.sampled,
-            label: array(py, map.labels.label),
-            settle: array(py, map.labels.settle),
-            turns: array(py, map.labels.turns),
-            finite_time_exponent: map.layers.map(|layers| array(py, layers.exponent)),
+impl LabelledStarts {
+    fn new(py: Python<'_>, labels: Labels, layers: Option<FiniteTime>) -> Self {
+        let open = |k: usize| array(py, labels.open.iter().map(|(_, state)| state[k]).collect());
+        Self {
+            open_theta: open(0),
+            open_velocity: open(1),
+            label: array(py, labels.label),
+            settle: array(py, labels.settle),
+            turns: array(py, labels.turns),
+            finite_time_exponent: layers.map(|layers| array(py, layers.exponent)),
+            work: labels.work,
+        }
+    }
+}
+
+/// Shares of sampled labels that half the step or mirroring changes.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Reliability {
+    unreliable: f64,
+    unreliable_half_step: f64,
+    unreliable_mirror: Option<f64>,
+    labels_sampled: usize,
+}
+
+/// Starts whose label changes nearby.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct Uncertainty {
+    eps: Array<f64>,
+    uncertain: Array<u64>,
+    tried: Array<u64>,
+}
+
+#[pymethods]
+impl BasinPlan {
+    /// Searches for the attractors; `state` restores the plan that another process has made.
+    #[new]
+    #[pyo3(signature = (model, starts, choices, state=None, progress=None))]
+    fn new(
+        py: Python<'_>,
+        model: Model,
+        starts: GivenStarts<'_>,
+        choices: Choices,
+        state: Option<&[u8]>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let (pendulum, starts) = (model.pendulum()?, starts.starts()?);
+        let options = Options::from(choices);
+        let plan = match state {
+            Some(bytes) => Plan::restored(&pendulum, bytes).map_err(raise)?,
+            None => watched(py, progress.as_ref(), |control| {
+                Plan::new(&pendulum, &starts, &options, control)
+            })?,
+        };
+        Ok(Self { plan, starts, seed: options.seed, threads: options.threads })
+    }
+
+    /// The plan as bytes.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.plan.stored().map_err(raise)?))
+    }
+
+    /// `basins`, `conservative` or `only_chaos`.
+    #[getter]
+    fn plane(&self) -> &'static str {
+        match self.plan.facts.labelling {
+            Labelling::Basins => "basins",
+            Labelling::Conservative => "conservative",
+            Labelling::OnlyChaos => "only_chaos",
+        }
+    }
+
+    #[getter]
+    fn layer_periods(&self) -> u32 {
+        if self.labelled() { 0 } else { self.plan.facts.bound }
+    }
+
+    #[getter]
+    fn bound(&self) -> u32 {
+        self.plan.facts.bound
+    }
+
+    #[getter]
+    fn chaos_bound(&self) -> u32 {
+        chaos_periods(&self.plan.strobe.pendulum)
+    }
+
+    #[getter]
+    fn searched_starts(&self) -> usize {
+        self.plan.facts.searched
+    }
+
+    #[getter]
+    fn steps_per_period(&self) -> usize {
+        self.plan.facts.steps
+    }
+
+    #[getter]
+    fn reached_error(&self) -> f64 {
+        self.plan.facts.reached_error
+    }
+
+    #[getter]
+    fn simd(&self) -> &'static str {
+        self.plan.strobe.simd.name()
+    }
+
+    /// Labels the starts from the index `first` to before `last`.
+    #[pyo3(signature = (first, last, progress=None))]
+    fn label(
+        &self,
+        py: Python<'_>,
+        first: usize,
+        last: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<LabelledStarts> {
+        if first > last || last > self.starts.len() {
+            return Err(PyIndexError::new_err("starts beyond the last one"));
+        }
+        let (labels, layers) = watched(py, progress.as_ref(), |control| {
+            let states = (first..last).map(|i| self.starts.get(i)).collect();
+            self.plan.cells(&Starts::List(states), &pool(self.threads)?, control)
+        })?;
+        Ok(LabelledStarts::new(py, labels, layers))
+    }
+
+    /// Labels the starts with these indices again.
+    #[pyo3(signature = (picks, progress=None))]
+    fn label_again(
+        &self,
+        py: Python<'_>,
+        picks: PyReadonlyArray1<'_, i64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<LabelledStarts> {
+        let picks: Vec<usize> = picks.as_slice()?.iter().map(|k| *k as usize).collect();
+        if picks.iter().any(|k| *k >= self.starts.len()) {
+            return Err(PyIndexError::new_err("starts beyond the last one"));
+        }
+        let labels = watched(py, progress.as_ref(), |control| {
+            self.plan.label(&self.starts, Some(&picks), &pool(self.threads)?, control)
+        })?;
+        Ok(LabelledStarts::new(py, labels, None))
+    }
+
+    /// Searches from states of open trajectories; None if labels are final, else the new label of
+    /// what has been labelled k + 1 before.
+    fn further(
+        &mut self,
+        py: Python<'_>,
+        theta: PyReadonlyArray1<'_, f64>,
+        velocity: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Option<Array<i16>>> {
+        let states = states(&theta, &velocity)?;
+        let plan = &mut self.plan;
+        let moved = watched(py, None, |control| plan.further(&states, control))?;
+        Ok(moved.map(|moved| array(py, moved)))
+    }
+
+    /// Indices of the starts whose labels are checked.
+    fn checked_starts(&self, py: Python<'_>) -> Array<i64> {
+        array(py, sample(&self.starts, self.seed).into_iter().map(|k| k as i64).collect())
+    }
+
+    /// Whether labels are reliable, from those of `checked_starts`.
+    fn reliability(
+        &self,
+        py: Python<'_>,
+        labels: PyReadonlyArray1<'_, i16>,
+    ) -> PyResult<Reliability> {
+        let own = labels.as_slice()?.to_vec();
+        let found = watched(py, None, |control| {
+            reliability(&self.plan, &self.starts, &own, self.seed, &pool(self.threads)?, control)
+        })?;
+        Ok(Reliability {
+            unreliable: found.either,
+            unreliable_half_step: found.half_step,
+            unreliable_mirror: found.mirror,
+            labels_sampled: found.sampled,
         })
     }
-}
 
-/// Basins over a grid.
-#[pyfunction]
-#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
-pub fn basins_grid(
-    py: Python<'_>,
-    model: Model,
-    theta: AxisTuple,
-    velocity: AxisTuple,
-    choices: Choices,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<BasinMap> {
-    let [theta, velocity] = axes(theta, velocity)?;
-    run(py, model, Starts::Grid { theta, velocity }, choices, progress)
-}
-
-/// Basins of a list of starts.
-#[pyfunction]
-#[pyo3(signature = (model, theta, velocity, choices, progress=None))]
-pub fn basins_list(
-    py: Python<'_>,
-    model: Model,
-    theta: PyReadonlyArray1<'_, f64>,
-    velocity: PyReadonlyArray1<'_, f64>,
-    choices: Choices,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<BasinMap> {
-    let states = states(&theta, &velocity)?;
-    if let Some(value) = states.iter().flatten().find(|x| !x.is_finite()) {
-        let allowed = "a finite number";
-        return Err(raise(Error::Range { name: "start", value: *value, allowed }));
+    /// Starts whose label changes nearby, from the labels of a thinned grid in rows of `columns`.
+    fn uncertainty(
+        &self,
+        py: Python<'_>,
+        labels: PyReadonlyArray1<'_, i16>,
+        columns: usize,
+    ) -> PyResult<Option<Uncertainty>> {
+        let Starts::Grid { theta, velocity } = &self.starts else { return Ok(None) };
+        if self.starts.len() < LEAST_CELLS {
+            return Ok(None);
+        }
+        let thinned = Thinned { labels: labels.as_slice()?.to_vec(), columns };
+        let Uncertain { eps, uncertain, tried } = watched(py, None, |control| {
+            let pool = pool(self.threads)?;
+            uncertainty([theta, velocity], &thinned, self.seed, |states| {
+                Ok(self.plan.label(&Starts::List(states), None, &pool, control)?.label)
+            })
+        })?;
+        let [uncertain, tried] = [uncertain, tried].map(|counts| array(py, counts));
+        Ok(Some(Uncertainty { eps: array(py, eps), uncertain, tried }))
     }
-    // Angle and velocity, and all that a map and its dataset have of a start.
-    reckon("starts", states.len(), 100)?;
-    run(py, model, Starts::List(states), choices, progress)
+
+    /// The attractors with the number of starts that end on each, after sets at rest that no start
+    /// reaches are left out; with the new label of what has been labelled k + 1 before.
+    fn finish(
+        &mut self,
+        py: Python<'_>,
+        counts: PyReadonlyArray1<'_, i64>,
+    ) -> PyResult<(Vec<Py<Attractor>>, Array<i16>)> {
+        let counts = counts.as_slice()?.to_vec();
+        let count = |label: i16| counts.get(label as usize - 1).copied().unwrap_or(0);
+        let moved = self.plan.drop_unreached_rests(|label| count(label) > 0);
+        let all = self.starts.len().max(1) as f64;
+        let mut fractions = vec![0.0; self.plan.catalogue.attractors.len()];
+        for (label, now) in (1..).zip(&moved) {
+            if let Some(fraction) = fractions.get_mut((*now as usize).wrapping_sub(1)) {
+                *fraction += count(label) as f64 / all;
+            }
+        }
+        let each = self.plan.catalogue.attractors.iter().zip(fractions);
+        let attractors = each.map(|(one, fraction)| Py::new(py, Attractor::new(one, fraction)));
+        Ok((attractors.collect::<PyResult<_>>()?, array(py, moved)))
+    }
 }
 
-/// The texture of labels in rows of `columns` cells.
+impl BasinPlan {
+    fn labelled(&self) -> bool {
+        self.plan.facts.labelling == Labelling::Basins
+    }
+}
+
+/// The texture of a plane whose rows come in parts.
+#[pyclass(module = "pendmap._core")]
+pub struct TextureSum(Sum);
+
+#[pymethods]
+impl TextureSum {
+    #[new]
+    fn new(columns: usize, rows: usize) -> Self {
+        Self(Sum::new(columns, rows))
+    }
+
+    /// Adds the labels of the next rows, and of the row after them unless it is beyond the last.
+    fn add(&mut self, py: Python<'_>, labels: PyReadonlyArray1<'_, i16>) -> PyResult<()> {
+        let cells = labels.as_slice()?.to_vec();
+        let sum = &mut self.0;
+        watched(py, None, |_| {
+            sum.add(&cells, &pool(0)?);
+            Ok(())
+        })
+    }
+
+    /// The texture of all rows.
+    fn total(&self) -> Texture {
+        Texture::new(&self.0.total())
+    }
+}
+
+/// The indices that a thinned map keeps along a side of `count` cells, the other side having `others`.
 #[pyfunction]
-pub fn texture(
-    py: Python<'_>,
-    labels: PyReadonlyArray1<'_, i16>,
-    columns: usize,
-) -> PyResult<Texture> {
-    let cells = labels.as_slice()?.to_vec();
-    let found = watched(py, None, |_| Ok(of_cells(&cells, columns, &pool(0)?)))?;
-    Ok(Texture::new(&found))
-}
-
-fn run(
-    py: Python<'_>,
-    model: Model,
-    starts: Starts,
-    choices: Choices,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<BasinMap> {
-    let pendulum = model.pendulum()?;
-    let options = Options::from(choices);
-    let map =
-        watched(py, progress.as_ref(), |control| basins(&pendulum, &starts, &options, control))?;
-    BasinMap::new(py, map)
+pub fn thinned(py: Python<'_>, count: usize, others: usize) -> Array<i64> {
+    array(py, Thinned::picks(count, others, 0).map(|k| k as i64).collect())
 }

@@ -15,7 +15,7 @@ use super::model::{Model, range};
 use super::raise;
 
 /// `(name of a parameter, values)`.
-type RangeTuple = (String, Vec<f64>);
+pub type RangeTuple = (String, Vec<f64>);
 
 /// The attractors over a plane of two parameters: arrays over all attractors of all cells, one cell after
 /// the other, and over cells.
@@ -65,7 +65,8 @@ pub struct Followed {
 }
 
 impl ParameterMap {
-    fn new(py: Python<'_>, map: &maps::ParameterMap) -> PyResult<Self> {
+    /// The arrays of a map.
+    pub fn new(py: Python<'_>, map: &maps::ParameterMap) -> PyResult<Self> {
         let cells = map.cells.iter();
         let each = cells.clone().enumerate();
         let all: Vec<(i32, &Found)> =
@@ -93,6 +94,25 @@ impl ParameterMap {
             searched_again: map.searched_again,
             simd: InstructionSet::choose().map_err(raise)?.name(),
         })
+    }
+}
+
+impl Bifurcation {
+    /// The arrays of a diagram.
+    pub fn of(py: Python<'_>, found: &diagram::Diagram) -> PyResult<Py<Self>> {
+        let all = found.map.cells.iter().flat_map(|cell| &cell.found).enumerate();
+        let points: Vec<(i32, State)> = all
+            .flat_map(|(i, f)| f.attractor.points.iter().map(move |point| (i as i32, *point)))
+            .collect();
+        let (point_entry, point_theta, point_velocity) = columns(py, &points);
+        let own = Self {
+            point_entry,
+            point_theta,
+            point_velocity,
+            up: Py::new(py, Followed::new(py, &found.up))?,
+            down: Py::new(py, Followed::new(py, &found.down))?,
+        };
+        Py::new(py, (own, ParameterMap::new(py, &found.map)?))
     }
 }
 
@@ -174,19 +194,7 @@ pub fn bifurcation(
     let found = watched(py, progress.as_ref(), |control| {
         diagram::bifurcation(&pendulum, &request, control)
     })?;
-    let all = found.map.cells.iter().flat_map(|cell| &cell.found).enumerate();
-    let points: Vec<(i32, State)> = all
-        .flat_map(|(i, f)| f.attractor.points.iter().map(move |point| (i as i32, *point)))
-        .collect();
-    let (point_entry, point_theta, point_velocity) = columns(py, &points);
-    let own = Bifurcation {
-        point_entry,
-        point_theta,
-        point_velocity,
-        up: Py::new(py, Followed::new(py, &found.up))?,
-        down: Py::new(py, Followed::new(py, &found.down))?,
-    };
-    Py::new(py, (own, ParameterMap::new(py, &found.map)?))
+    Bifurcation::of(py, &found)
 }
 
 /// Numbers, angles and velocities of points.

@@ -4,11 +4,10 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use nalgebra::Vector2;
 use pendmap::integrate::Strobe;
-use pendmap::maps::basin_entropy::texture;
+use pendmap::maps::basin_entropy::{TextureSum, texture};
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::{Control, pool};
 use pendmap::maps::finite_time::finite_time;
-use pendmap::maps::label::Labels;
 use pendmap::maps::starts::Starts;
 use pendmap::orbit::PoincareMap;
 
@@ -56,20 +55,11 @@ fn without_drive_and_damping_energy_decides_rotation() {
     }
 }
 
-fn labels_of(label: Vec<i16>) -> Labels {
-    let count = label.len();
-    Labels { label, settle: vec![0; count], turns: vec![0; count], open: Vec::new(), work: 0 }
-}
-
 #[test]
 fn texture_of_known_patterns() {
-    let starts = plane(20);
     let pattern = |f: &dyn Fn(usize, usize) -> i16| {
-        texture(
-            &labels_of((0..400).map(|i| f(i % 20, i / 20)).collect()),
-            &starts,
-            &pool(2).expect("a pool"),
-        )
+        let labels: Vec<i16> = (0..400).map(|i| f(i % 20, i / 20)).collect();
+        texture(&labels, 20, &pool(2).expect("a pool"))
     };
     let plain = pattern(&|_, _| 1);
     assert_eq!(
@@ -86,13 +76,22 @@ fn texture_of_known_patterns() {
     let (a, b) = (13.0_f64 / 25.0, 12.0_f64 / 25.0);
     assert!((chequers.basin_entropy + a * a.ln() + b * b.ln()).abs() < 1e-12);
     assert!(chequers.neighbours_agree.abs() < 1e-12 && (chequers.chance - 0.5).abs() < 1e-12);
-    // Stripes of four: every box has shares of 4, 4, 4, 4 of 20 and one label twice.
-    let list = texture(
-        &labels_of(vec![1, 2, 3]),
-        &Starts::List(spread(3, 1.0, 1.0)),
-        &pool(2).expect("a pool"),
-    );
-    assert!(list.neighbours_agree.abs() < 1e-12 && list.basin_entropy.abs() < 1e-12);
+}
+
+#[test]
+fn a_texture_in_parts_is_that_of_the_whole() {
+    let (columns, pool) = (23, pool(2).expect("a pool"));
+    for rows in [30, 31, 37, 4] {
+        let labels: Vec<i16> = (0..columns * rows).map(|k| (k * k % 7 % 3) as i16).collect();
+        let mut sum = TextureSum::new(columns, rows);
+        for first in (0..rows).step_by(10) {
+            // A part ends with the first row of the next one.
+            let last = (first + 11).min(rows);
+            sum.add(&labels[first * columns..last * columns], &pool);
+        }
+        let whole = texture(&labels, columns, &pool);
+        assert_eq!(format!("{:?}", sum.total()), format!("{whole:?}"), "{rows} rows");
+    }
 }
 
 #[test]

@@ -1,11 +1,14 @@
 //! Maps over parameters and bifurcation diagrams: against reference attractors and bifurcations.
 
+use std::collections::BTreeMap;
+
 use pendmap::attractor::Kind;
 use pendmap::integrate::State;
 use pendmap::maps::bifurcation::{self, Diagram, bifurcation};
 use pendmap::maps::cell::Cell;
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::{ParameterMap, Range, Request, parameter_map};
+use pendmap::maps::survey::{Block, Survey};
 use pendmap::model::Pendulum;
 
 use crate::support::{driven, plane};
@@ -23,6 +26,12 @@ fn starts(count: usize) -> Vec<State> {
     plane(1000).sampled_states(count, 1)
 }
 
+fn asked(p: Vec<f64>, omega: Vec<f64>, count: usize, threads: usize) -> Request {
+    let axes = [Range { index: P, values: p }, Range { index: OMEGA, values: omega }];
+    let starts = starts(61 * count);
+    Request { axes, starts, each: count, tol: 1e-6, bound: None, kept: 1, threads }
+}
+
 fn mapped(
     base: &Pendulum,
     p: Vec<f64>,
@@ -30,16 +39,7 @@ fn mapped(
     count: usize,
     threads: usize,
 ) -> ParameterMap {
-    let axes = [Range { index: P, values: p }, Range { index: OMEGA, values: omega }];
-    let request = Request {
-        axes,
-        starts: starts(61 * count),
-        each: count,
-        tol: 1e-6,
-        bound: None,
-        kept: 1,
-        threads,
-    };
+    let request = asked(p, omega, count, threads);
     parameter_map(base, &request, &Control::default()).expect("a map")
 }
 
@@ -106,6 +106,58 @@ fn threads_and_repetition_change_nothing() {
     let one = told(&once(1));
     assert_eq!(one, told(&once(2)));
     assert_eq!(one, told(&once(1)));
+}
+
+#[test]
+fn blocks_computed_apart_and_stored_give_the_same_map() {
+    let (base, control) = (driven(0.1, 1.0, 2.0), Control::default());
+    let request = asked(evenly(0.2, 1.2, 19), evenly(1.7, 2.2, 17), 2, 0);
+    let whole = parameter_map(&base, &request, &control).expect("a map");
+    let first = Survey::new(&base, &request).expect("a survey");
+    // Each call has a survey of its own, and the last block comes first.
+    let another = || Survey::restored(&base, &request, &first.state()).expect("a survey");
+    let order = || (0..first.blocks()).rev();
+    let searched = |k| (k, another().search(k, &control).expect("a block").to_bytes());
+    let mut blocks: BTreeMap<usize, Vec<u8>> = order().map(searched).collect();
+    assert_eq!(blocks.len(), 4);
+    for pass in 1..=first.passes() {
+        let exchanged = |k: usize| {
+            let survey = another();
+            let around = survey.around(k).into_iter();
+            let read =
+                |other: usize| (other, survey.block(other, &blocks[&other]).expect("a block"));
+            let known: BTreeMap<usize, Block> = around.map(read).collect();
+            let new = survey.exchange(pass, k, |other| &known[&other], &control);
+            Some((k, new.expect("no interruption")?.to_bytes()))
+        };
+        let new: Vec<_> = order().filter_map(exchanged).collect();
+        blocks.extend(new);
+        let read = |(k, bytes): (&usize, &Vec<u8>)| first.block(*k, bytes).expect("a block");
+        if !blocks.iter().map(read).any(|block| block.gained(pass)) {
+            break;
+        }
+    }
+    let read = |(k, bytes): (&usize, &Vec<u8>)| first.block(*k, bytes).expect("a block");
+    let apart = first.result(&blocks.iter().map(read).collect::<Vec<_>>()).expect("a map");
+    assert_eq!(format!("{:?}", apart.cells), format!("{:?}", whole.cells));
+    assert_eq!(apart.searched_again, whole.searched_again);
+    assert!(whole.searched_again > 0);
+}
+
+#[test]
+fn stored_results_of_another_plane_are_refused() {
+    let (base, control) = (driven(0.1, 1.0, 2.0), Control::default());
+    let survey = |columns| {
+        Survey::new(&base, &asked(evenly(0.2, 0.4, columns), vec![2.0], 1, 0)).expect("a survey")
+    };
+    let (own, other) = (survey(2), survey(3));
+    let bytes = other.search(0, &control).expect("a block").to_bytes();
+    assert!(other.block(0, &bytes).is_ok());
+    assert!(own.block(0, &bytes).is_err());
+    assert!(other.block(0, &bytes[..9]).is_err());
+    assert!(own.result(&[]).is_err());
+    let request = asked(evenly(0.2, 0.4, 2), vec![2.0], 1, 0);
+    assert!(Survey::restored(&base, &request, &other.state()).is_err());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use pendmap::error::Error;
 use pendmap::integrate::State;
 use pendmap::maps::basins::{Options, basins};
+use pendmap::maps::boundary_distance::Thinned;
 use pendmap::maps::control::Control;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::maps::uncertainty::{Uncertainty, uncertainty};
@@ -23,7 +24,7 @@ fn measured(side: usize, seed: u64, of: impl Fn(f64, f64) -> i16) -> Uncertainty
         of(centre(k % side), centre(k / side))
     };
     let map: Vec<i16> = (0..side * side).map(cell).collect();
-    uncertainty([&theta, &velocity], &map, seed, |states: Vec<State>| {
+    uncertainty([&theta, &velocity], &Thinned::new(&map, side), seed, |states: Vec<State>| {
         let part = |value: f64, axis: &Axis| (value - axis.low) / (axis.high - axis.low);
         let labels = states.iter().map(|s| of(part(s[0], &theta), part(s[1], &velocity)));
         Ok::<_, Error>(labels.collect())

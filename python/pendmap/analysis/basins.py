@@ -2,43 +2,43 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import xarray as xr
 
-from pendmap import _core
 from pendmap.analysis import orbit_table, result
+from pendmap.analysis.basin_dataset import LAYERS, boundary, cells_of, uncertain_starts
+from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts
 from pendmap.analysis.draws import drawn
 from pendmap.analysis.draws.basins import basins_over, drawn_basins
-from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.result import Field, Found, Schema, none_below_0, variable
+from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import summarise
-from pendmap.errors import MOST_PERIODS, check_flag, core_errors
+from pendmap.engine import Work
+from pendmap.errors import MOST_PERIODS, check_flag
 from pendmap.files import facts
-from pendmap.formatting import counted
 from pendmap.model import without_dimensions
-from pendmap.units import RATE, VELOCITY, Units
+from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
+    import os
+    from types import SimpleNamespace
+
     from numpy.typing import ArrayLike
 
+    from pendmap import _core
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
 
 
 DEFAULT_CELLS = 1000  # Default number of cells on each side of a map
 RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
-_LAYERS: Final = {
-    "basins": "labels",
-    "only_chaos": "finite_time",
-    "conservative": "finite_time",
-}
 
 
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
@@ -137,6 +137,12 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     seed: int = 0,
     check: bool = True,
     draws: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    part: tuple[int, int] | None = None,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    mix: bool = False,
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute the basins of attraction: the attractor on which each initial condition ends.
@@ -178,6 +184,25 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
         the probability of each outcome in each cell, and the uncertainty due to the parameters
         (:mod:`pendmap.analysis.draws.basins`).
+    store : str or path, optional
+        A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the map is
+        computed in tiles of about 2^20 starts, and each is stored as it is done. The result reads
+        its cells when they are used. A path holds an earlier result until the new one is complete,
+        which is at the path with ``.part`` until then; elsewhere an earlier result is removed.
+    resume : bool
+        Whether to go on with the store of a run that was stopped; the result is the same, bit for
+        bit. A store that another request began is refused.
+    part : (int, int), optional
+        ``(7, 64)`` computes the seventh of 64 parts of the tiles; :func:`pendmap.merge` completes
+        the map when all parts are in the store. Returns a dataset without variables.
+    executor : optional
+        Computes the tiles: a Dask client or any executor of :mod:`concurrent.futures`, like those
+        of joblib, mpi4py and submitit. Each tile has one thread unless ``threads`` says otherwise.
+    mix : bool
+        Whether to go on with a store that was begun on a processor that rounds otherwise.
+    chunks : optional
+        As for :func:`xarray.open_zarr`: the result of a store has arrays of Dask, ``{}`` with the
+        tiles as chunks.
     progress : callable, optional
         Called repeatedly with the units of work done and in total.
 
@@ -228,26 +253,42 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
+    kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    choices = _choices(numerics, layer_periods, check=check)
+    choices = choices_of(numerics, layer_periods, check=check)
     if draws is not None:
+        kept.refuse("draws")
         several = drawn(pendulum, draws, seed, progress)
         same = partial(basins, grid=grid, layer_periods=layer_periods, **numerics.options)
         own = same(pendulum, check=check, progress=several.first)
         return basins_over(own, several, partial(same, check=False))
-    with core_errors():
-        raw = _core.basins_grid(bare, *grid.bare(units), choices, progress)
+    starts_of = Starts(grid.bare(units))
+    cells, rate = TILE if kept.tiled else None, units.given(1.0, RATE)
+    job = BasinTiles(bare, starts_of, choices, rate, cells, threads=kept.threads(threads))
     angle, speed = grid.theta, grid.velocity
-    shape, unit = (speed.count, angle.count), units.of_velocity
     said = f"initial velocity {units.derivative}"
-    dataset = xr.Dataset(
-        {**_cells(raw, ("velocity", "theta"), shape, units), **_uncertain_starts(raw)},
-        coords={
-            **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
-            **coordinate("velocity", speed.centres, speed.edges, unit, said),
-        },
-    )
-    return _complete(dataset, raw, pendulum, numerics)
+
+    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        raw = job.run(work, check=check)
+        cells = cells_of(raw, job.starts.dims, units)
+        dataset = xr.Dataset(
+            {**cells, **uncertain_starts(raw)},
+            coords={
+                **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
+                **coordinate("velocity", speed.centres, speed.edges, units.of_velocity, said),
+            },
+        )
+        return _complete(dataset, raw, pendulum, numerics), [*cells]
+
+    request = {
+        "grid": grid,
+        "tol": numerics.tol,
+        "max_periods": numerics.max_periods,
+        "layer_periods": layer_periods,
+        "seed": numerics.seed,
+        "check": check,
+    }
+    return kept.complete("basins", pendulum, request, job, compute, progress)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)
@@ -294,92 +335,43 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     """
     bare, units = without_dimensions(pendulum)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    choices = _choices(numerics, layer_periods, check=check)
+    choices = choices_of(numerics, layer_periods, check=check)
     angles, speeds = starts(theta, velocity)
-    with core_errors():
-        raw = _core.basins_list(bare, angles, units.bare(speeds, VELOCITY), choices, progress)
+    states = Starts(None, angles, units.bare(speeds, VELOCITY))
+    job = BasinTiles(bare, states, choices, units.given(1.0, RATE))
+    return ends_of_list(job, Work(job, progress=progress), speeds, pendulum, numerics, check=check)
+
+
+def ends_of_list(  # noqa: PLR0913 (the parts of a map)
+    job: BasinTiles,
+    work: Work,
+    speeds: Floats,
+    model: Pendulum | Rig,
+    numerics: Numerics,
+    *,
+    check: bool,
+) -> xr.Dataset:
+    """Return the attractors that the starts of a list reach; ``speeds`` in the model's units."""
+    raw = job.run(work, check=check)
+    units = model.units
     dataset = xr.Dataset(
         {
-            **_cells(raw, ("start",), angles.shape, units),
-            "start_theta": variable("start", angles, "rad", "initial angle"),
+            **cells_of(raw, job.starts.dims, units),
+            "start_theta": variable("start", job.starts.theta, "rad", "initial angle"),
             "start_velocity": variable("start", speeds, units.of_velocity, "initial velocity"),
         }
     )
-    return _complete(dataset, raw, pendulum, numerics)
+    return _complete(dataset, raw, model, numerics)
 
 
-def _choices(numerics: Numerics, layer_periods: int | None, *, check: bool) -> _core._Choices:
+def choices_of(numerics: Numerics, layer_periods: int | None, *, check: bool) -> _core._Choices:
+    """Return the numerical choices of a map as passed to the core."""
     layers = optional_whole("layer_periods", layer_periods, 1, MOST_PERIODS)
     return {**numerics.core, "layer_periods": layers, "check": check_flag("check", check)}
 
 
-def _cells(
-    raw: _core.BasinMap, dims: tuple[str, ...], shape: tuple[int, ...], units: Units
-) -> dict[str, Any]:
-    """Return the variables with one value a start, over ``dims`` of ``shape``."""
-    finite_time = _LAYERS[raw.plane] == "finite_time"
-    when = "until settled"
-    if finite_time:
-        when = f"after {counted(raw.layer_periods, 'period')}"
-    elif not (raw.settle >= 0).any():
-        when = f"after {counted(raw.bound, 'period')}"
-    cells: dict[str, Any] = {
-        "label": variable(
-            dims,
-            raw.label.reshape(shape),
-            long_name="attractor",
-            comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
-            flags=dict(enumerate(["failed", "undecided", *(a.name for a in raw.attractors)], -1)),
-        ),
-        "settle_periods": variable(
-            dims,
-            raw.settle.reshape(shape),
-            "1",
-            "periods until the trap of an attractor captures the trajectory",
-            "-1 where no attractor captured it",
-            missing=-1,
-        ),
-        "net_turns": variable(
-            dims,
-            raw.turns.reshape(shape),
-            "1",
-            f"net turns {when}",
-            "the angle's displacement over 2 pi, rounded",
-        ),
-    }
-    exponent = raw.finite_time_exponent
-    if exponent is not None:
-        values = units.given(exponent, RATE).reshape(shape)
-        name = f"finite-time Lyapunov exponent {when}"
-        cells["finite_time_exponent"] = variable(dims, values, units.of_rate, name)
-    return cells
-
-
-def _uncertain_starts(raw: _core.BasinMap) -> dict[str, Any]:
-    """Return the counts of starts whose label changes nearby; none without a boundary."""
-    if not raw.uncertainty_eps.size:
-        return {}
-    what = "distance in sides of the window"
-    return {
-        "uncertainty_eps": variable("distance", raw.uncertainty_eps, "1", what),
-        "uncertain": variable(
-            "distance",
-            raw.uncertain.astype(np.int64),
-            "1",
-            "starts with another label at this distance on one side or the other",
-        ),
-        "uncertainty_tried": variable(
-            "distance",
-            raw.uncertainty_tried.astype(np.int64),
-            "1",
-            "starts with known ends, drawn anew for each distance; where drawn by "
-            "strata, the equivalent number of evenly drawn starts",
-        ),
-    }
-
-
 def _complete(
-    dataset: xr.Dataset, raw: _core.BasinMap, model: Pendulum | Rig, numerics: Numerics
+    dataset: xr.Dataset, raw: SimpleNamespace, model: Pendulum | Rig, numerics: Numerics
 ) -> xr.Dataset:
     """Add the table of attractors, all facts and the summary to the cells."""
     count, attractors = dataset["label"].size, raw.attractors
@@ -392,38 +384,17 @@ def _complete(
             "stderr": variable("attractor", stderr, "1", "standard error of the share"),
         }
     )
-    settle = dataset["settle_periods"].values
-    settled = settle[settle >= 0]
     values = {
         **numerics.provenance(),
-        **_boundary(dataset, raw),
-        "layers": _LAYERS[raw.plane],
+        **boundary(dataset, raw),
+        "layers": LAYERS[raw.plane],
         "cells": count,
-        "mean_settle": float(settled.mean()) if settled.size else -1.0,
-        "longest_settle": int(settled.max()) if settled.size else -1,
         "labels_reliable": int(raw.unreliable <= RELIABLE),
     }
     SCHEMA.complete(dataset, model, values, raw)
     pendulum, _ = without_dimensions(model)
     chosen = numerics.max_periods is None
-    dataset.attrs["summary"] = summarise(dataset, pendulum, bound_was_chosen=chosen)
+    dataset.attrs["summary"] = summarise(
+        dataset, pendulum, bound_was_chosen=chosen, decided=raw.decided, moving=raw.moving
+    )
     return dataset
-
-
-def _boundary(dataset: xr.Dataset, raw: _core.BasinMap) -> dict[str, float | None]:
-    """Return the measures of the boundary as facts, None without a boundary."""
-    found: dict[str, float | None] = {}
-    if raw.texture.boundary_boxes:
-        entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr
-        found["boundary_basin_entropy"] = entropy
-        found["boundary_boxes"] = raw.texture.boundary_boxes
-        found["boundary_basin_entropy_stderr"] = stderr if math.isfinite(stderr) else None
-        found["log2_criterion"] = int(passes_log2(entropy, stderr))
-    law = fitted_map(dataset) if "uncertainty_eps" in dataset else None
-    if law is not None:
-        found["uncertainty_exponent"] = law.value
-        found["uncertainty_exponent_stderr"] = law.stderr
-        found["uncertainty_exponent_low"], found["uncertainty_exponent_high"] = law.ci95
-        found["uncertainty_eps_low"] = float(law.eps[0])
-        found["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
-    return found

@@ -12,7 +12,9 @@ from pendmap import _core
 from pendmap.analysis import result, sweep
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
+from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import box_said
+from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import facts
 from pendmap.formatting import counted
@@ -20,6 +22,7 @@ from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
+    from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Indices, Mask
     from pendmap.units import Units
@@ -65,6 +69,12 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     max_periods: int | None = None,
     threads: int | None = None,
     seed: int = 0,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    part: tuple[int, int] | None = None,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    mix: bool = False,
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute the stroboscopic points of the attractors against one parameter.
@@ -87,8 +97,10 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
-    starts, box, tol, max_periods, threads, seed, progress
+    starts, box, tol, max_periods, threads, seed
         As for :func:`pendmap.parameter_map`.
+    store, resume, part, executor, mix, chunks, progress
+        As for :func:`pendmap.parameter_map`; tiles are 16 values.
 
     Returns
     -------
@@ -116,27 +128,40 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     bare, units = without_dimensions(pendulum)
     (axis,) = sweep.varied(pendulum, ranges, 1)
-    search = sweep.CellSearch(starts, box, Numerics(tol, max_periods, threads, seed, progress))
+    kept = Kept(store, resume, part, executor, mix, chunks)
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    search = sweep.CellSearch(starts, box, numerics)
     first = None
     if start is not None:
         if np.asarray(start, dtype=object).shape != (2,):
             raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
-    with core_errors():
-        initial, limits = search.initial(units), search.numerics.limits
-        raw = _core.bifurcation(bare, axis.kernel, *initial, first, *limits, progress)
-    dataset = _dataset(raw, axis, units)
-    values = {
-        **search.attributes(raw, units),
-        "varied": axis.name,
-        "points": dataset.sizes["point"],
-    }
-    SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
-    dataset.attrs["title"] = sweep.title(pendulum, axis)
-    lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
-    summarised(dataset, lines, pendulum, "attractors are")
-    return dataset
+    initial = search.initial(units)
+    job = SurveyTiles(bare, (axis.kernel,), initial, *kept.threads_of_tiles(numerics))
+
+    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        with core_errors():
+            if kept.tiled:
+                survey, blocks = job.run(work)
+                raw = survey.diagram(blocks, first)
+            else:
+                limits = numerics.limits
+                raw = _core.bifurcation(bare, axis.kernel, *initial, first, *limits, progress)
+        dataset = _dataset(raw, axis, units)
+        values = {
+            **search.attributes(raw, units),
+            "varied": axis.name,
+            "points": dataset.sizes["point"],
+        }
+        SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
+        dataset.attrs["title"] = sweep.title(pendulum, axis)
+        lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
+        summarised(dataset, lines, pendulum, "attractors are")
+        return dataset, []
+
+    request = {"ranges": ranges, "start": start, **search.request}
+    return kept.complete("bifurcation", pendulum, request, job, compute, progress)
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:

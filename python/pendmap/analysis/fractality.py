@@ -365,7 +365,9 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     0.67
     """
     cells = _numbered(labels)
-    found = _core.texture(np.ascontiguousarray(cells).ravel(), cells.shape[1])
+    texture = _core.TextureSum(cells.shape[1], cells.shape[0])
+    texture.add(np.ascontiguousarray(cells).ravel())
+    found = texture.total()
     return BasinEntropy(
         value=found.basin_entropy,
         boundary=found.boundary_basin_entropy,

@@ -9,25 +9,36 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis import result, survival
-from pendmap.analysis.basins import basins_of
+from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts
+from pendmap.analysis.basins import choices_of, ends_of_list
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
+from pendmap.analysis.lifetime_summary import summary_of, summary_of_draws
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Found, Schema, flag, variable
-from pendmap.analysis.summary import effort, window_said
+from pendmap.analysis.result import (
+    Field,
+    Found,
+    Schema,
+    flag,
+    variable,
+)
+from pendmap.analysis.stored import Kept
+from pendmap.analysis.summary import window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.files import facts
-from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.numerics import Progress
+    from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
 
 
@@ -117,6 +128,12 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     threads: int | None = None,
     seed: int = 0,
     draws: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    part: tuple[int, int] | None = None,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    mix: bool = False,
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Estimate the mean lifetime of transient chaos from the exponential tail of capture times.
@@ -150,7 +167,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws : int, optional
         As for :func:`pendmap.basins`; adds the interval of the mean lifetime
         (:func:`pendmap.analysis.lifetime.lifetime_over`).
-    max_periods, tol, threads, progress
+    max_periods, tol, threads, store, resume, part, executor, mix, chunks, progress
         As for :func:`pendmap.basins`.
 
     Returns
@@ -185,15 +202,26 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
+    kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
+        kept.refuse("draws")
         several = drawn(pendulum, draws, seed, progress)
         same = partial(lifetime, from_period=from_period, **numerics.options)
         own = same(pendulum, theta, velocity, starts=starts, progress=several.first)
         again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
         return lifetime_over(own, several, again)
+    request: dict[str, Any] = {
+        "starts": starts,
+        "from_period": from_period,
+        "tol": numerics.tol,
+        "max_periods": numerics.max_periods,
+        "seed": numerics.seed,
+        "theta": None,
+        "velocity": None,
+    }
     window = ""
     if theta is None or velocity is None:
         draw = np.random.default_rng(numerics.seed)
@@ -202,7 +230,30 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         velocity = draw.uniform(-reach, reach, starts)
         window = window_said((-math.pi, math.pi), (-reach, reach), units)
     angles, speeds = checked(theta, velocity)
-    found = basins_of(pendulum, angles, speeds, check=False, progress=progress, **numerics.options)
+    if not window:
+        request |= {"theta": angles, "velocity": speeds}
+    states = Starts(None, angles, units.bare(speeds, VELOCITY))
+    choices = choices_of(numerics, None, check=False)
+    cells = TILE if kept.tiled else None
+    rate, of_tile = units.given(1.0, RATE), kept.threads(threads)
+    job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=of_tile)
+
+    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        found = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
+        return _complete(found, pendulum, numerics, from_period, window), []
+
+    return kept.complete("lifetime", pendulum, request, job, compute, progress)
+
+
+def _complete(
+    found: xr.Dataset,
+    pendulum: Pendulum | Rig,
+    numerics: Numerics,
+    from_period: int | None,
+    window: str,
+) -> xr.Dataset:
+    """Return the lifetimes of the starts that end as ``found``."""
+    bare, units = without_dimensions(pendulum)
     label = found["label"].values.astype(np.int64)
     settle = found["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]
@@ -214,7 +265,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = survival.growth_on_saddle(found, fitted, bare, threads)
+    saddle = survival.growth_on_saddle(found, fitted, bare, numerics.threads)
     dataset = found.drop_dims("start").assign(
         {
             **_curves(found, times, censored, bound),
@@ -228,7 +279,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         **facts(found),
         **numerics.provenance(),
         **_measures(found, fitted, saddle, bare, units),
-        "starts": angles.size,
+        "starts": label.size,
         "captured": int(times.size),
         "censored": censored,
         "failed": int((label < 0).sum()),
@@ -236,7 +287,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         "from_period_given": int(from_period is not None),
     }
     SCHEMA.complete(dataset, pendulum, values)
-    lines = _summary(dataset, found)
+    lines = summary_of(dataset, found)
     if window:
         lines.append(f"Starts are drawn in {window}.")
     result.summarised(dataset, lines, pendulum, "these lifetimes are")
@@ -322,94 +373,6 @@ def _measures(
     }
 
 
-def _summary(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
-    """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
-    a = facts(dataset)
-    units = Units.of(a)
-    lines: list[str] = []
-    exponent = f"{with_error(a['chaos_exponent'], a['chaos_exponent_stderr'])} {units.per_time}"
-    if a["persistent"]:
-        lines.append(
-            f"Persistent: {_shares(found)}; largest exponent {exponent}; none of the "
-            f"trajectories followed was captured within {a['chaos_bound']} periods."
-        )
-    elif found.attrs["plane"] == "conservative":
-        lines.append("Without damping (gamma = 0) there are no attractors: no lifetime.")
-    elif a["transient_chaos"]:
-        lines += _of_tail(dataset, exponent)
-    else:
-        lines.append(_why_not(dataset, exponent))
-    if a["chaotic_share"] and not a["persistent"]:
-        names = found["attractor"].values[found["kind"].str.endswith("chaos").values]
-        lines.append(
-            f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
-            f"left out: chaos there was not captured within {a['chaos_bound']} periods."
-        )
-    if a["censored"] and found.attrs["plane"] == "basins":
-        lines.append(
-            f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
-            f"{counted(a['max_periods'], 'period')}."
-        )
-    if a["captured_starts"]:
-        lines.append(f"Ended on {_shares(found)}.")
-    return [*lines, f"{counted(a['starts'], 'start')}, {effort(a)}"]
-
-
-def _shares(found: xr.Dataset) -> str:
-    """Return the attractors with the share of the starts that each captures, as text."""
-    rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
-    return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)
-
-
-def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
-    a = facts(dataset)
-    units = Units.of(a)
-    clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
-    mean = with_error(a["mean_periods"], a["mean_periods_stderr"])
-    said = (
-        f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
-        f"{counted(a['tail_captured'], 'capture')} after period "
-        f"{a['from_period']}."
-    )
-    lines = [said]
-    tests = min(a["tail_weibull"], a["tail_steady"])
-    if tests < survival.LEVEL:
-        lines.append(
-            f"THE TAIL FROM PERIOD {a['from_period']} IS NOT EXPONENTIAL (chance {tests:.1g}): "
-            "its mean depends on where it begins."
-        )
-    line = (
-        f"On the chaotic saddle: exponent {exponent}, {a['exponent_per_period']:.4g} per period; "
-        f"rate of escape {a['escape_rate']:.4g}, entropy {a['entropy']:.4g} per period"
-    )
-    if math.isfinite(a["saddle_dimension"]):
-        line += f"; dimension {a['saddle_dimension']:.3f}"
-    return [*lines, line + "."]
-
-
-def _why_not(dataset: xr.Dataset, exponent: str) -> str:
-    a = facts(dataset)
-    if not a["captured_starts"] and a["chaotic_share"]:
-        return "Starts end only on chaotic attractors: no lifetime."
-    if not a["captured_starts"]:
-        return (
-            "No start was captured, and chaos is not shown to persist: undecided within "
-            f"{counted(a['max_periods'], 'period')}; --max-periods raises this bound."
-        )
-    longest = int(dataset["capture_period"].max())
-    head = f"No transient chaos: all settling ends within {counted(longest, 'period')}"
-    if not math.isfinite(a["tail_mean_periods"]):
-        return f"{head}, without an exponential tail."
-    head += f", with a tail of {a['tail_mean_periods']:.3g} periods"
-    if not math.isfinite(a["exponent_per_period"]):
-        return f"{head}, in which no start lives on to wander."
-    return (
-        f"{head}, in which deviations grow no faster than starts leave (exponent {exponent}, "
-        f"{a['exponent_per_period']:.3g} per period; rate {a['escape_rate']:.3g}): those at the "
-        "edge of a basin."
-    )
-
-
 def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     """Return a lifetime with the lifetimes of D draws from the same starts.
 
@@ -431,18 +394,4 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
         transient_share=variable((), transient.mean(), "1", f"{share} have transient chaos"),
         persistent_share=variable((), persistent.mean(), "1", f"{share} have persistent chaos"),
     )
-    return draws.complete(found, _drawn_summary(facts(found)))
-
-
-def _drawn_summary(a: dict[str, Any]) -> list[str]:
-    lines = []
-    if a["transient_share"]:
-        lines.append(
-            f"Mean lifetime: 95 % of the draws in [{a['mean_periods_low']:.4g}, "
-            f"{a['mean_periods_high']:.4g}] periods."
-        )
-    lines.append(
-        f"{100 * a['transient_share']:.3g} % of the draws have transient chaos; in "
-        f"{100 * a['persistent_share']:.3g} % chaos persists."
-    )
-    return lines
+    return draws.complete(found, summary_of_draws(facts(found)))

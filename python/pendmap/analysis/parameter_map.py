@@ -11,9 +11,12 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import result, sweep
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
-from pendmap.analysis.numerics import Numerics, part
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.numerics import part as progress_part
 from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
+from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import box_said
+from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.analysis.tongues import MOST_P, tongues
 from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.files import facts
@@ -22,6 +25,7 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
+    from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
 
@@ -102,14 +107,21 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     curves: bool = False,
     draws: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    part: tuple[int, int] | None = None,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    mix: bool = False,
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Find the set of attractors in every cell of a plane of two parameters.
 
     Every cell is searched from a few initial conditions, different from its neighbours', and from
-    points of its neighbours' attractors: grids are refined from every eighth cell to all, each cell
-    starting also from the attractors of its neighbours on the coarser grid; then, in six passes,
-    from the attractors that cells at distances from eight to one have and it lacks. In this way
+    points of its neighbours' attractors: within blocks of 16 by 16 cells, grids are refined from
+    every eighth cell to all, each cell starting also from the attractors of its neighbours on the
+    coarser grid; then, pass by pass over the whole plane, from the attractors that cells at
+    distances of eight, four, two and one have and it lacks, until none gains any. In this way
     coexisting branches are followed, and the result does not depend on the order of the work.
 
     Trajectories run until a stable orbit, found by Newton's method, has captured them. Those not
@@ -149,8 +161,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell
         (:func:`pendmap.analysis.parameter_map.regimes_over`).
-    threads, progress
-        As for :func:`pendmap.basins`.
+    threads, store, resume, part, executor, mix, chunks, progress
+        As for :func:`pendmap.basins`; tiles are blocks of 16 x 16 cells.
 
     Returns
     -------
@@ -185,35 +197,47 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     bare, units = without_dimensions(pendulum)
     columns, rows = sweep.varied(pendulum, ranges, 2)
+    kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     search = sweep.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
+        kept.refuse("draws")
         several = drawn(pendulum, draws, seed, progress)
         box = search.within(units)
         same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
         own = same(pendulum, curves=curves, progress=several.first)
         return regimes_over(own, several, same)
-    over = None
+    over: dict[str, Any] = {}
     if curves:
-        over = _curves(pendulum, columns, rows, part(progress, 0, 2))
-        progress = part(progress, 1, 2)
-    with core_errors():
-        axes, initial = (columns.kernel, rows.kernel), search.initial(units)
-        raw = _core.parameter_map(bare, axes, *initial, *numerics.limits, progress)
-    dataset = _dataset(raw, (columns, rows), units).assign(over or {})
-    values = {
-        **search.attributes(raw, units),
-        "columns": columns.name,
-        "rows": rows.name,
-        "cells": columns.values.size * rows.values.size,
-    }
-    replaced = [*columns.replaced, *rows.replaced]
-    SCHEMA.complete(dataset, pendulum, values, raw, replaced)
-    dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
-    lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
-    summarised(dataset, lines, pendulum, "attractors are")
-    return dataset
+        over = _curves(pendulum, columns, rows, progress_part(progress, 0, 2))
+        progress = progress_part(progress, 1, 2)
+    axes, initial = (columns.kernel, rows.kernel), search.initial(units)
+    job = SurveyTiles(bare, axes, initial, *kept.threads_of_tiles(numerics))
+
+    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        with core_errors():
+            if kept.tiled:
+                survey, blocks = job.run(work)
+                raw = survey.result(blocks)
+            else:
+                raw = _core.parameter_map(bare, axes, *initial, *numerics.limits, progress)
+        dataset = _dataset(raw, (columns, rows), units).assign(over)
+        values = {
+            **search.attributes(raw, units),
+            "columns": columns.name,
+            "rows": rows.name,
+            "cells": columns.values.size * rows.values.size,
+        }
+        replaced = [*columns.replaced, *rows.replaced]
+        SCHEMA.complete(dataset, pendulum, values, raw, replaced)
+        dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
+        lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
+        summarised(dataset, lines, pendulum, "attractors are")
+        return dataset, []
+
+    request = {"ranges": ranges, **search.request, "curves": curves}
+    return kept.complete("parameter_map", pendulum, request, job, compute, progress)
 
 
 def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:

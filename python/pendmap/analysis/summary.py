@@ -23,11 +23,15 @@ if TYPE_CHECKING:
 
 
 _NEARLY_CHANCE = 0.15  # Agreement of neighbours above chance, below which it is hardly better
-_STILL = 1e-12  # Sine of the angle below which a start hangs or is upright
 
 
-def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool) -> str:
-    """Return the summary of a basin map whose facts are set, one sentence a line."""
+def summarise(
+    dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool, decided: int, moving: int
+) -> str:
+    """Return the summary of a basin map whose facts are set, one sentence a line.
+
+    ``decided`` starts end on an attractor; ``moving`` undecided ones do not start at rest.
+    """
     a, plane = facts(dataset), dataset.attrs["plane"]
     unlimited = unlimited_rotation(pendulum)
     if plane == "conservative":
@@ -40,11 +44,11 @@ def summarise(dataset: xr.Dataset, pendulum: Pendulum, *, bound_was_chosen: bool
     elif plane == "only_chaos":
         lines = [_only_chaos(dataset)]
     else:
-        lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset)]
+        lines = [*_attractors(dataset), *_settling(dataset), *_texture(dataset, decided)]
     for key, word in (("undecided", "undecided"), ("failed", "failed or diverged")):
         share = a[key]
         if share > 0 and plane != "conservative":
-            bound = _bound(dataset, chosen=bound_was_chosen) if key == "undecided" else ""
+            bound = _bound(dataset, moving, chosen=bound_was_chosen) if key == "undecided" else ""
             bound = bound.split(";")[0] if unlimited else bound  # a larger bound does not help
             lines.append(f"{100 * share:.3g} % of the starts {word}{bound}.")
     if "theta" in dataset.dims:
@@ -118,24 +122,14 @@ def _dry(pendulum: Pendulum) -> tuple[float, float]:
     return friction, torque
 
 
-def _bound(dataset: xr.Dataset, *, chosen: bool) -> str:
+def _bound(dataset: xr.Dataset, moving: int, *, chosen: bool) -> str:
     """Return the bound after which a start is undecided, as text, and what raises it."""
-    undecided = dataset["label"] == 0
-    if bool(undecided.any()) and bool((undecided <= _at_rest(dataset)).all()):
+    if not moving and facts(dataset)["torque"] == 0 and not effects_of(dataset.attrs):
         return ": they start exactly at an unstable equilibrium and stay there"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
     if chosen and dataset["kind"].str.endswith("chaos").any():
         text += " (where chaos coexists, ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
-
-
-def _at_rest(dataset: xr.Dataset) -> xr.DataArray:
-    """Return which starts are at rest, hanging or inverted, for any drive."""
-    of = "start_" if "start_theta" in dataset else ""
-    hangs = np.abs(np.sin(dataset[f"{of}theta"])) < _STILL
-    alone = facts(dataset)["torque"] == 0 and not effects_of(dataset.attrs)
-    still: xr.DataArray = (dataset[f"{of}velocity"] == 0) & hangs & alone
-    return still
 
 
 def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Units) -> str:
@@ -231,9 +225,9 @@ def _boundary(attrs: Mapping[Any, Any]) -> list[str]:
     return lines
 
 
-def _texture(dataset: xr.Dataset) -> list[str]:
+def _texture(dataset: xr.Dataset, decided: int) -> list[str]:
     a = facts(dataset)
-    if not (dataset["label"] > 0).any():
+    if not decided:
         return []  # no label is decided: agreement has no meaning
     lines = []
     if "theta" in dataset.dims and a["cells"] > 1:

@@ -267,6 +267,13 @@ class CellSearch:
         if self.box is not None:
             check_type("box", self.box, Grid, "Grid.square(100)")
 
+    @property
+    def request(self) -> dict[str, Any]:
+        """The arguments that determine the search."""
+        numerics = self.numerics
+        choices = {"tol": numerics.tol, "max_periods": numerics.max_periods, "seed": numerics.seed}
+        return {"starts": self.starts, "box": self.box, **choices}
+
     def within(self, units: Units) -> Grid:
         """Return the box, in these units; by default that of :func:`pendmap.basins`."""
         return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))

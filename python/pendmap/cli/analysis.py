@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
 from typing import TYPE_CHECKING, Any
@@ -10,8 +11,15 @@ import click
 
 from pendmap import ANALYSES
 from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import added, output_options, progress_options
+from pendmap.cli.options import (
+    added,
+    output_options,
+    progress_options,
+    store_options,
+    worker_options,
+)
 from pendmap.cli.show import show
+from pendmap.cli.stored import Kept
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,26 +34,34 @@ the recording it opens: {0}.rrd, or what --rerun names."""
 
 
 def analysis_command(
-    name: str, *options: Decorator, model: Decorator = model_options
+    name: str, *options: Decorator, model: Decorator = model_options, stored: bool = False
 ) -> Callable[[Callable[..., dict[str, Any]]], click.Command]:
     """Return a decorator that makes a command of :data:`pendmap.ANALYSES`.
 
     The decorated function takes model, outputs and the values of ``options``, and returns the
-    keyword arguments of the analysis; its docstring is the help.
+    keyword arguments of the analysis; its docstring is the help. What is ``stored`` is computed in
+    tiles, by workers if they are given, and kept in a store if ``--out`` names one.
     """
     kind, function = next((k, own[0]) for k, (which, own, _) in ANALYSES.items() if which == name)
 
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
+            kept = Kept.take(given) if stored else None
             pendulum, outputs = begin(given, name)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
+            analysis = functools.partial(getattr(module, function), pendulum, **arguments)
+            if kept is not None:
+                kept.run(analysis, outputs, name, module.SCHEMA)
+                return
             with outputs.progress(name) as progress:
-                dataset = getattr(module, function)(pendulum, progress=progress, **arguments)
+                dataset = analysis(progress=progress)
             show(dataset, outputs, module.SCHEMA)
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
-        decorate = added(model, *options, progress_options, output_options())
+        kept = (store_options, worker_options) if stored else ()
+        files = output_options(stored=stored)
+        decorate = added(model, *options, *kept, progress_options, files)
         return click.command(name, help=text)(decorate(run))
 
     return make

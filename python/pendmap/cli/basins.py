@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     option("--layer-periods", whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),
     draws_option,
+    stored=True,
 )
 def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Map the basins of attraction over initial angle and velocity."""

@@ -18,6 +18,7 @@ from pendmap.cli.types import NUMBER
     option("--velocity", NUMBER, "Velocity of that start, in SI rad/s."),
     search_options,
     model=varied_model_options,
+    stored=True,
 )
 def command(*_: object, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Draw stroboscopic points against a parameter: all attractors, and followed up and down.

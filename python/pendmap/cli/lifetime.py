@@ -37,6 +37,7 @@ _STARTS = (100, 10_000_000)
     tol_option,
     seed_option("Draws the starts, and the models of --draws."),
     draws_option,
+    stored=True,
 )
 def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Measure how long transient chaos lives, or find that it persists."""

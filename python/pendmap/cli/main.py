@@ -34,6 +34,7 @@ _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
     "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     **{name: text for name, _, text in ANALYSES.values()},
+    "merge": "Complete a result that was computed in parts, or whose run was stopped.",
     "look": "Describe a record: channels, rate, noise, releases, faults.",
     "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
     "compare": "Compare a model with records that it was not fitted to.",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     draws_option,
     search_options,
     model=varied_model_options,
+    stored=True,
 )
 def command(_: object, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Map which attractors exist over any two parameters.

@@ -10,11 +10,21 @@ import click
 from pendmap.cli.types import (
     INSTRUCTION_SET,
     NUMBER,
+    PART,
     PICTURES,
+    TEXT,
     output_file,
+    output_or_address,
     whole,
 )
-from pendmap.errors import MOST_CELLS, MOST_DRAWS, MOST_PERIODS, MOST_SEED, MOST_THREADS
+from pendmap.errors import (
+    MOST_CELLS,
+    MOST_DRAWS,
+    MOST_PERIODS,
+    MOST_SEED,
+    MOST_THREADS,
+    MOST_WORKERS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,8 +137,39 @@ search_options = added(
 """Options of a search for attractors at each of many parameters."""
 
 
-def output_options(suffixes: tuple[str, ...] = RESULTS, what: str = "Result") -> Decorator:
-    """Return --out with these suffixes, --plot, --rerun, --view and --json."""
+drawing_options = added(plot_option, rerun_option, view_option, json_option("; alone, no files"))
+store_options = added(
+    click.option("--resume", is_flag=True, help="Go on with the unfinished run in --out F.zarr."),
+    option(
+        "--part",
+        PART,
+        "Compute part K of N of the tiles of --out F.zarr; pendmap merge completes it.",
+        metavar="K/N",
+    ),
+    click.option(
+        "--mix", is_flag=True, help="Go on with a store begun where numbers are rounded otherwise."
+    ),
+)
+"""Options of analyses that are kept in a store."""
+worker_options = added(
+    option("--workers count", whole(1, MOST_WORKERS), "Processes of this machine that compute."),
+    option("--scheduler", TEXT, "Dask scheduler whose workers compute, like tcp://host:8786."),
+)
+"""Options of who computes the tiles of a result."""
+
+
+def output_options(
+    suffixes: tuple[str, ...] = RESULTS, what: str = "Result", *, stored: bool = False
+) -> Decorator:
+    """Return --out with these suffixes, --plot, --rerun, --view and --json.
+
+    What is ``stored`` may be at an address, and is kept tile by tile in a .zarr.
+    """
     kinds = " or ".join(suffixes)
+    if stored:
+        text = (
+            f"{what}: {kinds}, a path or an address like s3://; .zarr keeps tiles as they are done."
+        )
+        return added(option("--out", output_or_address(*suffixes), text), drawing_options)
     out = option("--out", output_file(*suffixes), f"{what}: {kinds}.")
-    return added(out, plot_option, rerun_option, view_option, json_option("; alone, no files"))
+    return added(out, drawing_options)

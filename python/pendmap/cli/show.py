@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.options import RESULTS
-from pendmap.cli.types import default_file
+from pendmap.cli.types import Address, default_file
 from pendmap.errors import InputError, NotWrittenError, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import columns
@@ -40,6 +40,7 @@ class Outputs:
     plot: Path | None = None
     report: Path | None = None
     rerun: Path | None = None
+    address: Address | None = None
     view: bool = False
     as_json: bool = False
     quiet: bool = False
@@ -58,6 +59,8 @@ class Outputs:
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
         taken = {field: given.pop(field) for field in fields}
+        if isinstance(taken.get("out"), Address):
+            taken |= {"address": taken["out"], "out": None}
         if default and not any(value for field, value in taken.items() if field != "quiet"):
             taken |= {field: default_file(name + files[field]) for field in files if field in taken}
         if taken.get("view") and taken["rerun"] is None:
@@ -83,7 +86,18 @@ class Outputs:
     @property
     def draws(self) -> bool:
         """Whether a file, a figure or a recording is written."""
-        return bool(self.out or self.plot or self.rerun or self.view)
+        return bool(self.out or self.address or self.drawings)
+
+    @property
+    def drawings(self) -> bool:
+        """Whether a figure or a recording is written."""
+        return bool(self.plot or self.rerun or self.view)
+
+    @property
+    def store(self) -> Path | Address | None:
+        """The Zarr store that --out names."""
+        zarr = self.out is not None and self.out.suffix.lower() == ".zarr"
+        return self.address or (self.out if zarr else None)
 
     @property
     def shows_progress(self) -> bool:
@@ -177,12 +191,23 @@ def keep_inputs(
                 )
 
 
-def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema) -> None:
-    """Write the files asked for, then JSON or the summary to stdout."""
-    from pendmap.files.dataset import history, save
+@contextlib.contextmanager
+def made_here() -> Iterator[None]:
+    """Let the ``history`` of results name this command."""
+    from pendmap.files.dataset import made_by
 
-    made = dataset.assign_attrs(history=history("pendmap " + shlex.join(sys.argv[1:])))
-    written = write_all(outputs.files(dataset, functools.partial(save, made)))
+    with made_by("pendmap " + shlex.join(sys.argv[1:])):
+        yield
+
+
+def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Sequence[str] = ()) -> None:
+    """Write the files asked for, then JSON or the summary to stdout; ``stored`` names stores."""
+    from pendmap.files.dataset import save
+
+    COMPLETE.extend(stored)
+    with made_here():
+        written = write_all(outputs.files(dataset, functools.partial(save, dataset)))
+    written[:0] = stored
     lines = (dataset.attrs[name] for name in ("title", "summary"))
     outputs.finish(written, lambda: schema.json(dataset), lines)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import click
 
-from pendmap.errors import MOST_CELLS, InputError, short_repr
+from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -139,6 +139,26 @@ def output_file(*suffixes: str) -> OptionType[Path]:
     return OptionType("file", functools.partial(_output, suffixes))
 
 
+class Address(str):
+    """Address of a store that is no path, like ``s3://bucket/map.zarr``."""
+
+    __slots__ = ()
+
+
+def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
+    """Return the type of files to write, and of stores at an address."""
+
+    def read(text: str) -> Path | Address:
+        if "://" not in text:
+            return _output(suffixes, text)
+        if not text.lower().rstrip("/").endswith(".zarr"):
+            raise InputError(f"{text!r}: suffix of an address must be .zarr")
+        _import_library(text, ".zarr")
+        return Address(text)
+
+    return OptionType("file", read)
+
+
 def _output(suffixes: tuple[str, ...], text: str) -> Path:
     """Refuse a file that cannot be written."""
     path = Path(text)
@@ -182,18 +202,22 @@ def _report(text: str) -> Path:
 def _check_library(path: Path) -> None:
     """Refuse a file that needs a library that is not installed, or a .zarr of something else."""
     suffix = path.suffix.lower()
+    _import_library(str(path), suffix)
+    if suffix == ".zarr":
+        from pendmap.files.dataset import check_replaceable
+
+        check_replaceable(path)
+
+
+def _import_library(name: str, suffix: str) -> None:
     module, extra = _LIBRARIES.get(suffix, ("pendmap.files", ""))
     try:
         importlib.import_module(module)
     except Exception as error:
         raise InputError(
-            f"{str(path)!r}: {suffix} needs {extra}, which cannot be imported "
+            f"{name!r}: {suffix} needs {extra}, which cannot be imported "
             f"({type(error).__name__}: {error}): it must be installed, or another output chosen"
         ) from error
-    if suffix == ".zarr":
-        from pendmap.files.dataset import check_replaceable
-
-        check_replaceable(path)
 
 
 _LIBRARIES = {
@@ -205,6 +229,15 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
+def _part(text: str) -> tuple[int, int]:
+    """Read the number of a part and of all parts."""
+    match = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text.strip())
+    number, parts = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= number <= parts <= MOST_PARTS:
+        raise InputError(f"must be K/N with K from 1 to N, like 7/64, got {short_repr(text)}")
+    return number, parts
+
+
 FILE: click.Path = click.Path(path_type=Path)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
@@ -212,6 +245,8 @@ RANGE = OptionType("A:B:N", _range)
 NUMBER_OR_RANGE = OptionType[float | AxisText](
     "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
 )
+PART = OptionType("K/N", _part)
+TEXT = OptionType("text", str)
 VALUES = OptionType("A:B:N", _values)
 INSTRUCTION_SET = OptionType("name", _instruction_set)
 REPORT = OptionType("file", _report)

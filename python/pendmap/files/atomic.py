@@ -94,18 +94,29 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path).resolve()
     with _named(Path(path)), _stage(target.parent) as stage:
-        new, old = (stage / kind / target.name for kind in ("new", "old"))
+        new = stage / "new" / target.name
         new.parent.mkdir()
-        old.parent.mkdir()
         with _disk_faults(stage / "probe"):
             yield new
-        if target.exists():
-            target.rename(old)
-        try:
-            new.rename(target)
-        except OSError:
-            _put_back(stage)
-            raise
+        _replace(target, new, stage)
+
+
+def move_folder(new: Path, target: Path) -> None:
+    """Move a folder to ``target``, on the same disk; a folder there is removed after that."""
+    with _named(target), _stage(target.parent) as stage:
+        _replace(target, new, stage)
+
+
+def _replace(target: Path, new: Path, stage: Path) -> None:
+    old = stage / "old" / target.name
+    old.parent.mkdir()
+    if target.exists():
+        target.rename(old)
+    try:
+        new.rename(target)
+    except OSError:
+        _put_back(stage)
+        raise
 
 
 def read_whole(path: str | os.PathLike[str], most: int) -> bytes:

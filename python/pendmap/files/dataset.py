@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import importlib.util
 import json
 import math
 import os
 import re
 import time
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import xarray as xr
@@ -19,8 +21,10 @@ from pendmap.errors import InputError
 from pendmap.files import check_regular, whole_file, whole_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
+    from collections.abc import Collection, Hashable, Iterator, Mapping
 
+MARK: Final = "pendmap"
+"""Attribute of a Zarr store that a run began: the request, and whether it is complete."""
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
@@ -29,11 +33,13 @@ KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
 _UPGRADE: Final = "pendmap.analysis.version_1"  # Module that knows the schemas, for old files alone
 _TEXT: Final = "_name"
 """Suffix of a coordinate of text in a file: by CF those named as their dimension are numbers."""
+_MADE_BY: Final = contextvars.ContextVar("made_by", default="")
 _LARGE: Final = 4096  # Number of values above which a variable is compressed
 _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
-# Names of files in a Zarr store: metadata and chunks
-_ZARR: Final = re.compile(r"\.z(attrs|group|array|metadata)|\d+(\.\d+)*")
+_UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
+# Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
+_ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
 
 
 def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -78,18 +84,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         )
     if target.suffix.lower() == ".zarr" and importlib.util.find_spec("zarr") is None:
         raise InputError(f"{target}: .zarr needs the extra pendmap[zarr]; .nc always works")
-    if "history" not in dataset.attrs:
-        made_by = " or ".join(f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
-        dataset = dataset.assign_attrs(history=history(made_by))
-    texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
-    dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
-    # Coordinates have no missing values.
-    encoding: dict[Hashable, dict[str, Any]] = {
-        name: {"_FillValue": None}
-        for name, each in dataset.coords.items()
-        if each.dtype.kind == "f"
-    }
     if target.suffix.lower() != ".zarr":
+        dataset, encoding = stored_form(dataset)
         for name, values in dataset.data_vars.items():
             if values.size > _LARGE:
                 encoding[name] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -98,8 +94,65 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         return target
     check_replaceable(target)
     with whole_folder(target) as part:
-        dataset.to_zarr(part, mode="w", zarr_format=2, consolidated=True, encoding=encoding)
+        write_zarr(dataset, part)
     return target
+
+
+def stored_form(dataset: xr.Dataset) -> tuple[xr.Dataset, dict[Hashable, dict[str, Any]]]:
+    """Return a result as files have it by CF, and the encoding of its variables."""
+    if "history" not in dataset.attrs:
+        functions = (f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
+        made_by = _MADE_BY.get() or " or ".join(functions)
+        dataset = dataset.assign_attrs(history=history(made_by))
+    texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
+    dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
+    # Coordinates have no missing values.
+    floats = (name for name, each in dataset.coords.items() if each.dtype.kind == "f")
+    return dataset, {name: {"_FillValue": None} for name in floats}
+
+
+def write_zarr(
+    dataset: xr.Dataset,
+    place: str | os.PathLike[str],
+    beside: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Write a result as Zarr v3, and return its attributes.
+
+    With ``beside`` its variables are added to a store, which has these attributes instead. Text is
+    written as strings of any length, the only ones that Zarr v3 specifies.
+    """
+    dataset, encoding = stored_form(dataset)
+    attributes = dict(dataset.attrs)
+    texts = [name for name, values in dataset.variables.items() if values.dtype.kind == "U"]
+    dataset = dataset.assign({name: dataset[name].astype(object) for name in texts})
+    mode: Literal["w", "a"] = "w" if beside is None else "a"
+    dataset.attrs = attributes if beside is None else dict(beside)
+    dataset.to_zarr(place, mode=mode, zarr_format=3, consolidated=False, encoding=encoding)
+    return attributes
+
+
+def open_zarr(
+    place: str | os.PathLike[str],
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
+    drop: Collection[str] = (),
+) -> xr.Dataset:
+    """Open a Zarr store as it is stored; variables are read when they are used, but for text."""
+    dataset: xr.Dataset = xr.open_zarr(
+        place, chunks=chunks, consolidated=False, drop_variables=list(drop), **_AS_STORED
+    )
+    texts = [name for name, values in dataset.variables.items() if values.dtype.kind in "OT"]
+    plain = {name: np.array(dataset[name].values.tolist(), dtype=str) for name in texts}
+    return dataset.assign({name: dataset[name].copy(data=values) for name, values in plain.items()})
+
+
+@contextlib.contextmanager
+def made_by(command: str) -> Iterator[None]:
+    """Let ``history`` name a command in the place of the function that it calls."""
+    token = _MADE_BY.set(command)
+    try:
+        yield
+    finally:
+        _MADE_BY.reset(token)
 
 
 def history(made_by: str) -> str:
@@ -118,15 +171,21 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{target}: {wanted}; it is a file")
     if not target.exists() or not any(target.iterdir()):
         return
-    try:
-        said = json.loads((target / ".zattrs").read_bytes())
-    except (FileNotFoundError, ValueError):
-        said = {}
+    said = _zarr_attributes(target)
     if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
         raise InputError(f"{target}: {wanted}; the folder does not contain a result")
     for entry in target.rglob("*"):
         if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
             raise InputError(f"{target}: {wanted}; it contains {entry.name!r}, no part of a result")
+
+
+def _zarr_attributes(target: Path) -> object:
+    """Return the attributes of a Zarr store of format 3 or 2, None if there are none."""
+    with contextlib.suppress(FileNotFoundError, KeyError, TypeError, ValueError):
+        return json.loads((target / "zarr.json").read_bytes())["attributes"]
+    with contextlib.suppress(FileNotFoundError, ValueError):
+        return json.loads((target / ".zattrs").read_bytes())
+    return None
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -135,12 +194,12 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : str or path
-        A file that :func:`save` wrote.
+        A file that :func:`save` wrote, or a store (``store=``) at a path or an address.
 
     Raises
     ------
     InputError
-        If it is not a result of pendmap, or of a later format.
+        If it is not a result of pendmap, of a later format, or not yet complete.
     OSError
         If it cannot be read.
 
@@ -151,23 +210,26 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     >>> pendmap.load(path).attrs["kind"]
     'melnikov'
     """
-    source = Path(path)
-    if not source.exists():
+    source = os.fspath(path) if "://" in os.fspath(path) else Path(path)
+    suffix = PurePath(source).suffix.lower()
+    if isinstance(source, Path) and not source.exists():
+        if source.with_name(f"{source.name}.part").exists():
+            raise InputError(f"{source}: {_UNFINISHED.format(source)}")
         raise FileNotFoundError(2, "no such file", str(source))
-    if source.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {source.suffix!r}")
-    zarr = source.suffix.lower() == ".zarr"
-    if not (zarr and source.is_dir()):
+    if suffix not in SUFFIXES:
+        raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}")
+    if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
         dataset: xr.Dataset = (
-            xr.open_zarr(source, consolidated=True, **_AS_STORED)
-            if zarr
+            open_zarr(source)
+            if suffix == ".zarr"
             else xr.open_dataset(source, engine="netcdf4", **_AS_STORED)
         )
         with dataset:
             _check_result(dataset, source)
-            dataset = _restored(dataset.load())
+            dataset = restored(dataset.load())
+        dataset.attrs.pop(MARK, None)
         if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
             dataset = importlib.import_module(_UPGRADE).upgraded(dataset)
     except InputError:
@@ -177,7 +239,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     return dataset
 
 
-def _restored(dataset: xr.Dataset) -> xr.Dataset:
+def restored(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset read as it is stored with the types and names that it had."""
     for each in dataset.variables.values():
         missing = each.attrs.pop("_FillValue", None)
@@ -195,7 +257,9 @@ def _restored(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars([*texts]).assign_coords(named)
 
 
-def _check_result(dataset: xr.Dataset, source: Path) -> None:
+def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
+    if dataset.attrs.get(MARK, {"complete": True})["complete"] is not True:
+        raise InputError(f"{source}: {_UNFINISHED.format(source)}")
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]

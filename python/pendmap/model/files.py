@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from pendmap.errors import InputError, check_type
 from pendmap.files import whole_file
 from pendmap.model.pendulum import Pendulum, model_text
 from pendmap.model.rig import Rig
-from pendmap.model.tables import read_model
+from pendmap.model.tables import parsed_model, read_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -98,3 +99,9 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
     with whole_file(path, (".toml",)) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
     return Path(path)
+
+
+def parse_model(text: str, where: str) -> Pendulum | Rig:
+    """Return the model of :func:`model_text`; ``where`` names it in errors."""
+    bare: Callable[..., Pendulum | Rig] = Pendulum
+    return parsed_model(tomllib.loads(text), where, bare=bare, si=Rig.of)

@@ -55,9 +55,20 @@ def read_model(
     si: Callable[..., _Model] | None = None,
 ) -> _Model:
     """Return the model of a file, made by ``bare`` or ``si``; refuse it if its maker is None."""
-    content = read_toml(path)
+    return parsed_model(read_toml(path), os.fspath(path), typed, bare=bare, si=si)
+
+
+def parsed_model(
+    content: dict[str, Any],
+    where: str,
+    typed: Mapping[str, float] | None = None,
+    *,
+    bare: Callable[..., _Model] | None = None,
+    si: Callable[..., _Model] | None = None,
+) -> _Model:
+    """Return the model of a parsed file, as :func:`read_model`; ``where`` names it in errors."""
     typed = dict(typed or {})
-    with named(os.fspath(path)):
+    with named(where):
         _check_top(content)
         table = content.get("pendulum")
         if not isinstance(table, dict):

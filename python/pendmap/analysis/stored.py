@@ -1,0 +1,255 @@
+"""Runs that are kept in a store: what they were asked for, how they go on, how parts are merged."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib.util
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import xarray as xr
+
+from pendmap import _core
+from pendmap.analysis.grid import Grid
+from pendmap.engine import (
+    MemoryStore,
+    PartDone,
+    Work,
+    ZarrStore,
+    executor_of,
+    pack,
+    rounding,
+    unpack,
+)
+from pendmap.errors import MOST_PARTS, InputError, check_flag, check_whole, short_repr
+from pendmap.formatting import counted
+from pendmap.model import model_text, parse_model
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from pendmap.analysis.numerics import Numerics, Progress
+    from pendmap.model import Pendulum, Rig
+
+    Compute = Callable[[Work], tuple[xr.Dataset, list[str]]]
+    """Function that computes a result, and names its variables that are cells of the store."""
+
+_DIGEST: Final = "sha256 "
+_GRIDS: Final = ("grid", "box")  # Arguments that are grids
+
+
+@dataclasses.dataclass(frozen=True)
+class Kept:
+    """Where a result is kept, and who computes it."""
+
+    store: str | os.PathLike[str] | None = None
+    resume: bool = False
+    part: tuple[int, int] | None = None
+    executor: Any = None
+    mix: bool = False
+    chunks: Any = None
+
+    def __post_init__(self) -> None:
+        check_flag("resume", self.resume)
+        check_flag("mix", self.mix)
+        if self.part is not None:
+            if not isinstance(self.part, tuple | list) or len(self.part) != 2:  # noqa: PLR2004
+                raise InputError(f"part must be (number, parts), like (7, 64), got {self.part}")
+            parts = check_whole("part: parts", self.part[1], 1, MOST_PARTS)
+            check_whole("part: number", self.part[0], 1, parts)
+        for what in ("resume", "part", "chunks"):
+            if self.store is None and getattr(self, what) not in (False, None):
+                raise InputError(f"{what} must be given with a store (.zarr), got none")
+        if self.chunks is not None and importlib.util.find_spec("dask") is None:
+            raise InputError("chunks need the extra pendmap[dask]")
+
+    @property
+    def tiled(self) -> bool:
+        """Whether the result is computed in tiles."""
+        return self.store is not None or self.executor is not None
+
+    def refuse(self, name: str) -> None:
+        """Refuse an argument that needs a result in the memory of this process."""
+        if self.tiled:
+            raise InputError(f"{name} must be given without a store or an executor, got both")
+
+    @staticmethod
+    def threads_of_tiles(numerics: Numerics) -> tuple[tuple[float, int | None, int], int]:
+        """Return limits of a tile with one thread, and how many tiles this process has at once."""
+        tol, bound, threads = numerics.limits
+        return (tol, bound, 1), threads or _core.default_threads()
+
+    def threads(self, threads: int | None) -> int | None:
+        """Return the threads of a tile that an executor computes: by default one."""
+        return None if self.executor is None else threads or 1
+
+    def complete(  # noqa: PLR0913, PLR0917 (a request and how it is computed)
+        self,
+        name: str,
+        model: Pendulum | Rig,
+        arguments: Mapping[str, Any],
+        job: Any,  # noqa: ANN401 (of the analysis)
+        compute: Compute,
+        progress: Progress | None,
+    ) -> xr.Dataset:
+        """Return the result of ``compute``, or of the store if it is complete there."""
+        with executor_of(executor=self.executor) as executor:
+            if self.store is None:
+                return compute(Work(job, MemoryStore(), executor, None, progress))[0]
+            store = ZarrStore(os.fspath(self.store))
+            mark = _request(name, model, arguments)
+            if self._begin(store, mark):
+                return store.result(self.chunks)
+            for key, values in arguments.items():
+                if isinstance(values, np.ndarray) and store.get(key) is None:
+                    store.put(key, pack(values=values))
+            work = Work(job, store, executor, self.part, progress)
+            try:
+                with work.named(store.unfinished):
+                    dataset, cells = compute(work)
+                    store.complete(dataset, cells, {**mark, "complete": True})
+            except PartDone:
+                return self._said(work, store.unfinished)
+            except BaseException:
+                if self.part is None:  # another part may have begun the store
+                    store.abandon()
+                raise
+            return store.result(self.chunks)
+
+    def _said(self, work: Work, name: str) -> xr.Dataset:
+        """Return a dataset without variables that tells what a part has done."""
+        number, parts = self.part or (1, 1)
+        line = f"{work.tiles_done} of {counted(work.tiles, 'tile')} are in {name}."
+        end = f"pendmap merge {self.store} completes it when all parts are."
+        told = {"part": number, "parts": parts, "tiles": work.tiles, "tiles_done": work.tiles_done}
+        title = f"Part {number} of {parts} is done"
+        return xr.Dataset(attrs={"title": title, "summary": f"{line}\n{end}", **told})
+
+    def _begin(self, store: ZarrStore, mark: dict[str, Any]) -> bool:
+        """Begin a store or go on with one; return whether it is complete."""
+        if store.local and not Path(store.address).resolve().parent.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(Path(store.address).parent))
+        old = store.mark()
+        if old is not None and (self.resume or self.part is not None):
+            self._check(store.address, old, mark)
+            if not old["complete"] and self.part is None:
+                store.go_on()
+            return bool(old["complete"])
+        if old is not None and not old["complete"]:
+            raise InputError(
+                f"{store.unfinished}: is an unfinished run: --resume (resume=True) goes on with "
+                "it; a new run must have another name"
+            )
+        store.begin({**mark, "complete": False})
+        return False
+
+    def _check(self, address: str, old: Mapping[str, Any], mark: Mapping[str, Any]) -> None:
+        """Refuse a store that another request, another version or another arithmetic began."""
+        for key, what in (("analysis", "analysis"), ("version", "version of pendmap")):
+            if old[key] != mark[key]:
+                raise InputError(f"{address}: was begun by {what} {old[key]}, not {mark[key]}")
+        before, now = (_flat(one) for one in (old, mark))
+        for key in sorted({*before, *now}):
+            if before.get(key) != now.get(key):
+                said, given = (short_repr(one.get(key)) for one in (before, now))
+                raise InputError(f"{address}: was begun with {key} = {said}, not {given}")
+        if old["rounding"] != mark["rounding"] and not self.mix:
+            raise InputError(
+                f"{address}: was begun with an instruction set that rounds otherwise "
+                f"({old['rounding']}, here {mark['rounding']}): --mix (mix=True) goes on"
+            )
+
+
+def merge(
+    store: str | os.PathLike[str],
+    *,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Complete a run in a store: compute what is missing, and what its tiles exchange.
+
+    Parameters
+    ----------
+    store : str or path
+        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`,
+        :func:`pendmap.bifurcation` or :func:`pendmap.lifetime` began, in parts or alone.
+    executor, threads, progress
+        As for :func:`pendmap.basins`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The result; of a complete store without a computation.
+
+    Raises
+    ------
+    InputError
+        If there is no run of this version.
+    OSError
+        If the store cannot be written.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum, grid = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0), pendmap.Grid.square(20)
+    >>> result = pendmap.basins(pendulum, grid, store="map.zarr")
+    >>> bool((pendmap.merge("map.zarr").label == result.label).all())
+    True
+    """
+    import pendmap  # noqa: PLC0415 (the public functions, which import this module)
+
+    place = ZarrStore(os.fspath(store))
+    mark = place.mark()
+    if not mark:
+        raise InputError(f"{place.address}: must be a store of a run, there is none")
+    if mark["complete"]:
+        return place.result()
+    arguments = dict(mark["arguments"])
+    for key, value in arguments.items():
+        if isinstance(value, str) and value.startswith(_DIGEST):
+            arguments[key] = unpack(place.get(key) or pack(values=[]))["values"]
+        elif key in _GRIDS and value is not None:
+            arguments[key] = Grid(*(tuple(axis) for axis in value))  # type: ignore[arg-type]
+        elif key == "ranges":
+            arguments[key] = {name: tuple(values) for name, values in value.items()}
+    run = getattr(pendmap, mark["analysis"])
+    model = parse_model(mark["model"], place.address)
+    more = {"executor": executor, "threads": threads, "progress": progress}
+    found: xr.Dataset = run(model, **arguments, store=store, resume=True, **more)
+    return found
+
+
+def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a request as JSON has it."""
+    return {
+        "analysis": name,
+        "version": _core.__version__,
+        "rounding": rounding(),
+        "model": model_text(dataclasses.replace(model, notes={})),
+        "arguments": {key: _plain(value) for key, value in arguments.items()},
+    }
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 (an argument)
+    match value:
+        case Grid():
+            return [list(value.theta.as_tuple), list(value.velocity.as_tuple)]
+        case np.ndarray():
+            return _DIGEST + hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+        case dict():
+            return {str(key): _plain(part) for key, part in value.items()}
+        case tuple() | list():
+            return [_plain(part) for part in value]
+        case np.generic():
+            return value.item()
+    return value
+
+
+def _flat(mark: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arguments and lines of the model of a request by their names."""
+    lines = (line.partition(" = ") for line in mark["model"].splitlines())
+    return {**{f"model: {k}": v for k, _, v in lines}, **mark["arguments"]}

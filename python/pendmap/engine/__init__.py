@@ -1,0 +1,20 @@
+"""Computations in tiles: where their results are kept, and who computes them."""
+
+from pendmap.engine.executors import executor_of
+from pendmap.engine.store import Layout, MemoryStore, Store, ZarrStore, pack, unpack
+from pendmap.engine.work import Job, PartDone, Tile, Work, rounding
+
+__all__ = [
+    "Job",
+    "Layout",
+    "MemoryStore",
+    "PartDone",
+    "Store",
+    "Tile",
+    "Work",
+    "ZarrStore",
+    "executor_of",
+    "pack",
+    "rounding",
+    "unpack",
+]

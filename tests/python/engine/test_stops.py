@@ -1,0 +1,90 @@
+"""Runs that are killed or run out of disk, and go on: equal to those that were not stopped."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import signal
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+import tiled
+from conftest import HERE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture(autouse=True)
+def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("basins", "lifetime"):
+        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
+
+
+def run(
+    name: str, store: Path, fault: str = "none", at: int = 0
+) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "tiled.py", name, str(store), fault, str(at)]
+    return subprocess.run(words, cwd=HERE, capture_output=True, text=True, check=False, timeout=300)
+
+
+def writes(name: str, folder: Path) -> int:
+    """Return the number of writes of an uninterrupted run."""
+    return int(run(name, folder / "whole.zarr").stdout)
+
+
+def killed_often(name: str, folder: Path, kills: int) -> None:
+    """Assert that a run that was killed again and again is equal to one that was not."""
+    draw = random.Random(name)  # noqa: S311 (no secret)
+    store = folder / "killed.zarr"
+    every = writes(name, folder)
+    for kill in itertools.count():
+        most = every if kill >= kills else 2 * every // kills
+        ended = run(name, store, "killed", draw.randint(1, most))
+        if ended.returncode == 0:
+            break
+        assert ended.returncode == -signal.SIGKILL, ended.stderr
+    assert kill > kills // 2
+    tiled.assert_same(pendmap.load(store), tiled.CASES[name]())
+    assert {path.name for path in folder.iterdir()} == {"whole.zarr", "killed.zarr"}
+
+
+def test_a_killed_run_goes_on(tmp_path: Path) -> None:
+    killed_often("basins", tmp_path, 3)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["chaos", "bifurcation", "lifetime", "list"])
+def test_every_killed_analysis_goes_on(tmp_path: Path, name: str) -> None:
+    killed_often(name, tmp_path, 5)
+
+
+@pytest.mark.thorough
+def test_a_map_that_is_killed_50_times_goes_on(tmp_path: Path) -> None:
+    killed_often("map", tmp_path, 50)
+
+
+@pytest.mark.parametrize("name", ["basins", "bifurcation"])
+def test_a_full_disk_keeps_what_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    store = tmp_path / "full.zarr"
+    half = writes(name, tmp_path) // 2
+    full = run(name, store, "full", half)
+    assert full.returncode == 1
+    assert "No space left on device; " in full.stderr.splitlines()[-1]
+    assert "tiles are kept, --resume goes on" in full.stderr.splitlines()[-1]
+    with pytest.raises(
+        pendmap.InputError, match=r"full\.zarr: is an unfinished run: pendmap merge"
+    ):
+        pendmap.load(store)
+    if name == "basins":
+        with monkeypatch.context() as patch:
+            patch.setattr("pendmap.analysis.basins.TILE", 2 * tiled.TILE)
+            with pytest.raises(pendmap.InputError, match="was begun with tiles of"):
+                pendmap.merge(store)
+    tiled.assert_same(pendmap.merge(store), tiled.CASES[name]())

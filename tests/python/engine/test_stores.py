@@ -1,0 +1,147 @@
+"""Stores: where they may be, what they refuse, what they leave."""
+
+from __future__ import annotations
+
+import json
+import socket
+from typing import TYPE_CHECKING
+
+import fsspec
+import numpy as np
+import pytest
+import xarray as xr
+from moto.server import ThreadedMotoServer
+
+import pendmap
+import tiled
+from pendmap import Grid, InputError, Pendulum
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from conftest import Run
+
+SMALL = ("basins", "--p", "0.6", "--grid", "30")
+
+
+@pytest.fixture(autouse=True)
+def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("basins", "lifetime"):
+        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
+
+
+@pytest.fixture(scope="module")
+def bucket() -> Iterator[str]:
+    """A bucket of a local S3 server."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server = ThreadedMotoServer("127.0.0.1", port, verbose=False)
+    server.start()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+            patch.setenv(name, "any")
+        fsspec.filesystem("s3").mkdir("maps")
+        yield "s3://maps"
+    server.stop()
+
+
+@pytest.mark.parametrize("name", ["basins", "map"])
+def test_a_store_may_be_in_an_object_store(bucket: str, name: str) -> None:
+    store = f"{bucket}/{name}.zarr"
+    for number in (1, 2):
+        tiled.CASES[name](store=store, part=(number, 2))
+    with pytest.raises(InputError, match="is an unfinished run: --resume"):
+        tiled.CASES[name](store=store)
+    with pytest.raises(InputError, match="is an unfinished run: pendmap merge"):
+        pendmap.load(store)
+    tiled.assert_same(pendmap.merge(store), tiled.CASES[name]())
+    tiled.assert_same(pendmap.load(store), tiled.CASES[name]())
+
+
+def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, grid = tmp_path / "map.zarr", Grid.square(60)
+    pendmap.basins(Pendulum(p=0.6), grid, store=store, part=(1, 2))
+
+    def refused(said: str, model: Pendulum, grid: Grid, **other: float) -> None:
+        with pytest.raises(InputError, match=said):
+            pendmap.basins(model, grid, store=store, resume=True, **other)
+
+    refused(r"was begun with model: p = '0.6', not '0.7'", Pendulum(p=0.7), grid)
+    refused("was begun with grid = ", Pendulum(p=0.6), Grid.square(61))
+    refused("was begun with tol = 1e-06, not 1e-07", Pendulum(p=0.6), grid, tol=1e-7)
+    with pytest.raises(InputError, match="was begun by analysis basins, not lifetime"):
+        pendmap.lifetime(Pendulum(p=0.6), store=store, resume=True)
+    with pytest.raises(InputError, match=r"is an unfinished run: --resume \(resume=True\) goes on"):
+        pendmap.basins(Pendulum(p=0.6), grid, store=store)
+    monkeypatch.setenv("PENDMAP_SIMD", "portable")
+    refused("was begun with an instruction set that rounds otherwise", Pendulum(p=0.6), grid)
+    mixed = pendmap.basins(Pendulum(p=0.6), grid, store=store, resume=True, mix=True)
+    assert mixed.label.shape == (60, 60)
+
+
+def test_another_version_is_refused(tmp_path: Path) -> None:
+    store = tmp_path / "map.zarr"
+    tiled.CASES["basins"](store=store, part=(1, 2))
+    root = tmp_path / "map.zarr.part" / "zarr.json"
+    said = json.loads(root.read_text())
+    said["attributes"]["pendmap"]["version"] = "0.0.1"
+    root.write_text(json.dumps(said))
+    with pytest.raises(InputError, match=r"was begun by version of pendmap 0\.0\.1, not "):
+        tiled.CASES["basins"](store=store, resume=True)
+
+
+def test_an_older_result_is_there_until_the_new_one_is(tmp_path: Path) -> None:
+    store, model = tmp_path / "map.zarr", Pendulum(p=0.6)
+    old = pendmap.basins(model, Grid.square(40), store=store).load()
+    pendmap.basins(model, Grid.square(60), store=tmp_path / "other.zarr")
+    (tmp_path / "other.zarr").rename(tmp_path / "map.zarr.part")  # complete, not yet in its place
+    assert pendmap.load(store).sizes["theta"] == 40
+    assert pendmap.merge(store).sizes["theta"] == 60
+    tiled.assert_same(pendmap.basins(model, Grid.square(40), store=store), old)
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
+
+
+@pytest.mark.parametrize("kind", ["file", "folder", "group"])
+def test_what_is_no_store_is_kept(tmp_path: Path, kind: str) -> None:
+    store = tmp_path / "map.zarr"
+    match kind:
+        case "file":
+            store.write_text("mine")
+        case "folder":
+            store.mkdir()
+            (store / "thesis.tex").write_text("mine")
+        case "group":
+            xr.Dataset({"x": ("t", [1.0])}).to_zarr(store, zarr_format=3, consolidated=False)
+    before = sorted(store.rglob("*"))
+    for keep in ({}, {"resume": True}):
+        with pytest.raises(InputError, match="must be a new folder, or a result of pendmap"):
+            tiled.CASES["basins"](store=store, **keep)
+    assert sorted(store.rglob("*")) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
+
+
+def test_bad_input_leaves_no_store(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the smallest error that steps can reach"):
+        pendmap.basins(Pendulum(p=1e6), Grid.square(30), store=tmp_path / "map.zarr")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_the_command_keeps_resumes_and_merges(tmp_path: Path, pendmap_command: Run) -> None:
+    told = pendmap_command(*SMALL, "--out", "a.zarr", "--part", "1/2", "--json")
+    assert json.loads(told.stdout) == {"part": 1, "parts": 2, "tiles": 1, "tiles_done": 1}
+    assert (
+        "pendmap merge a.zarr completes it"
+        in pendmap_command(*SMALL, "--out", "a.zarr", "--part", "2/2").stdout
+    )
+    merged = pendmap_command("merge", "a.zarr", "--plot", "a.png")
+    assert merged.stdout.splitlines()[-1] == "Written: a.zarr, a.png"
+    plain = pendmap_command(*SMALL, "--out", "b.nc")
+    assert plain.stdout.splitlines()[:5] == merged.stdout.splitlines()[:5]
+    one, other = (pendmap.load(tmp_path / name) for name in ("a.zarr", "b.nc"))
+    tiled.assert_same(one, other)
+    assert ": pendmap merge a.zarr --plot a.png" in one.attrs["history"]
+    assert np.array_equal(xr.open_zarr(tmp_path / "a.zarr", consolidated=False).label, other.label)

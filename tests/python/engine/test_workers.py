@@ -1,0 +1,204 @@
+"""Tiles computed by processes, clusters and parts: the bits of the plain call."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+import distributed
+import pytest
+from joblib.externals.loky import get_reusable_executor
+
+import pendmap
+import tiled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    import xarray as xr
+
+
+@pytest.fixture(autouse=True)
+def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("basins", "lifetime"):
+        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
+
+
+@contextlib.contextmanager
+def pool() -> Iterator[Executor]:
+    fresh = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=fresh) as executor:
+        yield executor
+
+
+@contextlib.contextmanager
+def local_cluster() -> Iterator[Executor]:
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as own,
+        distributed.Client(own, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@contextlib.contextmanager
+def separate_processes() -> Iterator[Executor]:
+    """A cluster of a ``dask scheduler`` and two ``dask worker``, as on several machines."""
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1"]
+    with contextlib.ExitStack() as stack:
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+
+        def started(*words: str) -> subprocess.Popen[str]:
+            process = stack.enter_context(subprocess.Popen(words, **quiet))  # type: ignore[call-overload]
+            stack.callback(process.terminate)
+            return process  # type: ignore[no-any-return]
+
+        scheduler = started(*dask, "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
+        address = next(
+            line.split()[-1] for line in scheduler.stderr or () if "Scheduler at:" in line
+        )
+        for _ in range(2):
+            started(*worker, "--no-dashboard", address)
+        with distributed.Client(address, set_as_default=False) as client:
+            yield client
+
+
+@contextlib.contextmanager
+def joblib() -> Iterator[Executor]:
+    executor = get_reusable_executor(max_workers=2)
+    yield executor
+    executor.shutdown(wait=True, kill_workers=True)
+
+
+def plain(name: str) -> xr.Dataset:
+    return tiled.CASES[name]()
+
+
+@pytest.mark.parametrize("name", [*tiled.CASES])
+def test_processes_compute_the_same_bits(tmp_path: Path, name: str) -> None:
+    with pool() as executor:
+        tiled.assert_same(tiled.CASES[name](executor=executor), plain(name))
+        kept = tiled.CASES[name](executor=executor, store=tmp_path / "map.zarr")
+        tiled.assert_same(kept, plain(name))
+
+
+@pytest.mark.parametrize("executors", [local_cluster, joblib])
+def test_executors_compute_the_same_bits(
+    tmp_path: Path,
+    executors: Callable[[], AbstractContextManager[Executor]],
+) -> None:
+    with executors() as executor:
+        for name in ("basins", "map"):
+            kept = tiled.CASES[name](executor=executor, store=tmp_path / f"{name}.zarr")
+            tiled.assert_same(kept, plain(name))
+        tiled.assert_same(tiled.CASES["chaos"](executor=executor), plain("chaos"))
+
+
+@pytest.mark.thorough
+def test_separate_processes_compute_the_same_bits(tmp_path: Path) -> None:
+    with separate_processes() as client:
+        for name in tiled.CASES:
+            kept = tiled.CASES[name](executor=client, store=tmp_path / f"{name}.zarr")
+            tiled.assert_same(kept, plain(name))
+
+
+@pytest.mark.parametrize("name", [*tiled.CASES])
+def test_parts_that_are_merged_are_the_same_bits(tmp_path: Path, name: str) -> None:
+    store = tmp_path / "parts.zarr"
+    for number in (3, 1, 2):
+        told = tiled.CASES[name](store=store, part=(number, 3)).attrs
+        assert (told["part"], told["parts"]) == (number, 3)
+    assert told["tiles_done"] == told["tiles"]
+    tiled.assert_same(pendmap.merge(store), plain(name))
+    tiled.assert_same(pendmap.load(store), plain(name))
+    tiled.assert_same(tiled.CASES[name](store=store, part=(2, 3)), plain(name))
+
+
+def test_a_part_that_was_left_out_is_computed_by_merge(tmp_path: Path) -> None:
+    tiled.CASES["basins"](store=tmp_path / "parts.zarr", part=(2, 4))
+    tiled.assert_same(pendmap.merge(tmp_path / "parts.zarr"), plain("basins"))
+
+
+@pytest.mark.thorough
+def test_workers_that_are_killed_cost_only_their_tiles(tmp_path: Path) -> None:
+    over, killed = threading.Event(), []
+    with local_cluster() as client:
+
+        def kill() -> None:
+            while not over.wait(1.5):
+                pids = [own["pid"] for own in client.run(lambda: {"pid": os.getpid()}).values()]
+                killed.extend(pids[:1])
+                os.kill(pids[0], signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        try:
+            for name in ("basins", "map", "chaos"):
+                kept = tiled.CASES[name](executor=client, store=tmp_path / f"{name}.zarr")
+                tiled.assert_same(kept, plain(name))
+        finally:
+            over.set()
+            thread.join()
+    assert killed
+
+
+def test_workers_that_are_gone_are_an_error_that_keeps_the_tiles(tmp_path: Path) -> None:
+    store = tmp_path / "map.zarr"
+
+    class Fewer:
+        """An executor that takes five tiles."""
+
+        def __init__(self, executor: Executor) -> None:
+            self.left, self.executor = 5, executor
+
+        def submit(self, *call: object) -> object:
+            self.left -= 1
+            if self.left < 0:
+                raise RuntimeError("cannot schedule new futures after shutdown")
+            return self.executor.submit(*call)  # type: ignore[arg-type]
+
+    with pool() as executor, pytest.raises(OSError, match="the workers are gone") as gone:
+        tiled.CASES["basins"](executor=Fewer(executor), store=store)
+    assert "--resume goes on" in str(gone.value)
+    tiled.assert_same(tiled.CASES["basins"](store=store, resume=True), plain("basins"))
+
+
+def test_an_error_of_a_worker_is_that_of_the_call() -> None:
+    with pool() as executor, pytest.raises(pendmap.InputError, match="tol must be"):
+        pendmap.basins(pendmap.Pendulum(), pendmap.Grid.square(50), tol=1.0, executor=executor)
+
+
+@pytest.mark.parametrize(
+    ("keep", "said"),
+    [
+        ({"executor": 3}, "executor must have submit"),
+        ({"part": (3, 2), "store": "x.zarr"}, "part: number must be a whole number from 1 to 2"),
+        ({"part": (1, 2)}, "part must be given with a store"),
+        ({"resume": True}, "resume must be given with a store"),
+        ({"chunks": {}}, "chunks must be given with a store"),
+        ({"store": "no/folder/x.zarr"}, "the folder does not exist"),
+    ],
+)
+def test_bad_input_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keep: dict[str, object], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((pendmap.InputError, OSError), match=said):
+        tiled.CASES["basins"](**keep)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_lazy_results_are_arrays_of_dask(tmp_path: Path) -> None:
+    lazy = tiled.CASES["basins"](store=tmp_path / "map.zarr", chunks={})
+    assert lazy.label.chunks[0][:2] == (15, 15)
+    tiled.assert_same(lazy, plain("basins"))

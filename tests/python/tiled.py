@@ -1,0 +1,80 @@
+"""Small results in many tiles, and one that is stopped at one of its writes.
+
+``python tiled.py ANALYSIS STORE FAULT AT`` begins or goes on with a run; at write ``AT`` it is
+killed (``killed``), or the disk is full from there on (``full``); else it tells their number.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import signal
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+import pendmap
+from pendmap import Grid, Pendulum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+TILE = 1500
+_DRY = Pendulum(gamma=0.05, theta_r=0.05, p=1.1, omega=1.9)
+_WINDOW = {"p": (0.2, 2.0, 20), "omega": (1.5, 2.2, 18)}
+_STARTS = np.random.default_rng(1).uniform(-3, 3, (2, 1500))
+_CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, not of what
+
+CASES: dict[str, Callable[..., xr.Dataset]] = {
+    "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(103), **keep),
+    "chaos": lambda **keep: pendmap.basins(Pendulum(p=1.5, omega=1.1), Grid.square(103), **keep),
+    "map": lambda **keep: pendmap.parameter_map(Pendulum(), _WINDOW, starts=3, **keep),
+    "bifurcation": lambda **keep: pendmap.bifurcation(Pendulum(), {"p": (0.2, 2.0, 40)}, **keep),
+    "lifetime": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), starts=4000, **keep),
+    "list": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), *_STARTS, **keep),
+}
+"""Analyses that are computed in tiles."""
+
+
+def small_tiles() -> None:
+    """Let tiles of this process be small."""
+    for name in ("basins", "lifetime"):
+        importlib.import_module(f"pendmap.analysis.{name}").TILE = TILE
+
+
+def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
+    """Assert that two results are equal bit for bit."""
+    bare = [
+        each.load().assign_attrs(dict.fromkeys(_CHANGES, ""), threads=0) for each in (one, other)
+    ]
+    xr.testing.assert_identical(*bare)
+
+
+def stopped(fault: str, at: int, store: str, count: list[int]) -> None:
+    """Stop this process when it writes to ``store`` for the time ``at``; count in ``count``."""
+
+    def hook(event: str, words: tuple[Any, ...]) -> None:
+        writes = {"open", "os.rename", "os.remove", "os.rmdir", "os.mkdir"}
+        if event not in writes or store not in str(words[0]):
+            return
+        if event == "open" and not words[2] & os.O_CREAT:
+            return
+        count[0] += 1
+        if fault == "killed" and count[0] == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if fault == "full" and count[0] >= at and event == "open":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(words[0]))
+
+    sys.addaudithook(hook)
+
+
+if __name__ == "__main__":
+    name, place, fault, at = sys.argv[1:]
+    small_tiles()
+    writes = [0]
+    stopped(fault, int(at), place, writes)
+    CASES[name](store=place, resume=True)
+    sys.stdout.write(f"{writes[0]}\n")
