@@ -49,6 +49,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--side", type=int, default=4000)
     parser.add_argument("--pairs", type=int, default=3)
+    parser.add_argument("--p", nargs="+", default=["1", "1.7"])
     parser.add_argument("--large", type=int)
     given = parser.parse_args()
     rows = []
@@ -63,9 +64,8 @@ def main() -> None:
                 f"at the peak, {size / MIB:.0f} MiB on disk"
             )
             return
-        for p in ("1", "1.7"):
-            side = given.side if p == "1" else given.side // 2
-            plain = ["basins", "--p", p, "--grid", str(side)]
+        for p in given.p:
+            plain = ["basins", "--p", p, "--grid", str(given.side)]
             nc, zarr = [*plain, "--out", "m.nc"], [*plain, "--out", "m.zarr"]
             alone, both = [*zarr, "--workers", "1"], [*zarr, "--workers", "2"]
             for what, one, other in (
@@ -73,7 +73,7 @@ def main() -> None:
                 ("store and two workers / file", nc, both),
                 ("two workers / one", alone, both),
             ):
-                rows.append([p, f"{side}^2", what, *pairs(folder, given.pairs, one, other)])
+                rows.append([p, f"{given.side}^2", what, *pairs(folder, given.pairs, one, other)])
     say(machine(["numpy", "zarr", "distributed"]))
     say(table(["p", "cells", "ratio of", "wall", "CPU", "MiB", "MiB"], rows))
 

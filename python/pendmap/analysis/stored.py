@@ -6,7 +6,6 @@ import dataclasses
 import hashlib
 import importlib.util
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -130,8 +129,6 @@ class Kept:
 
     def _begin(self, store: ZarrStore, mark: dict[str, Any]) -> bool:
         """Begin a store or go on with one; return whether it is complete."""
-        if store.local and not Path(store.address).resolve().parent.is_dir():
-            raise FileNotFoundError(2, "the folder does not exist", str(Path(store.address).parent))
         old = store.mark()
         if old is not None and (self.resume or self.part is not None):
             self._check(store.address, old, mark)

@@ -36,7 +36,7 @@ def executor_of(
     Raises InputError for more than one of the three, or what is none.
     """
     if sum(given is not None for given in (scheduler, workers, executor)) > 1:
-        raise InputError("one of scheduler, workers and executor must be given, got more")
+        raise InputError("only one of scheduler, workers and executor must be given, got more")
     if executor is not None:
         if not hasattr(executor, "submit"):
             raise InputError(

@@ -197,7 +197,7 @@ class ZarrStore:
     @property
     def unfinished(self) -> str:
         """Name of the store until it is complete."""
-        return f"{self.address.rstrip('/')}.part" if self.local else self.address
+        return f"{self._name.rstrip('/')}.part" if self.local else self.address
 
     @property
     def _root(self) -> str:
@@ -223,10 +223,18 @@ class ZarrStore:
     def mark(self) -> dict[str, Any] | None:
         """Return what the run says of its request, that of an unfinished one first; None: no run.
 
-        Raises InputError for what is neither a run nor a result that may be replaced.
+        Raises InputError for what is neither a run nor a result that may be replaced, or for an
+        address that cannot be reached, OSError for a missing folder.
         """
-        system, _ = self._place
-        self.publish()
+        system, path = self._place
+        if self.local and not Path(path).parent.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(Path(self._name).parent))
+        try:
+            self.publish()
+        except (InputError, OSError):
+            raise
+        except Exception as error:  # libraries of object stores have their own
+            raise InputError(f"{self.address}: cannot be reached: {error}") from error
         if system.exists(self._root):
             if not system.exists(f"{self._root}/zarr.json"):
                 if system.isfile(self._root) or system.ls(self._root, detail=False):

@@ -62,6 +62,27 @@ def test_a_store_may_be_in_an_object_store(bucket: str, name: str) -> None:
     tiled.assert_same(pendmap.load(store), tiled.CASES[name]())
 
 
+def test_a_path_may_be_an_address(tmp_path: Path) -> None:
+    kept = tiled.CASES["basins"](store=f"file://{tmp_path}/map.zarr")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
+    tiled.assert_same(kept, tiled.CASES["basins"]())
+    with pytest.raises(FileNotFoundError, match="the folder does not exist"):
+        tiled.CASES["basins"](store=f"file://{tmp_path}/missing/map.zarr")
+    with pytest.raises(InputError, match=r"s4://maps/map\.zarr: Protocol not known: s4"):
+        tiled.CASES["basins"](store="s4://maps/map.zarr")
+
+
+def test_an_object_store_that_is_not_reached_is_told(
+    bucket: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object, **__: object) -> None:
+        raise RuntimeError("no connection")
+
+    monkeypatch.setattr("s3fs.S3FileSystem.exists", gone)
+    with pytest.raises(InputError, match=r"s3://maps/x\.zarr: cannot be reached: no connection"):
+        tiled.CASES["basins"](store=f"{bucket}/x.zarr")
+
+
 def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, grid = tmp_path / "map.zarr", Grid.square(60)
     pendmap.basins(Pendulum(p=0.6), grid, store=store, part=(1, 2))
