@@ -81,14 +81,8 @@ impl TextureSum {
         Self { columns, rows, done: 0, bands: Vec::new() }
     }
 
-    /// Whether a part may begin with this row: one with which a row of boxes begins.
-    #[must_use]
-    pub const fn may_begin(row: usize) -> bool {
-        row.is_multiple_of(BOX)
-    }
-
     /// Adds the labels of the next rows, and of the row after them unless it is beyond the last; the
-    /// next part begins with that row, which a row of boxes must begin with.
+    /// next part begins with that row, the first of a row of boxes.
     pub fn add(&mut self, cells: &[i16], pool: &rayon::ThreadPool) {
         let given = cells.len() / self.columns.max(1);
         let last = self.done + given == self.rows;

@@ -103,17 +103,15 @@ impl Survey {
     }
 
     /// The results of a block on its own.
-    #[pyo3(signature = (block, threads=None, progress=None))]
+    #[pyo3(signature = (block, progress=None))]
     fn search<'py>(
         &self,
         py: Python<'py>,
         block: usize,
-        threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         self.checked(block)?;
-        let threads = threads.unwrap_or(self.threads);
-        let found = pooled(py, threads, progress.as_ref(), |control| {
+        let found = pooled(py, self.threads, progress.as_ref(), |control| {
             control.begin(self.own.cells(block).len());
             self.own.search(block, control)
         })?;
@@ -123,15 +121,13 @@ impl Survey {
     /// The results of a block after exchange `pass_number` (from 1); none if they are those before it.
     ///
     /// `known` has the results before it of the block and those around it.
-    #[pyo3(signature = (pass_number, block, known, threads=None, progress=None))]
-    #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+    #[pyo3(signature = (pass_number, block, known, progress=None))]
     fn exchange<'py>(
         &self,
         py: Python<'py>,
         pass_number: usize,
         block: usize,
         known: BTreeMap<usize, Vec<u8>>,
-        threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyBytes>>> {
         self.checked(block)?;
@@ -146,7 +142,7 @@ impl Survey {
         };
         let known: BTreeMap<usize, survey::Block> =
             self.own.around(block).into_iter().map(one).collect::<PyResult<_>>()?;
-        let found = pooled(py, threads.unwrap_or(self.threads), progress.as_ref(), |control| {
+        let found = pooled(py, self.threads, progress.as_ref(), |control| {
             self.own.exchange(pass_number, block, |other| &known[&other], control)
         })?;
         Ok(found.map(|found| PyBytes::new(py, &found.to_bytes())))
@@ -167,15 +163,14 @@ impl Survey {
     }
 
     /// The whole diagram, from the results of all blocks; what is followed starts from `first`.
-    #[pyo3(signature = (blocks, first=None, threads=None))]
+    #[pyo3(signature = (blocks, first=None))]
     fn diagram(
         &self,
         py: Python<'_>,
         blocks: Vec<Vec<u8>>,
         first: Option<[f64; 2]>,
-        threads: Option<usize>,
     ) -> PyResult<Py<Bifurcation>> {
-        let found = pooled(py, threads.unwrap_or(self.threads), None, |control| {
+        let found = pooled(py, self.threads, None, |control| {
             let map = self.own.result(&self.stored(&blocks)?)?;
             followed(map, &self.own.plane(), first, control)
         })?;

@@ -19,12 +19,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@pytest.fixture(autouse=True)
-def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("basins", "lifetime"):
-        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
-
-
 def run(
     name: str, store: Path, fault: str = "none", at: int = 0
 ) -> subprocess.CompletedProcess[str]:

@@ -25,12 +25,6 @@ if TYPE_CHECKING:
 SMALL = ("basins", "--p", "0.6", "--grid", "30")
 
 
-@pytest.fixture(autouse=True)
-def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("basins", "lifetime"):
-        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
-
-
 @pytest.fixture(scope="module")
 def bucket() -> Iterator[str]:
     """A bucket of a local S3 server."""

@@ -28,12 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@pytest.fixture(autouse=True)
-def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("basins", "lifetime"):
-        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
-
-
 @contextlib.contextmanager
 def pool() -> Iterator[Executor]:
     fresh = multiprocessing.get_context("spawn")
