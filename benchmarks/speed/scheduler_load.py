@@ -100,8 +100,8 @@ def processes(workers: int, folder: Path) -> Iterator[Load]:
     file = folder / "scheduler.json"
     dask = [sys.executable, "-m", "dask"]
     quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    scheduler_call = [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    scheduler_call += ["--no-show", "--scheduler-file", str(file)]
+    scheduler_call = [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show"]
+    scheduler_call += ["--dashboard-address", "127.0.0.1:0", "--scheduler-file", str(file)]
     worker_call = [*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1"]
     worker_call += ["--no-nanny", "--no-dashboard", "--local-directory", str(folder)]
     started = [subprocess.Popen(scheduler_call, **quiet)]  # noqa: S603 (dask itself)
@@ -124,7 +124,7 @@ def local(workers: int, folder: Path) -> Iterator[Load]:
     with LocalCluster(
         n_workers=workers,
         threads_per_worker=1,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",
         local_directory=str(folder),
     ) as cluster:
         with Client(cluster) as client:

@@ -7,6 +7,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -18,6 +19,7 @@ from joblib.externals.loky import get_reusable_executor
 
 import pendmap
 import tiled
+from pendmap.engine import executor_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
+
+
+# The scheduler's status page listens even when it shows nothing: 8787 may be taken.
+ANY_PORT = "127.0.0.1:0"
 
 
 @contextlib.contextmanager
@@ -38,7 +44,7 @@ def pool() -> Iterator[Executor]:
 @contextlib.contextmanager
 def local_cluster() -> Iterator[Executor]:
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as own,
+        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=ANY_PORT) as own,
         distributed.Client(own, set_as_default=False) as client,
     ):
         yield client
@@ -57,7 +63,8 @@ def separate_processes() -> Iterator[Executor]:
             stack.callback(process.terminate)
             return process  # type: ignore[no-any-return]
 
-        scheduler = started(*dask, "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
+        local = ["--host", "127.0.0.1", "--port", "0", "--dashboard-address", ANY_PORT]
+        scheduler = started(*dask, *local)
         address = next(
             line.split()[-1] for line in scheduler.stderr or () if "Scheduler at:" in line
         )
@@ -96,6 +103,14 @@ def test_executors_compute_the_same_bits(
             kept = tiled.CASES[name](executor=executor, store=tmp_path / f"{name}.zarr")
             tiled.assert_same(kept, plain(name))
         tiled.assert_same(tiled.CASES["chaos"](executor=executor), plain("chaos"))
+
+
+def test_workers_start_where_the_port_of_dask_is_taken() -> None:
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # it is taken already
+            stack.enter_context(socket.create_server(("", 8787)))
+        executor = stack.enter_context(executor_of(workers=1))
+        assert executor.submit(sum, (1, 2)).result() == 3
 
 
 @pytest.mark.thorough
