@@ -175,7 +175,7 @@ def merge(
     Parameters
     ----------
     store : str or path
-        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`,
+        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`, :func:`pendmap.sweep`,
         :func:`pendmap.bifurcation` or :func:`pendmap.lifetime` began, in parts or alone.
     executor, threads, progress
         As for :func:`pendmap.basins`.
