@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
@@ -81,7 +81,7 @@ SCHEMA = Schema(
 
 def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     pendulum: Pendulum | Rig,
-    ranges: Mapping[str, Sequence[float]],
+    ranges: Mapping[str, ArrayLike],
     analysis: str = "basins",
     *,
     grid: Grid | int | None = None,
@@ -118,9 +118,10 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     ----------
     pendulum : Pendulum or Rig
         The model; parameters that vary replace its own.
-    ranges : mapping of str to (float, float, int)
-        One or two parameters with first value, last value (both included) and how many, as for
-        :func:`pendmap.parameter_map`.
+    ranges : mapping of str to array_like or (float, float, int)
+        One or two parameters with an array of ascending values, or a tuple of first value, last
+        value (both included) and how many; names as for :func:`pendmap.parameter_map`. Two have
+        evenly spaced values.
     analysis : str
         What is done for each model: ``basins``.
     grid : Grid or int, optional
@@ -171,7 +172,10 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
     bare, units = without_dimensions(pendulum)
     two = isinstance(ranges, dict) and len(ranges) == 2  # noqa: PLR2004
-    axes = parameters.varied(pendulum, ranges, 2 if two else 1)
+    axes = parameters.varied(pendulum, ranges, 2 if two else 1, listed=True)
+    for axis in axes if two else ():
+        if not axis.even:
+            raise InputError(f"{axis.name} must be evenly spaced where two parameters vary")
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
@@ -214,7 +218,10 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         return dataset, ["label"]
 
     request = {
-        "ranges": ranges,
+        "ranges": {
+            axis.name: own if isinstance(own, tuple) else axis.values.tolist()
+            for axis, own in zip(axes, ranges.values(), strict=True)
+        },
         "analysis": analysis,
         "grid": grid,
         "tol": numerics.tol,

@@ -269,3 +269,26 @@ def test_the_window_is_that_of_the_grid() -> None:
     found = pendmap.sweep(DRIVEN, {"p": (0.5, 0.6, 2)}, grid=grid)
     assert found.label.shape == (2, 5, 6)
     assert float(found.theta_bounds[0, 0]) == -1.0
+
+
+def test_values_may_be_any_that_ascend(tmp_path: Path) -> None:
+    values = [0.4, 0.5, 0.7, 0.75]
+    found = pendmap.sweep(Pendulum(), {"p": np.array(values)}, grid=12, check=False)
+    assert found["p"].values.tolist() == values
+    assert found["p_bounds"].values[1].tolist() == pytest.approx([0.45, 0.6])
+    pendmap.sweep(Pendulum(), {"p": values[:3]}, grid=12, store=tmp_path / "s.zarr", part=(1, 2))
+    merged = pendmap.merge(tmp_path / "s.zarr")
+    assert merged["fraction"].values.tolist() == found["fraction"].values[:3].tolist()
+
+
+@pytest.mark.parametrize(
+    ("ranges", "said"),
+    [
+        ({"p": [0.5, 0.4]}, "p must be ascending values"),
+        ({"p": []}, r"p must be an array \(N,\) of numbers"),
+        ({"p": [0.4, 0.5, 0.9], "omega": (1.9, 2.1, 3)}, "p must be evenly spaced"),
+    ],
+)
+def test_other_values_are_refused(ranges: dict[str, list[float]], said: str) -> None:
+    with pytest.raises(pendmap.InputError, match=said):
+        pendmap.sweep(Pendulum(), ranges, grid=12)
