@@ -17,7 +17,7 @@ from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.stored import Kept
 from pendmap.analysis.sweep_table import sweep_dataset
-from pendmap.analysis.sweep_tiles import SweepTiles, restored
+from pendmap.analysis.sweep_tiles import SweepTiles
 from pendmap.engine import Layout
 from pendmap.errors import InputError, short_repr
 from pendmap.model import without_dimensions
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweep import Varied
-    from pendmap.analysis.sweep_table import Maps, Numbers
-    from pendmap.engine import Work
+    from pendmap.analysis.sweep_table import Numbers
+    from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
 
 ANALYSES: Final = ("basins",)
@@ -187,15 +187,16 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     else:
         job = job.on_threads(kept.threads(threads) or 1)
     models = math.prod(job.shape)
-    _core.reckon("starts", models * grid.cells, _BYTES)
+    if store is None:
+        _core.reckon("starts", models * grid.cells, _BYTES)
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
         layout = _layout(job, axes, grid)
         work.store.create(layout)
-        maps = restored(job, job.run(work))
+        maps = job.run(work)
         numbers = branches(job, maps)
         for tile in range(layout.tiles):
-            work.store.write(tile, {"label": _labels(maps, numbers, layout, tile)})
+            work.store.write(tile, {"label": _labels(job, work.store, numbers, layout, tile)})
         label = work.store.whole("label")
         dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
@@ -240,13 +241,14 @@ def _layout(job: SweepTiles, axes: Sequence[Varied], grid: Grid) -> Layout:
     return Layout(dims, shape, min(job.side[0], job.shape[0]), {"label": "int16"})
 
 
-def _labels(maps: Maps, numbers: Numbers, layout: Layout, tile: int) -> NDArray[np.int16]:
+def _labels(
+    job: SweepTiles, store: Store, numbers: Numbers, layout: Layout, tile: int
+) -> NDArray[np.int16]:
     """Return the labels of a tile by the numbers of the whole sweep."""
     rows = layout.rows(tile)
     found = np.zeros((rows.stop - rows.start, *layout.shape[1:]), dtype=np.int16)
-    for place, one in maps.items():
-        if rows.start <= place[0] < rows.stop:
-            moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
-            here = (place[0] - rows.start, *place[1:])
-            found[here] = moved[one.label + 1].reshape(layout.shape[-2:])
+    for place, label in job.labels(store, tile):
+        moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
+        here = (place[0] - rows.start, *place[1:])
+        found[here] = moved[label + 1].reshape(layout.shape[-2:])
     return found

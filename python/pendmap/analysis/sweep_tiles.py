@@ -150,11 +150,20 @@ class SweepTiles:
             maps.append(one)
         return Tile(_packed(maps))
 
-    def run(self, work: Work) -> list[bytes]:
-        """Compute the blocks that are missing; return the records of all."""
+    def run(self, work: Work) -> dict[Place, Mapped]:
+        """Compute the blocks that are missing; return the maps of all by their places."""
         work.once(_STATE, lambda: b"none")
-        found = dict(work.each(STEP, _STATE, range(self.blocks)))
-        return [found[tile] for tile in range(self.blocks)]
+        found: dict[Place, Mapped] = {}
+        for tile, record in work.each(STEP, _STATE, range(self.blocks)):
+            found |= _of_block(self, tile, record)
+        return {place: found[place] for tile in range(self.blocks) for place in self.places(tile)}
+
+    def labels(self, store: Store, row: int) -> Iterator[tuple[Place, NDArray[np.int16]]]:
+        """Yield the labels of the blocks in a row along the first parameter, by their places."""
+        across = math.prod(self._blocks[1:])
+        for tile in range(row * across, (row + 1) * across):
+            label = unpack(store.get(f"{STEP}/{tile}") or b"")["label"]
+            yield from zip(self.places(tile), label, strict=True)
 
 
 class _Map:
@@ -252,18 +261,10 @@ class Found:
 
 @dataclasses.dataclass(frozen=True)
 class Mapped:
-    """The map of one of the models, from a record."""
+    """The map of one of the models without its labels, which stay in the store."""
 
-    label: NDArray[np.int16]
     measures: dict[str, float]
     found: list[Found]
-
-
-def restored(job: SweepTiles, records: Sequence[bytes]) -> dict[Place, Mapped]:
-    """Return the maps of all records by their places."""
-    return {
-        place: one for tile, data in enumerate(records) for place, one in _of_block(job, tile, data)
-    }
 
 
 def _of_block(job: SweepTiles, tile: int, data: bytes) -> Iterator[tuple[Place, Mapped]]:
@@ -279,4 +280,4 @@ def _of_block(job: SweepTiles, tile: int, data: bytes) -> Iterator[tuple[Place, 
     for k, place in enumerate(job.places(tile)):
         own = [every[m] for m in np.flatnonzero(read["owner"] == k)]
         measures = dict(zip(MEASURES, read["measures"][k].tolist(), strict=True))
-        yield place, Mapped(read["label"][k], measures, own)
+        yield place, Mapped(measures, own)

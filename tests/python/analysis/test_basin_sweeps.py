@@ -213,7 +213,7 @@ def model_of(points: list[float], *, twin: int = 0) -> Mapped:
         Found("tumbling chaos", "tumbling_chaos", 0, 0, twin, 0.1, 0.0, 0.5, np.array([[x, 0.0]]))
         for x in points
     ]
-    return Mapped(np.zeros(0, np.int16), {"steps": 10.0}, found)
+    return Mapped({"steps": 10.0}, found)
 
 
 def job(*counts: int) -> SweepTiles:
