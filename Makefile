@@ -45,7 +45,7 @@ lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of impor
 bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 	$(BIN)/pip install --quiet -r benchmarks/requirements.txt
 	cargo bench --locked
-	for script in speed.integration speed.friction speed.exponents speed.parameters speed.maps speed.autonomous \
+	for script in speed.integration speed.friction speed.exponents speed.parameters speed.maps speed.sweeps speed.autonomous \
 			speed.threads_memory speed.rig statistics.coverage; do \
 		$(BIN)/python -m benchmarks.$$script || exit 1; done
 

@@ -13,6 +13,7 @@ TYPE_CHECKING = False  # importing typing would take most of this file's import 
 if TYPE_CHECKING:
     from typing import Any
 
+    from pendmap.analysis.basin_sweep import sweep as sweep
     from pendmap.analysis.basins import basins as basins
     from pendmap.analysis.basins import basins_of as basins_of
     from pendmap.analysis.bifurcation import bifurcation as bifurcation
@@ -63,6 +64,11 @@ ANALYSES = {
         "Integrate one trajectory: time history, phase plane, Poincaré section.",
     ),
     "basins": ("basins", ["basins", "basins_of"], "Map the basins of attraction."),
+    "basin_sweep": (
+        "sweep",
+        ["sweep"],
+        "Map basins along one or two parameters, with their attractors matched.",
+    ),
     "parameter_map": (
         "map",
         ["parameter_map"],

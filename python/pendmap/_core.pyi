@@ -45,6 +45,7 @@ __all__ = [
     "growth",
     "lyapunov",
     "orbits",
+    "orbits_near",
     "parameter_map",
     "parameter_names",
     "period",
@@ -142,7 +143,9 @@ class BasinPlan:
         choices: _Choices,
         state: bytes | None = None,
         progress: _Progress | None = None,
+        near: BasinPlan | None = None,
     ) -> BasinPlan: ...
+    def map(self, progress: _Progress | None = None) -> tuple[LabelledStarts, Texture]: ...
     def label(self, first: int, last: int, progress: _Progress | None = None) -> LabelledStarts: ...
     def label_again(
         self, picks: NDArray[np.int64], progress: _Progress | None = None
@@ -375,6 +378,9 @@ def orbits(
     threads: int,
     progress: _Progress | None = None,
 ) -> OrbitSearch: ...
+def orbits_near(
+    model: Pendulum, steps: int, states: Sequence[tuple[float, float, int]]
+) -> list[tuple[int, list[_Pair]] | None]: ...
 def parameter_names(model: Pendulum) -> list[str]: ...
 def parameter_map(
     model: Pendulum,

@@ -218,7 +218,7 @@ fn describe(
         region.unite(&window.region);
     }
     let every = points(windows);
-    let exponents = exponents(strobe, &spread(&every, effort.watched), length, cancel)?;
+    let exponents = exponents(strobe, &spread(&every, effort.watched_alone), length, cancel)?;
     let (mean, stderr) = mean_and_error(&exponents);
     let period = strobe.pendulum.period();
     let turning = |w: &&Window| w.turns.abs() > LEAST_TURNS * length as f64;

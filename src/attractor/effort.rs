@@ -17,11 +17,15 @@ pub struct Effort {
     pub tries: usize,
     /// Number of uncaptured trajectories that are observed.
     pub watched: usize,
+    /// The same where no attractor is known that could capture them.
+    pub watched_alone: usize,
     /// Uncaptured trajectories are observed for this multiple of the first bound.
     pub watch: u32,
     /// Runs that a chaotic set requires; if fewer have reached it, more runs from its points must
     /// stay.
     pub proved: usize,
+    /// Starts of a grid from which short cycles are sought beside chaos, for each period.
+    pub short_tries: usize,
     /// Cells around the circle of a set's region: few enough for its points to fill the visited
     /// part.
     pub cells: usize,
@@ -54,10 +58,21 @@ impl Effort {
         first_round: 32,
         tries: 24,
         watched: 256,
+        watched_alone: 256,
         watch: 4,
         proved: 16,
+        short_tries: 16,
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
+    };
+    /// The budget for a pendulum whose attractors are mostly known from a similar one: what else the starts reach
+    /// is found as by a thorough search, but only from those that no trap captures within a long first round,
+    /// and chaos that nothing could end is confirmed by fewer runs.
+    pub const CONTINUED: Self = Self {
+        first_round: 1024,
+        watched_alone: 16,
+        trap: Sampling { levels: 14, rounds: 4, ..Self::THOROUGH.trap },
+        ..Self::THOROUGH
     };
     /// The budget for one pendulum among thousands.
     pub const BRISK: Self = Self {
@@ -66,8 +81,10 @@ impl Effort {
         first_round: 24,
         tries: 6,
         watched: 24,
+        watched_alone: 24,
         watch: 4,
         proved: 16,
+        short_tries: 16,
         cells: 24,
         trap: Sampling { points: 3, rays: 12, levels: 8, ratio: 0.5, rounds: 2, returns: 2 },
     };

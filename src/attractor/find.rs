@@ -79,6 +79,22 @@ impl Catalogue {
         self
     }
 
+    /// The catalogue of a similar pendulum: the orbits that Newton's method from those of this one finds and
+    /// that attract, and its quasi-periodic rotations, followed for three times `bound`; without its chaos.
+    #[must_use]
+    pub fn continued(&self, strobe: &Strobe, bound: u32, cancel: &AtomicBool) -> Self {
+        let mut next = Self::new(strobe, Effort::CONTINUED);
+        let orbits: Vec<(State, usize)> =
+            self.orbits.iter().map(|(orbit, _)| (orbit.points[0], orbit.n)).collect();
+        next.take_over(strobe, &orbits, cancel);
+        next.take_over_curves(strobe, &self.sets, bound, cancel);
+        if next.attractors.is_empty() {
+            // Beside chaos with small basins Newton's method finds more orbits than the starts reach.
+            next.effort.first_round = Effort::THOROUGH.first_round;
+        }
+        next
+    }
+
     /// Searches from `starts`; see [`Catalogue::endings`]. Returns whether anything new was found.
     pub fn search(
         &mut self,
@@ -211,6 +227,7 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> bool {
         let returns = near_returns(strobe, alive, self.effort.longest_cycle);
+        let steps = PoincareMap::of_steps(strobe);
         let known = self.orbits.len();
         let (mut found, mut tries) = (Vec::new(), 0);
         for (_, start, n) in returns {
@@ -222,10 +239,8 @@ impl Catalogue {
                 continue;
             }
             tries += 1;
-            let Some(orbit) = newton::find(map, start, n, REACH) else { continue };
-            if !self.attracts_anew(strobe, &orbit) {
-                continue;
-            }
+            let Some(orbit) = newton::find(&steps, start, n, REACH) else { continue };
+            let Some(orbit) = self.refined(strobe, map, orbit) else { continue };
             let traps = self.admit(strobe, map, orbit, cancel);
             if !traps.is_empty() {
                 tries = 0;
@@ -293,9 +308,23 @@ impl Catalogue {
         self.traps = traps;
     }
 
-    /// Whether this orbit attracts and is not yet known.
-    pub(super) fn attracts_anew(&self, strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
-        attracts(strobe, orbit) && !self.knows(orbit)
+    /// The orbit of `map` that an orbit of the integration steps is near, if both attract and it is not yet
+    /// known; most orbits that are met repel, and steps tell it sooner than the precise map.
+    pub(super) fn refined(
+        &self,
+        strobe: &Strobe,
+        map: &PoincareMap,
+        orbit: PeriodicOrbit,
+    ) -> Option<PeriodicOrbit> {
+        if !attracts(strobe, &orbit) {
+            return None;
+        }
+        let orbit = if self.effort.precise {
+            newton::find(map, orbit.points[0], orbit.n, REACH)?
+        } else {
+            orbit
+        };
+        (attracts(strobe, &orbit) && !self.knows(&orbit)).then_some(orbit)
     }
 
     /// Whether this orbit is one of those found.

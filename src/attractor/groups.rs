@@ -24,11 +24,14 @@ impl Groups {
         for windows in runs {
             let mut own = Vec::with_capacity(windows.len());
             for window in windows {
-                let (senses, mut region) = (window.senses, window.region.clone());
-                let place = found.len();
+                let (senses, place) = (window.senses, found.len());
+                let mut region = window.region.clone();
                 for k in 0..place {
                     if parent[k] == k && found[k].0 == senses && found[k].1.meets(&window.region) {
-                        region.unite(&found[k].1);
+                        // The smaller one goes into the larger one.
+                        let mut joined = found[k].1.taken();
+                        joined.unite(&region);
+                        region = joined;
                         parent[k] = place;
                     }
                 }

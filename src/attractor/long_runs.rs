@@ -137,10 +137,12 @@ fn walk_block(
             for (i, windows) in all.iter_mut().enumerate() {
                 let Some(window) = windows.last_mut() else { continue };
                 let state = [block.half_turns[i] * PI, block.kick[i] / kick];
-                window.region.mark(state);
                 window.points.push(state);
                 window.turns = block.turns[i] - from[i];
             }
+        }
+        for window in all.iter_mut().filter_map(|windows| windows.last_mut()) {
+            window.region = empty.of(&window.points);
         }
     }
     Some(all)

@@ -54,9 +54,11 @@ impl Region {
         self.angle
     }
 
-    /// Adds the cell of a state.
-    pub fn mark(&mut self, state: State) {
-        self.cells.insert(self.cell(state));
+    /// The cells of states, and no others.
+    #[must_use]
+    pub fn of(&self, states: &[State]) -> Self {
+        // Built from all at once: sorting them takes a third of as many insertions.
+        Self { cells: states.iter().map(|state| self.cell(*state)).collect(), ..*self }
     }
 
     /// Whether a state lies in a visited cell.
@@ -74,6 +76,12 @@ impl Region {
     /// Adds the cells of another region of the same pendulum.
     pub fn unite(&mut self, other: &Self) {
         self.cells.extend(&other.cells);
+    }
+
+    /// This region, which has no cells any more.
+    #[must_use]
+    pub fn taken(&mut self) -> Self {
+        Self { cells: std::mem::take(&mut self.cells), ..*self }
     }
 
     /// Whether the two share a fifth of the smaller one's cells.

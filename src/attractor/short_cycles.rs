@@ -7,14 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::find::{Catalogue, REACH};
 use crate::integrate::{State, Strobe};
 use crate::model::Angle;
-use crate::orbit::newton;
+use crate::orbit::{PoincareMap, newton};
 
 /// Longest period, in forcing periods.
 const LONGEST: usize = 4;
 /// Starts along each side of the grid.
 const SIDE: usize = 64;
-/// Starts from which Newton's method is tried, for each period.
-const TRIED: usize = 16;
 /// Number of orbits sought from one start.
 const BESIDE: usize = 3;
 /// Factor by which the grid exceeds the largest velocity observed.
@@ -34,19 +32,19 @@ impl Catalogue {
         let reach = |part: usize| points.iter().fold(0.0_f64, |most, s| most.max(s[part].abs()));
         let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * reach(0) };
         let fastest = MARGIN * reach(1);
-        let map = self.map(strobe);
+        let (map, steps) = (self.map(strobe), PoincareMap::of_steps(strobe));
         let known = self.orbits.len();
         // Repelled by all orbits met: a stable orbit is next to the one it was created with.
         let mut met: Vec<State> = Vec::new();
         for (starts, n) in least_gaps(strobe, [widest, fastest]).iter().zip(1..) {
-            for start in starts.iter().take(TRIED) {
+            for start in starts.iter().take(self.effort.short_tries) {
                 for _ in 0..BESIDE {
-                    let found = newton::find_other(&map, *start, n, REACH, &met);
+                    let found = newton::find_other(&steps, *start, n, REACH, &met);
                     let Some(orbit) = found.filter(|_| !cancel.load(Ordering::Relaxed)) else {
                         break;
                     };
                     met.extend(&orbit.points);
-                    if self.attracts_anew(strobe, &orbit) {
+                    if let Some(orbit) = self.refined(strobe, &map, orbit) {
                         self.admit(strobe, &map, orbit, cancel);
                     }
                 }

@@ -31,7 +31,9 @@ impl Catalogue {
             .enumerate()
             .filter_map(|(k, end)| if let Ending::Open(s) = end { Some((k, *s)) } else { None })
             .collect();
-        let stride = open.len().div_ceil(self.effort.watched).max(1);
+        let alone = self.attractors.iter().all(|a| a.kind.is_chaotic());
+        let most = if alone { self.effort.watched_alone } else { self.effort.watched };
+        let stride = open.len().div_ceil(most).max(1);
         let (places, sample): (Vec<usize>, Vec<State>) = open.into_iter().step_by(stride).unzip();
         let length = self.effort.watch * bound;
         // Nearly conservative motion takes longer than this to show where it ends.
@@ -76,6 +78,35 @@ impl Catalogue {
             self.sets.push(set);
         }
         self.rebuild(&strobe.pendulum);
+    }
+
+    /// Quasi-periodic rotations among the sets of a similar pendulum: runs from their points, observed for twice
+    /// `bound` after it.
+    pub(super) fn take_over_curves(
+        &mut self,
+        strobe: &Strobe,
+        known: &[ChaoticSet],
+        bound: u32,
+        cancel: &AtomicBool,
+    ) {
+        for old in known.iter().filter(|set| set.band.is_some()) {
+            let starts = spread(&old.points, self.effort.proved);
+            let settled = capture::outcomes(strobe, &self.traps, bound, &starts, cancel);
+            let ends: Vec<State> = settled.iter().flatten().map(|o| o.state).collect();
+            let open = settled.is_some_and(|all| all.iter().all(|o| o.fate == Fate::Open));
+            if !open {
+                continue;
+            }
+            let none = vec![None; ends.len()];
+            let found =
+                chaos::sets(strobe, &self.traps, &ends, &none, 2 * bound, &self.effort, cancel);
+            let new = |set: &ChaoticSet| {
+                set.band.is_some() && !self.sets.iter().any(|other| other.same_as(set))
+            };
+            let new: Vec<ChaoticSet> = found.into_iter().filter(new).collect();
+            self.sets.extend(new);
+            self.rebuild(&strobe.pendulum);
+        }
     }
 
     /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.

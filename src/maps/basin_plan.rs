@@ -109,6 +109,34 @@ impl Plan {
         options: &Options,
         control: &Control,
     ) -> Result<Self, Error> {
+        Self::beside(None, pendulum, starts, options, control)
+    }
+
+    /// The plan of a similar pendulum: as by [`Plan::new`], but attractors that continue those of this
+    /// plan are known before the search.
+    ///
+    /// The step, the sample of the search and the criteria are those of [`Plan::new`]. Chaos alone is
+    /// confirmed by fewer runs ([`Effort::CONTINUED`]).
+    ///
+    /// # Errors
+    /// Those of [`Plan::new`].
+    pub fn continued(
+        &self,
+        pendulum: &Pendulum,
+        starts: &Starts,
+        options: &Options,
+        control: &Control,
+    ) -> Result<Self, Error> {
+        Self::beside(Some(self), pendulum, starts, options, control)
+    }
+
+    fn beside(
+        known: Option<&Self>,
+        pendulum: &Pendulum,
+        starts: &Starts,
+        options: &Options,
+        control: &Control,
+    ) -> Result<Self, Error> {
         pendulum.check_mappable()?;
         let simd = InstructionSet::choose()?;
         if starts.is_empty() {
@@ -116,9 +144,13 @@ impl Plan {
         }
         let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
         let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, simd)?;
-        let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
+        let searched = search_periods(pendulum);
+        let mut catalogue = known.map_or_else(
+            || Catalogue::new(&strobe, Effort::THOROUGH),
+            |known| known.catalogue.continued(&strobe, searched, control.flag()),
+        );
         let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
-        let endings = catalogue.endings(&strobe, &seeds, search_periods(pendulum), control.flag());
+        let endings = catalogue.endings(&strobe, &seeds, searched, control.flag());
         control.check()?;
         let labelling = if !pendulum.is_dissipative() {
             Labelling::Conservative

@@ -72,6 +72,31 @@ impl BasinMap {
     }
 }
 
+/// The labels of all starts, or their layers, after as many further searches as `plan` requires.
+///
+/// # Errors
+/// Those of [`Plan::cells`].
+pub fn ends(
+    plan: &mut Plan,
+    starts: &Starts,
+    pool: &rayon::ThreadPool,
+    control: &Control,
+) -> Result<(Labels, Option<FiniteTime>), Error> {
+    let (mut labels, layers) = plan.cells(starts, pool, control)?;
+    loop {
+        let stride = labels.open.len().div_ceil(FURTHER_SAMPLE).max(1);
+        let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
+        let Some(moved) = plan.further(&states, control)? else { break };
+        labels.rename(&moved);
+        let mut picks = Vec::new();
+        memory::room("starts", &mut picks, labels.open.len())?;
+        picks.extend(labels.open.iter().map(|(i, _)| *i));
+        let again = plan.label(starts, Some(&picks), pool, control)?;
+        labels.replace(&picks, again);
+    }
+    Ok((labels, layers))
+}
+
 /// The basins of attraction of `pendulum` over `starts`.
 ///
 /// # Errors
@@ -88,18 +113,7 @@ pub fn basins(
     memory::reckon("starts", starts.len(), EACH)?;
     let pool = pool(options.threads)?;
     let mut plan = Plan::new(pendulum, starts, options, control)?;
-    let (mut labels, layers) = plan.cells(starts, &pool, control)?;
-    loop {
-        let stride = labels.open.len().div_ceil(FURTHER_SAMPLE).max(1);
-        let states: Vec<State> = labels.open.iter().step_by(stride).map(|(_, s)| *s).collect();
-        let Some(moved) = plan.further(&states, control)? else { break };
-        labels.rename(&moved);
-        let mut picks = Vec::new();
-        memory::room("starts", &mut picks, labels.open.len())?;
-        picks.extend(labels.open.iter().map(|(i, _)| *i));
-        let again = plan.label(starts, Some(&picks), &pool, control)?;
-        labels.replace(&picks, again);
-    }
+    let (labels, layers) = ends(&mut plan, starts, &pool, control)?;
     let labelled = layers.is_none();
     let mut map = BasinMap {
         attractors: Vec::new(),

@@ -103,7 +103,7 @@ mod _core {
         library::{effects, formula, roles},
         maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
         motion::{Trajectory, acceleration, advance, choose_steps, simulate},
-        orbits::{Orbit, OrbitSearch, orbits},
+        orbits::{Orbit, OrbitSearch, orbits, orbits_near},
         parameter_maps::{
             Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,
         },

@@ -2,9 +2,9 @@
 
 use numpy::PyReadonlyArray1;
 use pendmap::error::Error;
-use pendmap::maps::basin_entropy::{Texture as Entropies, TextureSum as Sum};
+use pendmap::maps::basin_entropy::{Texture as Entropies, TextureSum as Sum, texture};
 use pendmap::maps::basin_plan::{Labelling, Options, Plan};
-use pendmap::maps::basins::LEAST_CELLS;
+use pendmap::maps::basins::{LEAST_CELLS, ends};
 use pendmap::maps::boundary_distance::Thinned;
 use pendmap::maps::bounds::chaos_periods;
 use pendmap::maps::control::pool;
@@ -172,7 +172,9 @@ pub struct Uncertainty {
 impl BasinPlan {
     /// Searches for the attractors; `state` restores the plan that another process has made.
     #[new]
-    #[pyo3(signature = (model, starts, choices, state=None, progress=None))]
+    ///
+    /// `near` is the plan of a similar model, whose attractors are continued.
+    #[pyo3(signature = (model, starts, choices, state=None, progress=None, near=None))]
     fn new(
         py: Python<'_>,
         model: Model,
@@ -180,13 +182,16 @@ impl BasinPlan {
         choices: Choices,
         state: Option<&[u8]>,
         progress: Option<Py<PyAny>>,
+        near: Option<PyRef<'_, Self>>,
     ) -> PyResult<Self> {
         let (pendulum, starts) = (model.pendulum()?, starts.starts()?);
         let options = Options::from(choices);
+        let known = near.map(|near| near.plan.clone());
         let plan = match state {
             Some(bytes) => Plan::restored(&pendulum, bytes).map_err(raise)?,
-            None => watched(py, progress.as_ref(), |control| {
-                Plan::new(&pendulum, &starts, &options, control)
+            None => watched(py, progress.as_ref(), |control| match known {
+                Some(known) => known.continued(&pendulum, &starts, &options, control),
+                None => Plan::new(&pendulum, &starts, &options, control),
             })?,
         };
         Ok(Self { plan, starts, seed: options.seed, threads: options.threads })
@@ -260,6 +265,29 @@ impl BasinPlan {
             self.plan.cells(&Starts::List(states), &pool(self.threads)?, control)
         })?;
         Ok(LabelledStarts::new(py, labels, layers))
+    }
+
+    /// Labels all starts, with as many further searches as are required; of a grid also the texture.
+    #[pyo3(signature = (progress=None))]
+    fn map(
+        &mut self,
+        py: Python<'_>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(LabelledStarts, Texture)> {
+        let Self { plan, starts, threads, .. } = self;
+        let (labels, layers, found) = watched(py, progress.as_ref(), |control| {
+            let pool = pool(*threads)?;
+            let (labels, layers) = ends(plan, starts, &pool, control)?;
+            let found = match starts {
+                Starts::Grid { theta, .. } if layers.is_none() => {
+                    texture(&labels.label, theta.count, &pool)
+                }
+                Starts::List(_) if layers.is_none() => Entropies::of_list(),
+                _ => Entropies::plain(),
+            };
+            Ok((labels, layers, found))
+        })?;
+        Ok((LabelledStarts::new(py, labels, layers), Texture::new(&found)))
     }
 
     /// Labels the starts with these indices again.

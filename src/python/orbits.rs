@@ -2,13 +2,17 @@
 
 use pendmap::attractor;
 use pendmap::attractor::catalogue::arrange;
+use pendmap::integrate::Strobe;
+use pendmap::lanes::InstructionSet;
 use pendmap::maps::orbits::{Request, orbits as search};
+use pendmap::orbit::{PoincareMap, newton};
 use pyo3::prelude::*;
 
 use super::convert::Attractor;
 use super::long_calls::watched;
 use super::maps::{AxisTuple, axes};
 use super::model::Model;
+use super::raise;
 
 /// A periodic orbit.
 #[pyclass(frozen, get_all, extends = Attractor, module = "pendmap._core")]
@@ -62,4 +66,31 @@ pub fn orbits(
         begun: found.begun,
         friction: pendulum.has_friction(),
     })
+}
+
+/// Largest distance of Newton's method from where it begins.
+const REACH: f64 = 0.3;
+
+/// Turns, points of a periodic orbit.
+type Near = (i64, Vec<(f64, f64)>);
+
+/// The periodic orbits that Newton's method finds from states `(theta, velocity, n)`, n periods each; none where
+/// it finds none of that period. They are orbits of `steps` integration steps a period, with their error.
+#[pyfunction]
+pub fn orbits_near(
+    py: Python<'_>,
+    model: Model,
+    steps: usize,
+    states: Vec<(f64, f64, usize)>,
+) -> PyResult<Vec<Option<Near>>> {
+    let pendulum = model.pendulum()?;
+    let simd = InstructionSet::choose().map_err(raise)?;
+    Ok(py.detach(|| {
+        let map = PoincareMap::of_steps(&Strobe::new(&pendulum, steps, simd));
+        let near = |&(theta, velocity, n): &(f64, f64, usize)| {
+            let orbit = newton::find(&map, [theta, velocity], n, REACH).filter(|o| o.n == n)?;
+            Some((orbit.w, orbit.points.iter().map(|p| (p[0], p[1])).collect()))
+        };
+        states.iter().map(near).collect()
+    }))
 }

@@ -13,7 +13,7 @@
 //! - [`tangent`], [`orbits`], [`orbit_search`], [`bifurcations`]: derivatives, periodic orbits,
 //!   their bifurcations
 //! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: attractors
-//! - [`maps`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
+//! - [`maps`], [`continued_plans`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`exponents`]: rates of divergence of neighbouring motions, also through friction
 //! - [`tongues`]: regions of stability of rest
 //! - [`properties`]: properties of every pendulum
@@ -23,6 +23,7 @@ mod attractors;
 mod bifurcations;
 mod chaos;
 mod chaotic_sets;
+mod continued_plans;
 mod convergence_order;
 mod corners;
 mod edge_cases;

@@ -162,6 +162,19 @@ def frequencies(values: ArrayLike) -> Floats:
     return array
 
 
+def ascending(name: str, given: ArrayLike) -> Floats:
+    """Return values of a parameter as an array; each must be greater than the one before."""
+    try:
+        values = np.atleast_1d(np.array(given, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        values = np.zeros(0)
+    if values.ndim != 1 or not (values.size and np.isfinite(values).all()):
+        raise InputError(f"{name} must be an array (N,) of numbers, got {short_repr(given)}")
+    if not (np.diff(values) > 0).all():
+        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
+    return values
+
+
 def starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
     """Return angles and velocities of a list of starts as two arrays of one length."""
     arrays = []

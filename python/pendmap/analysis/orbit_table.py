@@ -127,10 +127,14 @@ def matched(
     return found
 
 
-def distance(one: Floats, other: Floats) -> float:
-    """Return the mean distance from points of ``one`` to the nearest of ``other``, modulo turns."""
+def distance(one: Floats, other: Floats, *, circle: bool = True) -> float:
+    """Return the mean distance from points of ``one`` to the nearest of ``other``.
+
+    On a ``circle`` angles are taken modulo turns.
+    """
     if not (one.size and other.size):
         return _APART
     away = one[:, None] - other[None]
-    away[..., 0] = np.remainder(away[..., 0] + math.pi, math.tau) - math.pi
+    if circle:
+        away[..., 0] = np.remainder(away[..., 0] + math.pi, math.tau) - math.pi
     return float(np.hypot(away[..., 0], away[..., 1]).min(axis=1).mean())

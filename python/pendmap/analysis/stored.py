@@ -172,7 +172,7 @@ def merge(
     Parameters
     ----------
     store : str or path
-        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`,
+        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`, :func:`pendmap.sweep`,
         :func:`pendmap.bifurcation` or :func:`pendmap.lifetime` began, in parts or alone.
     executor, threads, progress
         As for :func:`pendmap.basins`.
@@ -212,7 +212,10 @@ def merge(
         elif key in _GRIDS and value is not None:
             arguments[key] = Grid(*(tuple(axis) for axis in value))  # type: ignore[arg-type]
         elif key == "ranges":
-            arguments[key] = {name: tuple(values) for name, values in value.items()}
+            # A number of values is whole; values themselves are not.
+            arguments[key] = {
+                name: tuple(own) if isinstance(own[-1], int) else own for name, own in value.items()
+            }
     run = getattr(pendmap, mark["analysis"])
     model = parse_model(mark["model"], place.address)
     more = {"executor": executor, "threads": threads, "progress": progress}

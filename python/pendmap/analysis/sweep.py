@@ -13,7 +13,7 @@ from scipy.ndimage import find_objects, label
 
 from pendmap import _core
 from pendmap.analysis import result
-from pendmap.analysis.grid import Grid, coordinate
+from pendmap.analysis.grid import Grid, ascending, coordinate
 from pendmap.analysis.result import Field, Found, point, variable
 from pendmap.errors import (
     MOST_CELLS,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.numerics import Numerics
     from pendmap.model import Pendulum
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Varied:
-    """A parameter and the values that it takes: ascending, evenly spaced."""
+    """A parameter and its values: ascending, evenly spaced unless they were listed."""
 
     name: str
     """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
@@ -75,9 +75,19 @@ class Varied:
         x = self.values
         if x.size == 1:
             return {self.name: (self.name, x, self.attributes)}
-        half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
-        edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
+        if self.even:
+            half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
+            edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
+        else:
+            middle = 0.5 * (x[1:] + x[:-1])
+            edges = np.array([2 * x[0] - middle[0], *middle, 2 * x[-1] - middle[-1]])
         return coordinate(self.name, x, edges, **self.attributes)
+
+    @property
+    def even(self) -> bool:
+        """Whether the values are evenly spaced."""
+        steps = np.diff(self.values)
+        return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
 
     @property
     def replaced(self) -> tuple[str, ...]:
@@ -86,15 +96,18 @@ class Varied:
 
 
 def varied(
-    model: Pendulum | Rig, ranges: Mapping[str, Sequence[float]], count: int
+    model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int, *, listed: bool = False
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` parameters that vary, from their first and last value and number."""
+    """Return the ``count`` parameters that vary, from their first and last value and number.
+
+    Where they may be ``listed``, what is no tuple is an array of values.
+    """
     if not isinstance(ranges, dict) or len(ranges) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
         raise InputError(f"ranges must be a mapping like {few}, got {given or 'nothing'}")
-    found = tuple(_one(model, name, given) for name, given in ranges.items())
+    found = tuple(_one(model, name, given, listed=listed) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
         for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
@@ -142,7 +155,7 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
 
 
-def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
+def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varied:  # noqa: ANN401
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     # Name in the core, factor and power of w0 of each quantity.
@@ -161,7 +174,8 @@ def _one(model: Pendulum | Rig, name: str, given: object) -> Varied:
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
         )
-    values = _values(name, given)
+    by_ends = isinstance(given, tuple) or not listed
+    values = _values(name, given) if by_ends else ascending(name, given)
     if name in own:
         bare, factor, power = own[name]
         if name in {"frequency_hz", "stroke_mm"}:
@@ -221,8 +235,7 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     return dataclasses.replace(model, **changed)
 
 
-CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")
-"""Long name and comment of the variable ``chaos_periods``."""
+CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")  # Name, comment
 STARTS = 9  # Default number of initial conditions of a cell
 _SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746

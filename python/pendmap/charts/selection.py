@@ -28,6 +28,7 @@ _TABLES, _COLUMNS = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "par
 _RISING = ("averaged", "event_time")  # Rising variables along dimensions without a coordinate
 
 _OVER: dict[str, dict[str, tuple[str, ...]]] = {
+    "basin_sweep": {"twin": ("attractor",), "point_theta": ("point",)},
     "basins": {"fraction": ("attractor",)},
     "bifurcation": {"kind": ("kind",), "entry_kind": ("entry",), "point_value": ("point",)},
     "lifetime": {"captured": ("attractor", "elapsed"), "tail_mean": ("tail_begin",)},
@@ -41,6 +42,7 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
 """Dimensions that variables of a result must have in every selection of it."""
 
 _CELLS = {
+    "basin_sweep": ("label",),
     "basins": ("label", "settle_periods", "net_turns"),
     "bifurcation": ("up", "down"),
     "parameter_map": ("regime", "exponent"),
@@ -93,6 +95,7 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
     """Return the axes of an image, rows first."""
     a = dataset.attrs
     axes: dict[str, tuple[str, ...]] = {
+        "basin_sweep": (*str(a.get("varied")).split(), "velocity", "theta"),
         "basins": ("velocity", "theta"),
         "parameter_map": (str(a.get("rows")), str(a.get("columns"))),
         "bifurcation": (str(a.get("varied")),),

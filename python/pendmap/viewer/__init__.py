@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.charts import registry
 from pendmap.errors import ViewerError
-from pendmap.viewer import basins, chart, frame, trajectory
+from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
 from pendmap.viewer.frame import SUFFIXES
 from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
 from pendmap.viewer.window import (
@@ -51,6 +51,7 @@ __all__ = [
 ]
 
 _KINDS = {
+    "basin_sweep": (basin_sweep.blueprint, basin_sweep.log),
     "basins": (basins.blueprint, basins.log),
     "trajectory": (trajectory.blueprint, trajectory.log),
 }
@@ -73,8 +74,10 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
     ``/turns/data/turns``, ``/exponent/data/exponent`` (meaningful layers, the leading one in
-    front), ``/legend`` and ``/summary``. Closed orbits: ``/phase/data/NUMBER`` with ``path`` and
-    ``points``, ``/legend`` and ``/summary``. Map over two parameters: ``/kinds/data/kinds``,
+    front), ``/legend`` and ``/summary``. Sweep: ``/basin/data/{labels,attractors}`` of each model,
+    on the timeline of the parameter (of two: ``map``), its chart, ``/legend`` and ``/summary``.
+    Closed orbits: ``/phase/data/NUMBER`` with ``path`` and ``points``, ``/legend`` and
+    ``/summary``. Map over two parameters: ``/kinds/data/kinds``,
     ``/{exponent,attractors,undecided}/data/values``. Bifurcation diagram:
     ``/{bifurcation,velocity,exponent}/data/NUMBER``. Exponent: ``/growth/data/own``,
     ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or, for a closed orbit,
@@ -90,7 +93,8 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Result of ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
+        Result of ``pendmap.basins``, ``pendmap.sweep``, ``pendmap.orbit``,
+        ``pendmap.parameter_map``,
         ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
         ``pendmap.melnikov`` or ``pendmap.simulate``; ``attrs["kind"]`` names the kind. A
         selection is shown with its own cells, as by :func:`pendmap.render.draw`.

@@ -15,6 +15,7 @@ from pendmap.files import facts
 DRIVEN = Pendulum(gamma=0.1, p=0.6, omega=2.0)
 RESULTS = {
     "basins": lambda: pendmap.basins(DRIVEN, 10),
+    "basin_sweep": lambda: pendmap.sweep(DRIVEN, {"p": (0.5, 0.7, 2)}, grid=10),
     "bifurcation": lambda: pendmap.bifurcation(DRIVEN, {"p": (0.5, 0.7, 2)}, starts=2),
     "lifetime": lambda: pendmap.lifetime(DRIVEN, starts=100),
     "melnikov": lambda: pendmap.melnikov(DRIVEN, [1.0, 2.0]),

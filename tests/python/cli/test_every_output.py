@@ -41,6 +41,7 @@ COMMANDS = {
     "simulate": ("--until", "20"),
     "basins": ("--grid", "6", "--max-periods", "300"),
     "map": ("--vary", "gamma", "0.3:0.6:3", "--p", "0.3:0.6:2", "--starts", "2"),
+    "sweep": ("--vary", "gamma", "0.3:0.6:3", "--grid", "6", "--max-periods", "300"),
     "bifurcation": ("--vary", "p", "0.3:0.6:4", "--starts", "2"),
     "orbit": ("--grid", "5"),
     "lyapunov": ("--max-periods", "300"),

@@ -36,6 +36,7 @@ calls = {
     "parameter_map": lambda: pendmap.parameter_map(
         pendulum, {"p": (0.1, 1.0, 20000), "gamma": (0.1, 0.2, 20000)}
     ),
+    "sweep": lambda: pendmap.sweep(pendulum, {"p": (0.1, 1.0, 20000)}, grid=2000),
     "simulate": lambda: pendmap.simulate(pendulum, 1.0, 0.0, 5e4, samples=10000),
     "basins_of": lambda: pendmap.basins_of(pendulum, *np.broadcast_to(0.5, (2, 10**9))),
     "advance": lambda: pendmap.advance(pendulum, *np.broadcast_to(0.5, (2, 10**9)), 1),

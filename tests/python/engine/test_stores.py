@@ -43,7 +43,7 @@ def bucket() -> Iterator[str]:
     server.stop()
 
 
-@pytest.mark.parametrize("name", ["basins", "map"])
+@pytest.mark.parametrize("name", ["basins", "map", "plane"])
 def test_a_store_may_be_in_an_object_store(bucket: str, name: str) -> None:
     store = f"{bucket}/{name}.zarr"
     for number in (1, 2):

@@ -37,6 +37,10 @@ RESULTS: dict[str, Callable[[], xr.Dataset]] = {
     "basins": lambda: pendmap.basins(DRAWN, Grid.square(10, 6.2), draws=2),
     "basins of a list": lambda: pendmap.basins_of(SI, [0.0, 1.0], [0.1, 2.5]),
     "basins without damping": lambda: pendmap.basins(Pendulum(gamma=0), 8),
+    "basin_sweep": lambda: pendmap.sweep(SI, {"quadratic_drag.q": (0.01, 0.02, 2)}, grid=8),
+    "sweep over two parameters": lambda: pendmap.sweep(
+        SI, {"Tr": (0.0, 0.2, 2), "p": (0.3, 1.2, 2)}, grid=8
+    ),
     "bifurcation": lambda: pendmap.bifurcation(SI, {"stroke_mm": (20, 40, 3)}, starts=2),
     "lifetime": lambda: pendmap.lifetime(DRAWN, starts=100, draws=2),
     "lyapunov": lambda: pendmap.lyapunov(SI),

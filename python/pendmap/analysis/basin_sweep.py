@@ -1,0 +1,254 @@
+"""Sweeps: basins of attraction along one or two parameters, their attractors matched."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap import _core
+from pendmap.analysis import result, sweep_report
+from pendmap.analysis import sweep as parameters
+from pendmap.analysis.basins import choices_of
+from pendmap.analysis.branches import branches
+from pendmap.analysis.grid import Grid
+from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.result import Field, Found, Schema, summarised
+from pendmap.analysis.stored import Kept
+from pendmap.analysis.sweep_table import sweep_dataset
+from pendmap.analysis.sweep_tiles import SweepTiles
+from pendmap.engine import Layout
+from pendmap.errors import InputError, short_repr
+from pendmap.model import without_dimensions
+from pendmap.units import VELOCITY
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping, Sequence
+
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.sweep import Varied
+    from pendmap.analysis.sweep_table import Numbers
+    from pendmap.engine import Store, Work
+    from pendmap.model import Pendulum, Rig
+
+ANALYSES: Final = ("basins",)
+DEFAULT_CELLS: Final = 100  # Default number of cells on each side of a map
+_BYTES: Final = 8  # Memory of a start during the computation
+
+SCHEMA = Schema(
+    "basin_sweep",
+    result.UNITS,
+    Field("analysis", "", "analysis of each model"),
+    Field("varied", "", "names of the parameters", convert=lambda names: names.split()),
+    Field("models", "1", "models: values of the parameters"),
+    Field("blocks", "1", "blocks of neighbouring models; the first of each was searched alone"),
+    Field("cells", "1", "starts of each map"),
+    Field(
+        "attractors",
+        "",
+        "attractors with the ranges in which they exist",
+        read=sweep_report.attractors,
+    ),
+    Field("maps", "", "maps, each with its attractors", read=sweep_report.maps),
+    Found(
+        "undecided",
+        "1",
+        "share of all starts that no attractor captured",
+        None,
+        variable="undecided_share",
+    ),
+    Found(
+        "failed", "1", "share of all starts that failed or diverged", None, variable="failed_share"
+    ),
+    *result.TIMED,
+    Found("reached_error", "1", "largest error after 5 periods that was reached", None),
+    *result.END,
+    result.SECTION,
+    result.TOL.hidden,
+    Field(
+        "layer_periods", "periods", "periods of planes without basins; 0: by default", json=False
+    ),
+    result.SEED.hidden,
+    *result.VERSIONS,
+    references="Datseris, Luiz Rossi & Wagemakers (2023), Chaos 33, 073151",
+)
+
+
+def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
+    pendulum: Pendulum | Rig,
+    ranges: Mapping[str, ArrayLike],
+    analysis: str = "basins",
+    *,
+    grid: Grid | int | None = None,
+    tol: float = 1e-6,
+    max_periods: int | None = None,
+    layer_periods: int | None = None,
+    threads: int | None = None,
+    seed: int = 0,
+    check: bool = True,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    part: tuple[int, int] | None = None,
+    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
+    mix: bool = False,
+    chunks: Any = None,  # noqa: ANN401 (of xarray)
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Map the basins of attraction along one or two parameters, and match the attractors.
+
+    Models are mapped in fixed blocks of neighbours, 16 along one parameter and 8 x 8 over two. The
+    first model of a block is searched as by :func:`pendmap.basins`. Each further one starts from
+    its neighbour's attractors, followed by Newton's method; then the same sample of starts is
+    searched for others, and all starts that end undecided begin further searches. Only chaos is
+    confirmed by fewer runs than in a map alone (16 instead of 256; 64 starts where it attracted
+    everything).
+
+    Then attractors are matched from model to model along both parameters: orbits by Newton's
+    method, in halved steps where a whole one fails; those left by least distance, if their turns
+    and their symmetry are equal: chaos, and what an orbit becomes where its period doubles. So an
+    attractor has one number in the whole sweep, in the order of first appearance. Mirror images
+    stay two attractors.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; parameters that vary replace its own.
+    ranges : mapping of str to array_like or (float, float, int)
+        One or two parameters with an array of ascending values, or a tuple of first value, last
+        value (both included) and how many; names as for :func:`pendmap.parameter_map`. Two have
+        evenly spaced values.
+    analysis : str
+        What is done for each model: ``basins``.
+    grid : Grid or int, optional
+        As for :func:`pendmap.basins`; by default 100 cells on each side.
+    tol, max_periods, layer_periods, seed, threads
+        As for :func:`pendmap.basins`; blocks are computed at once on the threads.
+    check : bool
+        Whether to check a sample of the labels of the first map of each block with half the step
+        and mirrored.
+    store, resume, part, executor, mix, chunks, progress
+        As for :func:`pendmap.basins`; tiles are blocks.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the parameters and ``attractor``: ``fraction`` of the starts (0 where it does not
+        exist) with ``stderr``, ``exists``, ``kind``, ``n``, ``w``, ``exponent`` with
+        ``exponent_stderr``, and a stroboscopic point, ``theta_point`` and ``velocity_point``. Over
+        the parameters: ``plane``, ``attractors`` (how many), ``basin_entropy``,
+        ``boundary_basin_entropy`` with its standard error, ``uncertainty_exponent`` of the labels
+        on the grid (:func:`pendmap.uncertainty_exponent`) with its standard error, ``undecided``,
+        ``failed``, ``steps_per_period``, ``max_periods``, and for the first map of a block
+        ``unreliable``. ``label`` over the parameters, velocity and theta has the number of the
+        attractor. ``twin`` over ``attractor`` is the number of the mirror image. All points of the
+        attractors, of chaos at most 128, are over ``point``.
+
+    Raises
+    ------
+    InputError
+        If a parameter or value is not allowed, the model has an effect that no map can have, or no
+        step reaches ``tol``.
+
+    References
+    ----------
+    G. Datseris, K. Luiz Rossi & A. Wagemakers (2023), Chaos 33, 073151 (matching along parameters).
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, omega=2.0)
+    >>> result = pendmap.sweep(pendulum, {"p": (0.4, 0.7, 4)}, grid=20)
+    >>> [str(name) for name in result.attractor.values]
+    ['oscillation 2:0', 'rotation 1:-1', 'rotation 1:+1']
+    >>> result.exists.sel(attractor="rotation 1:+1").values
+    array([0, 1, 1, 1], dtype=int8)
+    """
+    if analysis not in ANALYSES:
+        raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
+    bare, units = without_dimensions(pendulum)
+    two = isinstance(ranges, dict) and len(ranges) == 2  # noqa: PLR2004
+    axes = parameters.varied(pendulum, ranges, 2 if two else 1, listed=True)
+    for axis in axes if two else ():
+        if not axis.even:
+            raise InputError(f"{axis.name} must be evenly spaced where two parameters vary")
+    grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
+    kept = Kept(store, resume, part, executor, mix, chunks)
+    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    choices = choices_of(numerics, layer_periods, check=check)
+    workers = numerics.workers or _core.default_threads()
+    job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices, workers)
+    if executor is None:
+        job = job.on_threads(workers)
+    else:
+        job = job.on_threads(kept.threads(threads) or 1)
+    models = math.prod(job.shape)
+    if store is None:
+        _core.reckon("starts", models * grid.cells, _BYTES)
+
+    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        layout = _layout(job, axes, grid)
+        work.store.create(layout)
+        maps = job.run(work)
+        numbers = branches(job, maps)
+        for tile in range(layout.tiles):
+            work.store.write(tile, {"label": _labels(job, work.store, numbers, layout, tile)})
+        label = work.store.whole("label")
+        dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
+        values = {
+            **numerics.provenance(),
+            "analysis": analysis,
+            "varied": " ".join(axis.name for axis in axes),
+            "models": models,
+            "blocks": job.blocks,
+            "cells": grid.cells,
+            "layer_periods": layer_periods or 0,
+            "undecided": float(dataset["undecided"].mean()),
+            "failed": float(dataset["failed"].mean()),
+            "reached_error": float(dataset["step_error"].max()),
+        }
+        replaced = [name for axis in axes for name in axis.replaced]
+        SCHEMA.complete(dataset, pendulum, values, None, replaced)
+        dataset.attrs["title"] = parameters.title(pendulum, *axes)
+        lines = [*sweep_report.summary(dataset), *parameters.without_damping(pendulum, *axes)]
+        summarised(dataset, lines, pendulum, "basins are")
+        return dataset, ["label"]
+
+    request = {
+        "ranges": {
+            axis.name: own if isinstance(own, tuple) else axis.values.tolist()
+            for axis, own in zip(axes, ranges.values(), strict=True)
+        },
+        "analysis": analysis,
+        "grid": grid,
+        "tol": numerics.tol,
+        "max_periods": numerics.max_periods,
+        "layer_periods": layer_periods,
+        "seed": numerics.seed,
+        "check": check,
+    }
+    return kept.complete("sweep", pendulum, request, job, compute, progress)
+
+
+def _layout(job: SweepTiles, axes: Sequence[Varied], grid: Grid) -> Layout:
+    """Return the array of the labels; a tile is as long as a block."""
+    dims = (*(axis.name for axis in axes), "velocity", "theta")
+    shape = (*job.shape, grid.velocity.count, grid.theta.count)
+    return Layout(dims, shape, min(job.side[0], job.shape[0]), {"label": "int16"})
+
+
+def _labels(
+    job: SweepTiles, store: Store, numbers: Numbers, layout: Layout, tile: int
+) -> NDArray[np.int16]:
+    """Return the labels of a tile by the numbers of the whole sweep."""
+    rows = layout.rows(tile)
+    found = np.zeros((rows.stop - rows.start, *layout.shape[1:]), dtype=np.int16)
+    for place, label in job.labels(store, tile):
+        moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
+        here = (place[0] - rows.start, *place[1:])
+        found[here] = moved[label + 1].reshape(layout.shape[-2:])
+    return found

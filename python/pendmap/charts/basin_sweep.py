@@ -1,0 +1,280 @@
+"""Sweeps: shares of the attractors stacked along a parameter, or maps over two."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendmap.analysis.orbit_table import plain
+from pendmap.analysis.sweep_report import varied_names
+from pendmap.charts import names, palette, plane
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.legend import typeset
+from pendmap.charts.marks import (
+    DASHED,
+    INK,
+    QUIET,
+    Band,
+    Colours,
+    Image,
+    Level,
+    Line,
+    Mark,
+    Points,
+    bars,
+)
+from pendmap.errors import InputError
+from pendmap.files import facts
+from pendmap.units import Units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pendmap.charts.marks import Ends, Floats
+
+
+MOST: Final = 12  # Greatest number of attractors that a legend names; all others are grey
+OTHERS: Final = "#c9c9c9"  # Colour of the others
+LAYERS: Final = {
+    "entropy": ("basin_entropy", "basin entropy", "nat"),
+    "boundary": ("boundary_basin_entropy", "entropy of the boundary", "nat"),
+    "uncertainty": ("uncertainty_exponent", "uncertainty exponent", ""),
+    "attractors": ("attractors", "attractors that coexist", ""),
+    "main": ("fraction", "share of the starts", ""),
+    "undecided": ("undecided", "share of the starts undecided", ""),
+}
+"""Layers over two parameters by the name a user types: variable, title and unit."""
+_LEADING: Final = ("entropy", "attractors", "main")
+_SIZE: Final = (7.4, 8.4)  # Size of a figure over one parameter, inches
+_HEIGHTS: Final = (2.6, 1.2, 1.2, 1.3)
+_MOST_COUNT: Final = 8  # Largest count that has its own colour
+
+
+@dataclass(frozen=True)
+class Branch:
+    """An attractor of a sweep, with its colour."""
+
+    id: int
+    name: str
+    colour: str
+
+
+def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
+    """Return the attractors in the order of their numbers; all but ``most`` have one grey.
+
+    Those of equal names have successive colours of their family.
+    """
+    share = dataset["fraction"].sum(varied_names(dataset)).values
+    if most is not None and share.size == most + 1:
+        most = None
+    named = set(np.argsort(-share, kind="stable")[:most].tolist())
+    seen: Counter[str] = Counter()
+    found = []
+    for k, name in enumerate(map(str, dataset["attractor"].values)):
+        short = plain(name).partition(" from ")[0]
+        seen[short] += 1
+        if k in named:
+            told = short if seen[short] == 1 else f"{short} #{seen[short]}"
+            found.append(Branch(k + 1, typeset(name), palette.colour(told)))
+        else:
+            found.append(Branch(k + 1, "", OTHERS))
+    return found
+
+
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
+    """Return shares, entropies and exponents along a parameter, or maps over two."""
+    dims = varied_names(dataset)
+    dataset = dataset.transpose(..., "attractor")
+    symbols = [names.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in dims]
+    fixed = names.parameters(facts(dataset), dims)
+    rows, columns = dataset.sizes["velocity"], dataset.sizes["theta"]
+    number = math.prod(dataset.sizes[one] for one in dims)
+    title = f"Basins along {' and '.join(one.split(' (')[0] for one in symbols)}"
+    subtitle = f"{fixed};   {number} maps of {columns} × {rows} cells"
+    if len(dims) == 1:
+        return _line(dataset, dims[0], symbols[0], title, subtitle, layer)
+    return _plane(dataset, symbols, title, subtitle, layer, cells)
+
+
+def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)
+    dataset: xr.Dataset, dim: str, symbol: str, title: str, subtitle: str, layer: str | None
+) -> Chart:
+    """Return the chart over one parameter."""
+    x, ends = dataset[dim].values, plane.outer_edges(dataset, dim)
+    every = listed(dataset)
+    units = Units.of(facts(dataset))
+    below = Axis(symbol, ends)
+    bare = Axis("", ends, ticks=()) if layer is None else below
+    entropies, exponents = _entropies(dataset, x), _growth(dataset, x, every)
+    known = dataset["exponent"].values
+    rates = plane.padded(np.append(known[np.isfinite(known)], 0.0))
+    panels = [
+        Panel(
+            "fraction",
+            "",
+            bare,
+            Axis("share of the starts", (0.0, 1.0)),
+            _stack(dataset, dim, every),
+        ),
+        Panel(
+            "entropy", "", bare, Axis("entropy\n(nat)", _from_0(entropies, math.log(2))), entropies
+        ),
+        Panel(
+            "uncertainty",
+            "",
+            bare,
+            Axis("uncertainty\nexponent", (0.0, 1.1)),
+            _uncertainty(dataset, x),
+        ),
+        Panel(
+            "exponent",
+            "",
+            below,
+            Axis(f"exponent\n{names.per_time(units)}", rates),
+            exponents,
+        ),
+    ]
+    return Chart(
+        title,
+        subtitle,
+        [[panel] for panel in panels],
+        recorded=panels,
+        heights=_HEIGHTS,
+        size=_SIZE,
+        letters=False,
+        tabs=True,
+    ).only(layer)
+
+
+def _stack(dataset: xr.Dataset, dim: str, every: list[Branch]) -> list[Mark]:
+    """Return the shares of the attractors on one another, with their errors, then undecided starts.
+
+    Each share is as wide as its cell: nothing is known between two values.
+    """
+    x, edges = dataset[dim].values, np.repeat(plane.edges(dataset, dim), 2)[1:-1]
+    fraction, stderr = dataset["fraction"].values, dataset["stderr"].values
+    top = np.zeros(x.size)
+    marks: list[Mark] = []
+    grey = sum(not one.name for one in every)
+    layers = [
+        (one.name or f"{grey} others", one.colour, fraction[:, k]) for k, one in enumerate(every)
+    ]
+    layers.append(("undecided", palette.UNDECIDED, dataset["undecided"].values))
+    layers.append(("failed", palette.FAILED, dataset["failed"].values))
+    for k, (name, colour, share) in enumerate(layers):
+        if not share.any():
+            continue
+        low, top = top, top + share
+        ends = np.repeat(low, 2), np.repeat(top, 2)
+        marks.append(Band(edges, *ends, colour=colour, name=name, path=f"{k + 1}/share"))
+        size = stderr[:, k] if k < len(every) and every[k].name else np.zeros(x.size)
+        own = size > 0
+        at = bars(x[own], (top - size)[own], (top + size)[own])
+        marks.append(Line(*at, width=0.6, colour=INK, order=3.0))
+    return marks
+
+
+def _entropies(dataset: xr.Dataset, x: Floats) -> list[Mark]:
+    """Return the entropy of the plane and that of the boundary with its error."""
+    whole, edge = dataset["basin_entropy"].values, dataset["boundary_basin_entropy"].values
+    edge = np.where(dataset["boundary_boxes"].values > 0, edge, np.nan)
+    error = dataset["boundary_basin_entropy_stderr"].values
+    dark, blue = palette.colour("rotation 1:+1"), palette.colour("rotation 1:-1")
+    return [
+        Level(math.log(2), colour=QUIET, dash=DASHED),
+        Line(x, whole, colour=blue, name="basin entropy", path="whole"),
+        Line(
+            x,
+            edge,
+            colour=dark,
+            name="of the boundary (dashed: ln 2, fractal above)",
+            path="boundary",
+        ),
+        *_error(x, edge, error, dark),
+    ]
+
+
+def _uncertainty(dataset: xr.Dataset, x: Floats) -> list[Mark]:
+    """Return the uncertainty exponent with its error: 1 where the boundary is smooth."""
+    value, error = (dataset[f"uncertainty_exponent{end}"].values for end in ("", "_stderr"))
+    level = Level(1.0, colour=QUIET, dash=DASHED)
+    return [level, Line(x, value, colour=INK, path="value"), *_error(x, value, error, INK)]
+
+
+def _error(x: Floats, value: Floats, error: Floats, colour: str) -> list[Mark]:
+    known = np.isfinite(value) & np.isfinite(error)
+    at = bars(x[known], (value - error)[known], (value + error)[known])
+    dots = Points(x[known], value[known], colour=colour, size=2.0)
+    return [Line(*at, width=0.7, colour=colour), dots]
+
+
+def _growth(dataset: xr.Dataset, x: Floats, every: list[Branch]) -> list[Mark]:
+    """Return the largest Lyapunov exponent of each attractor."""
+    marks: list[Mark] = [Level(0.0, colour=QUIET)]
+    for k, one in enumerate(every):
+        at = x, dataset["exponent"].values[:, k]
+        look: dict[str, Any] = {"colour": one.colour, "order": 2.0 if one.name else 1.0}
+        marks.append(Line(*at, width=0.8, **look))
+        marks.append(Points(*at, size=2.2, path=f"{one.id}/exponent", **look))
+    return marks
+
+
+def _from_0(marks: list[Mark], least: float) -> Ends:
+    values = [np.asarray(mark.y) for mark in marks if isinstance(mark, Line)]
+    return 0.0, holding(*values, [0.0, 1.1 * least])[1]
+
+
+def _plane(  # noqa: PLR0913, PLR0917 (parts of a chart)
+    dataset: xr.Dataset,
+    symbols: list[str],
+    title: str,
+    subtitle: str,
+    layer: str | None,
+    cells: int,
+) -> Chart:
+    """Return the chart over two parameters: the first one upward, as the rows of the arrays."""
+    shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
+    if layer is not None and layer not in (*LAYERS, *shares):
+        known = ", ".join([*LAYERS, *shares])
+        raise InputError(f"layer must be one of this sweep, {known}, got {layer!r}")
+    up, across = (plane.outer_edges(dataset, one) for one in varied_names(dataset))
+    sides = Axis(symbols[1], across), Axis(symbols[0], up)
+    panels = []
+    for one in [layer] if layer else LAYERS:
+        text, image = _image(dataset, one, shares.get(one), across, up, cells)
+        panels.append(Panel(one, text, *sides, [image]))
+    leading = panels if layer else [panel for panel in panels if panel.name in _LEADING]
+    return Chart(title, subtitle, [leading], recorded=panels, ratio=0.85, tabs=True)
+
+
+def _image(  # noqa: PLR0913, PLR0917 (parts of an image)
+    dataset: xr.Dataset, layer: str, which: int | None, across: Ends, up: Ends, cells: int
+) -> tuple[str, Image]:
+    """Return the title and the image of a layer."""
+    name, text, unit = LAYERS[layer if which is None else "main"]
+    array = dataset[name]
+    if name == "fraction":
+        total = array.sum([*array.dims[:-1]]).values
+        which = int(np.argmax(total)) if which is None else which
+        array = array.isel(attractor=which)
+        text = f"{text} on {typeset(str(dataset['attractor'].values[which]))}"
+    values = np.asarray(plane.pixels(dataset, array, cells), dtype=np.float64)
+    if layer == "boundary":
+        values = np.where(
+            plane.pixels(dataset, dataset["boundary_boxes"], cells) > 0, values, np.nan
+        )
+    said = f"{text} ({unit})" if unit else text
+    if layer == "attractors":
+        top = int(min(values.max(initial=1), _MOST_COUNT))
+        beyond: Any = "max" if values.max(initial=0) > top else "neither"
+        whole = [float(k) for k in range(top + 1)]
+        look = Colours(said, "viridis", -0.5, top + 0.5, "counts", beyond, whole)
+    else:
+        known = values[np.isfinite(values)]
+        high = 1.0 if unit == "" else max(float(known.max(initial=0.0)), 1e-3)
+        look = Colours(said, "magma" if unit else "cividis", 0.0, high)
+    return text, Image(values, across, up, colours=look, path="values")

@@ -1,0 +1,294 @@
+"""Sweeps of basin maps: as maps alone, attractors with one number along the parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+import pendmap
+from pendmap import Grid, InputError, Pendulum
+from pendmap.analysis import branches
+from pendmap.analysis.sweep_tiles import Found, Mapped, SweepTiles
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+DRIVEN = Pendulum(gamma=0.1, omega=2.0)
+LINE = {"p": (0.4, 1.6, 21)}
+PLANE = {"p": (0.5, 0.9, 9), "omega": (1.9, 2.1, 3)}
+CELLS = 40
+
+
+@pytest.fixture(scope="module")
+def line() -> xr.Dataset:
+    return pendmap.sweep(DRIVEN, LINE, grid=CELLS)
+
+
+def equal(one: xr.Dataset, other: xr.Dataset) -> None:
+    """Compare all variables and attributes but times."""
+    assert set(one.variables) == set(other.variables)
+    for name in one.variables:
+        np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name))
+    lines = [text.attrs["summary"].splitlines()[:-1] for text in (one, other)]
+    assert lines[0] == lines[1]
+
+
+def test_each_map_is_that_of_the_model_alone(line: xr.Dataset) -> None:
+    for k in (0, 1, 8, 13, 20):
+        model = dataclasses.replace(DRIVEN, p=float(line.p.values[k]))
+        alone = pendmap.basins(model, CELLS, check=False)
+        here = line.isel(p=k)
+        there = np.flatnonzero(here.exists.values)
+        assert sorted(alone.n.values) == sorted(here.n.values[there])
+        # The number of each attractor of the map alone is that of its point in the sweep.
+        number = {}
+        for point, own in zip(alone.theta_point.values, alone.id.values, strict=True):
+            gap = np.abs(here.theta_point.values - point)
+            number[int(own)] = int(np.nanargmin(gap)) + 1
+            assert np.nanmin(gap) < 1e-9
+        moved = np.array([number[int(label)] for label in alone.label.values.ravel()])
+        np.testing.assert_array_equal(here.label.values.ravel(), moved)
+        share = here.fraction.values[[number[int(own)] - 1 for own in alone.id.values]]
+        np.testing.assert_allclose(share, alone.fraction.values)
+        assert float(here.basin_entropy) == float(alone.basin_entropy)
+
+
+def test_shares_and_labels_agree(line: xr.Dataset) -> None:
+    for k in range(line.sizes["p"]):
+        counts = np.bincount(
+            line.label.values[k].ravel() + 1, minlength=2 + line.sizes["attractor"]
+        )
+        np.testing.assert_allclose(counts[2:] / CELLS**2, line.fraction.values[k])
+        assert counts[1] / CELLS**2 == float(line.undecided[k])
+    assert ((line.fraction.values > 0) <= (line.exists.values > 0)).all()
+
+
+def test_an_attractor_keeps_its_number_until_it_ends_and_through_its_doubling() -> None:
+    # The rotation 1:1 doubles its period near p = 1.35: its orbit repels from there on.
+    found = pendmap.sweep(DRIVEN, {"p": (1.2, 1.45, 11)}, grid=20)
+    for sign in (1, -1):
+        own = [k for k, w in enumerate(found.w.values[0]) if w == sign]
+        assert len(own) == 1
+        n = found.n.values[:, own[0]]
+        assert found.exists.values[:, own[0]].all()
+        assert set(n) == {1, 2}
+        assert (np.diff(n) >= 0).all()
+        np.testing.assert_array_equal(found.w.values[:, own[0]], sign * n)
+    twins = found.twin.values
+    np.testing.assert_array_equal(twins[twins - 1], found.id.values)
+
+
+def test_numbers_follow_an_orbit_that_a_reference_integrator_follows() -> None:
+    """A branch is the orbit that Newton's method on scipy's flow leads to in 40 small steps."""
+    values = np.linspace(0.5, 0.8, 4)
+    found = pendmap.sweep(DRIVEN, {"p": (0.5, 0.8, 4)}, grid=20)
+    own = found.attractor.values.tolist().index("rotation 1:+1")
+    period = np.pi
+
+    def gap(state: np.ndarray, p: float) -> np.ndarray:
+        def right(time: float, y: np.ndarray) -> list[float]:
+            return [y[1], -0.1 * y[1] - (1 + p * np.cos(2 * time)) * np.sin(y[0])]
+
+        end = solve_ivp(right, (0, period), state, rtol=1e-11, atol=1e-12).y[:, -1]
+        return np.array([end[0] - 2 * np.pi - state[0], end[1] - state[1]])
+
+    state = np.array([found.theta_point.values[0, own], found.velocity_point.values[0, own]])
+    for p in np.linspace(0.5, 0.8, 31):
+        state = fsolve(gap, state, args=(p,), xtol=1e-12)
+        near = np.flatnonzero(np.abs(values - p) < 1e-9)
+        if near.size:
+            theta = found.theta_point.values[near[0], own]
+            assert abs(np.angle(np.exp(1j * (theta - state[0])))) < 1e-7
+            assert abs(found.velocity_point.values[near[0], own] - state[1]) < 1e-7
+
+
+def test_over_two_parameters_rows_and_columns_agree_with_lines() -> None:
+    plane = pendmap.sweep(DRIVEN, PLANE, grid=20, check=False)
+    model = dataclasses.replace(DRIVEN, omega=float(plane.omega.values[1]))
+    along = pendmap.sweep(model, {"p": PLANE["p"]}, grid=20, check=False)
+    here = plane.isel(omega=1)
+    for k in range(along.sizes["p"]):
+        pairs = {*zip(here.label.values[k].ravel(), along.label.values[k].ravel(), strict=True)}
+        assert len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
+        np.testing.assert_allclose(
+            sorted(here.fraction.values[k][here.exists.values[k] > 0]),
+            sorted(along.fraction.values[k][along.exists.values[k] > 0]),
+        )
+
+
+def test_results_depend_neither_on_threads_nor_on_an_executor_nor_on_parts(
+    line: xr.Dataset, tmp_path: Path
+) -> None:
+    equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, threads=1), line)
+    with ThreadPoolExecutor(2) as pool:
+        equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, executor=pool), line)
+    pytest.importorskip("zarr")
+    store = tmp_path / "sweep.zarr"
+    for number in (2, 1):
+        said = pendmap.sweep(DRIVEN, LINE, grid=CELLS, store=store, part=(number, 2))
+        assert not said.variables
+    equal(pendmap.merge(store), line)
+    equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, store=store, resume=True), line)
+    with pytest.raises(InputError, match="was begun with grid"):
+        pendmap.sweep(DRIVEN, LINE, grid=CELLS + 1, store=store, resume=True)
+
+
+def test_a_parameter_of_an_effect_and_units_of_a_rig() -> None:
+    drag = pendmap.Effect("quadratic_drag", {"q": 0.0})
+    model = Pendulum(gamma=0.1, p=0.6, omega=2.0, effects=(drag,))
+    found = pendmap.sweep(model, {"quadratic_drag.q": (0.0, 0.1, 3)}, grid=20)
+    own = dataclasses.replace(model, effects=(pendmap.Effect("quadratic_drag", {"q": 0.1}),))
+    alone = pendmap.basins(own, 20, check=False)
+    share = found.fraction.values[-1][found.exists.values[-1] > 0]
+    np.testing.assert_allclose(sorted(share), sorted(alone.fraction.values))
+
+
+def test_a_rig_has_the_same_basins_in_its_units() -> None:
+    w0 = 6.0
+    rig = pendmap.Rig(w0=w0, c_over_m=0.1 * w0, p=0.6, Omega=2.0 * w0)
+    found = pendmap.sweep(rig, {"p": (0.5, 0.6, 2)}, grid=20)
+    bare = pendmap.sweep(DRIVEN, {"p": (0.5, 0.6, 2)}, grid=20)
+    np.testing.assert_array_equal(found.label.values, bare.label.values)
+    np.testing.assert_allclose(found.exponent.values, w0 * bare.exponent.values)
+    np.testing.assert_allclose(found.velocity_point.values, w0 * bare.velocity_point.values)
+    assert found.exponent.attrs["units"] == "1/s"
+    assert found.velocity.attrs["units"] == "rad/s"
+
+
+def test_planes_without_basins() -> None:
+    chaos = pendmap.sweep(DRIVEN, {"p": (1.9, 2.0, 3)}, grid=20)
+    assert [str(name) for name in chaos.attractor.values] == ["tumbling chaos"]
+    assert (chaos.fraction.values == 1).all()
+    assert (chaos.plane.values == 1).all()
+    still = pendmap.sweep(Pendulum(gamma=0.0), {"p": (0.1, 0.2, 2)}, grid=10)
+    assert still.sizes["attractor"] == 0
+    assert (still.undecided.values == 1).all()
+    assert "Without damping" in still.attrs["summary"]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "more", "message"),
+    [
+        ({"p": (0.5, 0.6, 2)}, {"analysis": "lifetime"}, "analysis must be basins, got 'lifetime'"),
+        ({"q": (0.5, 0.6, 2)}, {}, "'q' is no parameter of this model"),
+        ({}, {}, "ranges must be a mapping like"),
+        ({"p": (0, 1, 2), "omega": (1, 2, 2), "gamma": (0, 1, 2)}, {}, "ranges must be a mapping"),
+        ({"p": (0.5, 0.6, 2)}, {"grid": 0}, "count must be"),
+        ({"p": (0.5, 0.6, 2)}, {"check": 2}, "check must be"),
+        ({"p": (0.5, 0.6, 2)}, {"resume": True}, "resume must be given with a store"),
+    ],
+)
+def test_refusals(
+    ranges: dict[str, tuple[float, float, int]], more: dict[str, object], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        pendmap.sweep(DRIVEN, ranges, **{"grid": 5, **more})  # type: ignore[arg-type]
+
+
+def test_json_holds_every_map(line: xr.Dataset) -> None:
+    found = importlib.import_module("pendmap.analysis.basin_sweep").SCHEMA.json(line)
+    assert len(found["maps"]) == line.sizes["p"]
+    assert [one["id"] for one in found["attractors"]] == line.id.values.tolist()
+    shares = [
+        sum(a["fraction"] for a in one["attractors"]) + one["undecided"] for one in found["maps"]
+    ]
+    np.testing.assert_allclose(shares, 1.0)
+
+
+# ---- matching
+
+
+def model_of(points: list[float], *, twin: int = 0) -> Mapped:
+    """Return a map with chaos at these angles, which no orbit leads to."""
+    found = [
+        Found("tumbling chaos", "tumbling_chaos", 0, 0, twin, 0.1, 0.0, 0.5, np.array([[x, 0.0]]))
+        for x in points
+    ]
+    return Mapped({"steps": 10.0}, found)
+
+
+def job(*counts: int) -> SweepTiles:
+    names = ("p", "omega")[: len(counts)]
+    spans = tuple(
+        (name, np.linspace(1.0, 2.0, n).tolist()) for name, n in zip(names, counts, strict=True)
+    )
+    return SweepTiles(DRIVEN, spans, ((-3, 3, 5), (-3, 3, 5)), {}, 1)  # type: ignore[typeddict-item]
+
+
+def test_numbers_are_in_the_order_of_first_appearance() -> None:
+    maps = {(0,): model_of([0.5]), (1,): model_of([-1.0, 0.6]), (2,): model_of([-1.1, 0.7])}
+    found = branches.branches(job(3), maps)
+    assert found == {(0,): [0], (1,): [1, 0], (2,): [1, 0]}
+
+
+def test_a_gap_ends_a_branch() -> None:
+    maps = {(0,): model_of([0.5]), (1,): model_of([]), (2,): model_of([0.5])}
+    assert branches.branches(job(3), maps) == {(0,): [0], (1,): [], (2,): [1]}
+
+
+def test_no_map_has_two_attractors_of_one_branch() -> None:
+    # Around the plane the left one becomes the right one: they stay two at every model.
+    maps = {
+        (0, 0): model_of([0.0, 0.3]),
+        (0, 1): model_of([0.1, 0.35]),
+        (1, 0): model_of([0.2, 0.5]),
+        (1, 1): model_of([0.3, 0.55]),
+    }
+    found = branches.branches(job(2, 2), maps)
+    assert all(len(set(own)) == len(own) for own in found.values())
+
+
+def test_names_are_different(line: xr.Dataset) -> None:
+    names = [str(name) for name in line.attractor.values]
+    assert len(set(names)) == len(names)
+    assert all(names)
+
+
+def test_a_block_is_a_path_along_neighbours() -> None:
+    for counts in ((37,), (11, 20)):
+        one = job(*counts)
+        every = [one.places(tile) for tile in range(one.blocks)]
+        listed = [place for block in every for place in block]
+        assert len(listed) == len(set(listed)) == int(np.prod(counts))
+        for block in every:
+            steps = np.abs(np.diff(np.array(block), axis=0)).sum(axis=1)
+            assert (steps == 1).all()
+
+
+def test_the_window_is_that_of_the_grid() -> None:
+    grid = Grid((-1.0, 1.0, 6), (0.0, 1.0, 5))
+    found = pendmap.sweep(DRIVEN, {"p": (0.5, 0.6, 2)}, grid=grid)
+    assert found.label.shape == (2, 5, 6)
+    assert float(found.theta_bounds[0, 0]) == -1.0
+
+
+def test_values_may_be_any_that_ascend(tmp_path: Path) -> None:
+    values = [0.4, 0.5, 0.7, 0.75]
+    found = pendmap.sweep(Pendulum(), {"p": np.array(values)}, grid=12, check=False)
+    assert found["p"].values.tolist() == values
+    assert found["p_bounds"].values[1].tolist() == pytest.approx([0.45, 0.6])
+    pendmap.sweep(Pendulum(), {"p": values[:3]}, grid=12, store=tmp_path / "s.zarr", part=(1, 2))
+    merged = pendmap.merge(tmp_path / "s.zarr")
+    assert merged["fraction"].values.tolist() == found["fraction"].values[:3].tolist()
+
+
+@pytest.mark.parametrize(
+    ("ranges", "said"),
+    [
+        ({"p": [0.5, 0.4]}, "p must be ascending values"),
+        ({"p": []}, r"p must be an array \(N,\) of numbers"),
+        ({"p": [0.4, 0.5, 0.9], "omega": (1.9, 2.1, 3)}, "p must be evenly spaced"),
+    ],
+)
+def test_other_values_are_refused(ranges: dict[str, list[float]], said: str) -> None:
+    with pytest.raises(pendmap.InputError, match=said):
+        pendmap.sweep(Pendulum(), ranges, grid=12)
