@@ -135,13 +135,108 @@ struct Capture<'a> {
 
 /// A hit: which attractor and point, when, and where the trajectory was.
 #[derive(Clone, Copy)]
-struct Hit {
-    attractor: usize,
+pub(super) struct Hit {
+    pub(super) attractor: usize,
     point: usize,
-    clock: u64,
+    pub(super) clock: u64,
     turns: f64,
     theta: f64,
     velocity: f64,
+}
+
+/// What the traps have seen of the trajectory in a lane.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sight {
+    hit: Option<Hit>,
+    /// When friction last held it, and by how much the maximum load exceeds the friction.
+    held: Option<(u64, f64)>,
+}
+
+/// The traps that watch the lanes of a block, period by period.
+pub(super) struct Guard<'a> {
+    strobe: &'a Strobe,
+    traps: &'a Traps,
+    /// Ellipses in the coordinates of a lane: half turns and kick.
+    scaled: Vec<Ellipse>,
+}
+
+impl<'a> Guard<'a> {
+    pub(super) fn new(strobe: &'a Strobe, traps: &'a Traps) -> Self {
+        let scale = strobe.schedule.kick;
+        let scaled = traps
+            .ellipses
+            .iter()
+            .map(|e| Ellipse {
+                centre: [e.centre[0] * FRAC_1_PI, e.centre[1] * scale],
+                shape: [e.shape[0] * PI, e.shape[1] / scale, e.shape[2] / scale],
+                ..*e
+            })
+            .collect();
+        Self { strobe, traps, scaled }
+    }
+
+    /// The trap that holds `lane`, as attractor, point and length of its cycle.
+    fn trap(&self, block: &Block, lane: usize) -> Option<(usize, usize, usize)> {
+        let state = [block.half_turns[lane], block.kick[lane]];
+        if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
+            return Some((e.attractor, e.point, e.cycle));
+        }
+        let state = self.state(block, lane);
+        self.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0, 1))
+    }
+
+    /// The first of two hits of `lane` on the same attractor, one point on, in successive periods, of
+    /// which the second ends at `clock`.
+    pub(super) fn captured(
+        &self,
+        block: &Block,
+        lane: usize,
+        clock: u64,
+        sight: &mut Sight,
+    ) -> Option<Hit> {
+        let (attractor, point, cycle) = self.trap(block, lane)?;
+        let next = |hit: &Hit| {
+            let consecutive = hit.clock + 1 == clock && hit.attractor == attractor;
+            consecutive && point == (hit.point + 1) % cycle
+        };
+        if let Some(hit) = sight.hit.filter(next) {
+            return Some(hit);
+        }
+        let [theta, velocity] = self.state(block, lane);
+        let turns = block.turns[lane];
+        sight.hit = Some(Hit { attractor, point, clock, turns, theta, velocity });
+        None
+    }
+
+    /// The set at rest in which friction holds `lane` for ever, or into which it creeps.
+    pub(super) fn at_rest(
+        &self,
+        block: &Block,
+        lane: usize,
+        clock: u64,
+        sight: &mut Sight,
+    ) -> Option<usize> {
+        let theta = block.held_at[lane] * PI;
+        let rest = self.traps.rests.of(theta)?;
+        let equation = &self.strobe.equation;
+        let excess = equation.excess(theta);
+        let limit = equation.hold(theta);
+        let creeps = sight.held.is_some_and(|(before, more)| {
+            before + 1 == clock && excess < more && excess < CREEPING * limit
+        });
+        sight.held = Some((clock, excess));
+        (equation.holds_for_ever(theta) || creeps).then_some(rest)
+    }
+
+    pub(super) fn state(&self, block: &Block, lane: usize) -> State {
+        [block.half_turns[lane] * PI, block.kick[lane] / self.strobe.schedule.kick]
+    }
+}
+
+/// [`Fate::Open`], or [`Fate::Failed`] of a state outside the range of numbers.
+pub(super) fn fate_at_bound([theta, velocity]: State) -> Fate {
+    let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
+    if finite { Fate::Open } else { Fate::Failed }
 }
 
 /// The trajectory in one lane.
@@ -150,16 +245,13 @@ struct Tenant {
     index: usize,
     first_theta: f64,
     born: u64,
-    hit: Option<Hit>,
-    /// When friction last held it, and by how much the maximum load exceeds the friction.
-    held: Option<(u64, f64)>,
+    sight: Sight,
 }
 
 /// A block whose lanes take a new start when one has ended.
 struct Watch<'a> {
     job: Capture<'a>,
-    /// Ellipses in the coordinates of a lane: half turns and kick.
-    scaled: Vec<Ellipse>,
+    guard: Guard<'a>,
     block: Block,
     height: Vec<f64>,
     tenants: Vec<Option<Tenant>>,
@@ -170,20 +262,9 @@ struct Watch<'a> {
 impl<'a> Watch<'a> {
     fn new(job: Capture<'a>) -> Self {
         let width = job.strobe.block_width(job.source.count());
-        let scale = job.strobe.schedule.kick;
-        let scaled = job
-            .traps
-            .ellipses
-            .iter()
-            .map(|e| Ellipse {
-                centre: [e.centre[0] * FRAC_1_PI, e.centre[1] * scale],
-                shape: [e.shape[0] * PI, e.shape[1] / scale, e.shape[2] / scale],
-                ..*e
-            })
-            .collect();
         Self {
+            guard: Guard::new(job.strobe, job.traps),
             job,
-            scaled,
             block: Block::new(width),
             height: vec![f64::INFINITY; width],
             tenants: vec![None; width],
@@ -203,7 +284,7 @@ impl<'a> Watch<'a> {
             let heights = Heights {
                 angle: self.job.strobe.angle,
                 block: &mut self.block,
-                ellipses: &self.scaled,
+                ellipses: &self.guard.scaled,
                 height: &mut self.height,
             };
             let low = dispatch::run(self.job.strobe.simd, heights);
@@ -237,6 +318,7 @@ impl<'a> Watch<'a> {
     fn refill(&mut self, lane: usize) -> bool {
         let Some((index, [theta, velocity])) = self.job.source.next() else {
             self.tenants[lane] = None;
+            self.block.idle[lane] = true;
             (self.block.half_turns[lane], self.block.kick[lane]) = (0.0, 0.0);
             return false;
         };
@@ -244,85 +326,40 @@ impl<'a> Watch<'a> {
         self.block.kick[lane] = velocity * self.job.strobe.schedule.kick;
         self.block.turns[lane] = 0.0;
         self.tenants[lane] =
-            Some(Tenant { index, first_theta: theta, born: self.clock, hit: None, held: None });
+            Some(Tenant { index, first_theta: theta, born: self.clock, sight: Sight::default() });
         self.next_expiry = self.next_expiry.min(self.clock + u64::from(self.job.bound));
         true
     }
 
-    /// The trap that holds `lane`, as attractor, point and length of its cycle.
-    fn trap(&self, lane: usize) -> Option<(usize, usize, usize)> {
-        let state = [self.block.half_turns[lane], self.block.kick[lane]];
-        if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
-            return Some((e.attractor, e.point, e.cycle));
-        }
-        let state = [self.theta(lane), self.velocity(lane)];
-        self.job.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0, 1))
-    }
-
-    /// Whether `lane` has hit the same attractor, one point on, in two successive periods; if so
-    /// its outcome has been delivered.
+    /// Whether a trap has captured `lane`; if so its outcome has been delivered.
     #[inline(never)]
     fn captured(&mut self, lane: usize) -> bool {
-        let (Some(mut tenant), Some((attractor, point, cycle))) =
-            (self.tenants[lane], self.trap(lane))
-        else {
-            return false;
-        };
-        if let Some(hit) = tenant.hit {
-            let consecutive = hit.clock + 1 == self.clock && hit.attractor == attractor;
-            if consecutive && point == (hit.point + 1) % cycle {
-                let end = (hit.theta, hit.velocity, hit.turns, hit.clock);
-                self.hand_over(tenant, Fate::Captured(attractor), end);
-                return true;
-            }
-        }
-        tenant.hit = Some(Hit {
-            attractor,
-            point,
-            clock: self.clock,
-            turns: self.block.turns[lane],
-            theta: self.theta(lane),
-            velocity: self.velocity(lane),
-        });
-        self.tenants[lane] = Some(tenant);
-        false
+        let Some(tenant) = &mut self.tenants[lane] else { return false };
+        let hit = self.guard.captured(&self.block, lane, self.clock, &mut tenant.sight);
+        let (Some(hit), tenant) = (hit, *tenant) else { return false };
+        let end = ([hit.theta, hit.velocity], hit.turns, hit.clock);
+        self.hand_over(tenant, Fate::Captured(hit.attractor), end);
+        true
     }
 
     /// Whether friction holds `lane` for ever, or it creeps to such a state; if so its outcome has
     /// been delivered.
     #[inline(never)]
     fn at_rest(&mut self, lane: usize) -> bool {
-        let theta = self.block.held_at[lane] * PI;
-        let (Some(mut tenant), Some(rest)) = (self.tenants[lane], self.job.traps.rests.of(theta))
-        else {
-            return false;
-        };
-        let equation = &self.job.strobe.equation;
-        let excess = equation.excess(theta);
-        let limit = equation.hold(theta);
-        let creeps = tenant.held.is_some_and(|(clock, before)| {
-            clock + 1 == self.clock && excess < before && excess < CREEPING * limit
-        });
-        if equation.holds_for_ever(theta) || creeps {
-            let end = (self.theta(lane), self.velocity(lane), self.block.turns[lane], self.clock);
-            self.hand_over(tenant, Fate::Captured(rest), end);
-            return true;
-        }
-        tenant.held = Some((self.clock, excess));
-        self.tenants[lane] = Some(tenant);
-        false
+        let Some(tenant) = &mut self.tenants[lane] else { return false };
+        let rest = self.guard.at_rest(&self.block, lane, self.clock, &mut tenant.sight);
+        let (Some(rest), tenant) = (rest, *tenant) else { return false };
+        self.hand_over(tenant, Fate::Captured(rest), self.end(lane));
+        true
     }
 
-    fn theta(&self, lane: usize) -> f64 {
-        self.block.half_turns[lane] * PI
+    /// State, turns and time of `lane` now.
+    fn end(&self, lane: usize) -> (State, f64, u64) {
+        (self.guard.state(&self.block, lane), self.block.turns[lane], self.clock)
     }
 
-    fn velocity(&self, lane: usize) -> f64 {
-        self.block.kick[lane] / self.job.strobe.schedule.kick
-    }
-
-    fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (f64, f64, f64, u64)) {
-        let (theta, velocity, turns, clock) = end;
+    fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (State, f64, u64)) {
+        let ([theta, velocity], turns, clock) = end;
         let whole = turns + (theta - tenant.first_theta) / TAU;
         let outcome = Outcome {
             fate,
@@ -347,10 +384,8 @@ impl<'a> Watch<'a> {
                 self.next_expiry = self.next_expiry.min(expiry);
                 continue;
             }
-            let (theta, velocity) = (self.theta(lane), self.velocity(lane));
-            let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
-            let fate = if finite { Fate::Open } else { Fate::Failed };
-            self.hand_over(tenant, fate, (theta, velocity, self.block.turns[lane], self.clock));
+            let end = self.end(lane);
+            self.hand_over(tenant, fate_at_bound(end.0), end);
             emptied += usize::from(!self.refill(lane));
         }
         emptied

@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::capture::{self, Outcome, Traps};
+use super::capture::{Fate, Traps};
 use super::effort::Effort;
 use super::groups::Groups;
 use super::kind::Kind;
-use super::long_runs::{Cut, Senses, Window, long_runs};
+use super::long_runs::{Cut, Run, Senses, Window, long_runs};
 use super::region::Region;
 use super::trap::Band;
 use crate::integrate::Strobe;
@@ -29,6 +29,8 @@ const ROUNDS: usize = 16;
 const CURVES: usize = 128;
 /// An exponent is positive if it is at least this many standard errors above zero.
 const SIGNIFICANCE: f64 = 4.0;
+/// Multiple of the trajectories that measure an exponent again which these do not show to be positive.
+const MORE: usize = 4;
 /// Least exponent, per period, that is accepted as positive.
 const LEAST_EXPONENT: f64 = 1e-3;
 /// Distance within which points are identical.
@@ -37,6 +39,17 @@ const SAME: f64 = 1e-6;
 const NEUTRAL: f64 = 2e-3;
 /// Least number of turns of such motion, per period.
 const LEAST_TURNS: f64 = 0.02;
+
+/// Chaos that an earlier search of the same pendulum has found.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownChaos {
+    /// Kind of chaos.
+    pub kind: Kind,
+    /// Sense of its turns.
+    pub sense: i64,
+    /// Largest Lyapunov exponent per unit of tau, and its standard error.
+    pub exponent: [f64; 2],
+}
 
 /// A set of trajectories that share a region and never leave it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -71,33 +84,57 @@ impl ChaoticSet {
     }
 }
 
-/// Sorts trajectories into the sets that none of them leaves: they are observed from `states` on
-/// for `periods` more.
+/// Observes trajectories from `states` for `periods`, as [`sets`] needs it; `None` if `cancel` was set.
+#[must_use]
+pub fn observed(
+    strobe: &Strobe,
+    traps: &Traps,
+    states: &[State],
+    periods: u32,
+    effort: &Effort,
+    cancel: &AtomicBool,
+) -> Option<Vec<Run>> {
+    long_runs(strobe, traps, states, cut(periods, effort), cancel)
+}
+
+fn cut(periods: u32, effort: &Effort) -> Cut {
+    let length = (periods as usize / WINDOWS).max(1);
+    Cut { windows: WINDOWS, length, side: effort.cells }
+}
+
+/// Sorts trajectories that have been [`observed`] for `periods` into the sets that none of them leaves.
 ///
-/// `captured` gives the number of these periods after which one of the `traps` captured each, if
-/// any did. Returns no set if `cancel` was set.
+/// Chaos of the kind and sense of one `known` has its exponent. Returns no set if `cancel` was set.
 #[must_use]
 pub fn sets(
     strobe: &Strobe,
     traps: &Traps,
-    states: &[State],
-    captured: &[Option<u32>],
+    known: &[KnownChaos],
+    observed: Vec<Run>,
     periods: u32,
     effort: &Effort,
     cancel: &AtomicBool,
 ) -> Vec<ChaoticSet> {
-    let length = (periods / WINDOWS as u32).max(1);
-    let mut runs =
-        Runs { strobe, traps, length, effort, cancel, windows: Vec::new(), captured: Vec::new() };
-    runs.sets(states, captured).unwrap_or_default()
+    let cut = cut(periods, effort);
+    let mut runs = Runs {
+        strobe,
+        traps,
+        known,
+        cut,
+        effort,
+        cancel,
+        windows: Vec::new(),
+        captured: Vec::new(),
+    };
+    runs.sets(observed).unwrap_or_default()
 }
 
 /// Trajectories observed window by window.
 struct Runs<'a> {
     strobe: &'a Strobe,
     traps: &'a Traps,
-    /// Periods of a window.
-    length: u32,
+    known: &'a [KnownChaos],
+    cut: Cut,
     effort: &'a Effort,
     cancel: &'a AtomicBool,
     /// The windows of each before its capture.
@@ -107,13 +144,13 @@ struct Runs<'a> {
 }
 
 impl Runs<'_> {
-    /// The sets of the runs from `states` and of as many further ones as a decision requires.
+    /// The sets of the runs observed and of as many further ones as a decision requires.
     ///
     /// A run whose last group no window follows goes on for a window. A set of fewer than
     /// [`Effort::proved`] runs gets that many more from its own points. Sets that this does not settle within
     /// [`ROUNDS`] are left out. `None` if the search was cancelled.
-    fn sets(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<Vec<ChaoticSet>> {
-        self.add(states, captured)?;
+    fn sets(&mut self, observed: Vec<Run>) -> Option<Vec<ChaoticSet>> {
+        self.add(observed);
         let mut groups = Groups::new(&self.windows, &self.captured);
         for _ in 0..ROUNDS {
             let unknown = groups.without_next();
@@ -125,57 +162,45 @@ impl Runs<'_> {
                 break;
             }
             self.go_on(&unknown)?;
-            let ends = self.captures(&few, self.length * WINDOWS as u32)?;
-            self.add(&few, &ends)?;
+            let further = long_runs(self.strobe, self.traps, &few, self.cut, self.cancel)?;
+            self.add(further);
             groups = Groups::new(&self.windows, &self.captured);
         }
         let mut found = Vec::new();
         for class in groups.classes() {
             let windows = groups.windows(&self.windows, &class);
-            let set =
-                describe(self.strobe, &windows, self.length as usize, self.effort, self.cancel);
+            let set = self.describe(&windows);
             let proved = groups.members(&class) >= self.effort.proved;
             found.extend(set.filter(|set| proved || set.band.is_some()));
         }
         (!self.cancel.load(Ordering::Relaxed)).then_some(found)
     }
 
-    /// Watches from `states`; a run that repeats itself, as from a start exactly on an orbit that does not
-    /// attract, shows no set.
-    fn add(&mut self, states: &[State], captured: &[Option<u32>]) -> Option<()> {
-        for (mut windows, captured) in self.long_runs(states, WINDOWS)?.into_iter().zip(captured) {
-            windows.truncate(captured.map_or(WINDOWS, |at| (at / self.length) as usize));
+    /// Adds runs; one that repeats itself, as from a start exactly on an orbit that does not attract, shows no
+    /// set.
+    fn add(&mut self, runs: Vec<Run>) {
+        for Run { mut windows, fate, .. } in runs {
             if closes(self.strobe.angle, &windows, self.effort.longest_cycle) {
                 windows.clear();
             }
             self.windows.push(windows);
-            self.captured.push(captured.is_some());
+            self.captured.push(fate != Fate::Open);
         }
-        Some(())
     }
 
     /// Observes these runs for another window.
     fn go_on(&mut self, runs: &[usize]) -> Option<()> {
         let last = |run: &usize| self.windows[*run].last()?.points.last().copied();
         let ends: Vec<State> = runs.iter().filter_map(last).collect();
-        let captured = self.captures(&ends, self.length)?;
-        for ((run, windows), at) in runs.iter().zip(self.long_runs(&ends, 1)?).zip(captured) {
-            self.captured[*run] = at.is_some();
-            if at.is_none() {
+        let cut = Cut { windows: 1, ..self.cut };
+        let further = long_runs(self.strobe, self.traps, &ends, cut, self.cancel)?;
+        for (run, Run { windows, fate, .. }) in runs.iter().zip(further) {
+            self.captured[*run] = fate != Fate::Open;
+            if fate == Fate::Open {
                 self.windows[*run].extend(windows);
             }
         }
         Some(())
-    }
-
-    fn long_runs(&self, states: &[State], windows: usize) -> Option<Vec<Vec<Window>>> {
-        let cut = Cut { windows, length: self.length as usize, side: self.effort.cells };
-        long_runs(self.strobe, states, cut, self.cancel)
-    }
-
-    fn captures(&self, states: &[State], periods: u32) -> Option<Vec<Option<u32>>> {
-        let outcomes = capture::outcomes(self.strobe, self.traps, periods, states, self.cancel)?;
-        Some(outcomes.iter().map(Outcome::end).collect())
     }
 
     fn points_of_small_classes(&self, groups: &Groups) -> Vec<State> {
@@ -201,50 +226,53 @@ fn closes(angle: Angle, windows: &[Window], longest: usize) -> bool {
     })
 }
 
-/// The attractor of a set of windows; `None` if it is neither chaotic nor quasi-periodic.
-fn describe(
-    strobe: &Strobe,
-    windows: &[&Window],
-    length: usize,
-    effort: &Effort,
-    cancel: &AtomicBool,
-) -> Option<ChaoticSet> {
-    if strobe.pendulum.is_autonomous() {
-        // A flow in the plane has no chaos: the remaining trajectories have not settled yet.
-        return None;
+impl Runs<'_> {
+    /// The attractor of a set of windows; `None` if it is neither chaotic nor quasi-periodic.
+    fn describe(&self, windows: &[&Window]) -> Option<ChaoticSet> {
+        let Self { strobe, effort, .. } = self;
+        if strobe.pendulum.is_autonomous() {
+            // A flow in the plane has no chaos: the remaining trajectories have not settled yet.
+            return None;
+        }
+        let mut region = Region::new(effort.cells, &strobe.pendulum);
+        for window in windows {
+            region.unite(&window.region);
+        }
+        let every = points(windows);
+        let found = |kind: Kind, sense: i64, [exponent, exponent_stderr]: [f64; 2], band| {
+            let points = spread(&every, KEPT);
+            Some(ChaoticSet { kind, sense, points, exponent, exponent_stderr, region, band })
+        };
+        let (kind, sense) =
+            windows.iter().fold(Senses::default(), |all, window| all.with(window.senses)).kind();
+        let known = self.known.iter().find(|known| (known.kind, known.sense) == (kind, sense));
+        if let Some(known) = known {
+            return found(kind, sense, known.exponent, None);
+        }
+        let length = self.cut.length;
+        let measured = |count: usize| {
+            let all = exponents(strobe, &spread(&every, count), length, self.cancel)?;
+            Some(mean_and_error(&all))
+        };
+        let (mut mean, mut stderr) = measured(effort.exponents)?;
+        if mean > LEAST_EXPONENT && mean < SIGNIFICANCE * stderr {
+            (mean, stderr) = measured(MORE * effort.exponents)?;
+        }
+        let turning = |w: &&Window| w.turns.abs() > LEAST_TURNS * length as f64;
+        if mean.abs() < NEUTRAL && windows.iter().all(turning) {
+            // Near a resonance one trajectory fills the curve slowly; several fill it sooner.
+            let curve: Vec<State> =
+                windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
+            let band = Band::around(strobe, &curve, 0)?;
+            let sense = windows[0].turns.signum() as i64;
+            let stderr = stderr / strobe.pendulum.period();
+            return found(Kind::QuasiperiodicRotation, sense, [0.0, stderr], Some(band));
+        }
+        if mean < LEAST_EXPONENT.max(SIGNIFICANCE * stderr) {
+            return None;
+        }
+        found(kind, sense, [mean, stderr].map(|x| x / strobe.pendulum.period()), None)
     }
-    let mut region = Region::new(effort.cells, &strobe.pendulum);
-    for window in windows {
-        region.unite(&window.region);
-    }
-    let every = points(windows);
-    let exponents = exponents(strobe, &spread(&every, effort.watched_alone), length, cancel)?;
-    let (mean, stderr) = mean_and_error(&exponents);
-    let period = strobe.pendulum.period();
-    let turning = |w: &&Window| w.turns.abs() > LEAST_TURNS * length as f64;
-    let found = |kind: Kind, sense: i64, mean: f64, band: Option<Band>| ChaoticSet {
-        kind,
-        sense,
-        points: spread(&every, KEPT),
-        exponent: mean / period,
-        exponent_stderr: stderr / period,
-        region,
-        band,
-    };
-    if mean.abs() < NEUTRAL && windows.iter().all(turning) {
-        // Near a resonance one trajectory fills the curve slowly; several fill it sooner.
-        let curve: Vec<State> =
-            windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
-        let band = Band::around(strobe, &curve, 0)?;
-        let sense = windows[0].turns.signum() as i64;
-        return Some(found(Kind::QuasiperiodicRotation, sense, 0.0, Some(band)));
-    }
-    if mean < LEAST_EXPONENT.max(SIGNIFICANCE * stderr) {
-        return None;
-    }
-    let (kind, sense) =
-        windows.iter().fold(Senses::default(), |all, window| all.with(window.senses)).kind();
-    Some(found(kind, sense, mean, None))
 }
 
 /// At most `most` of the points, equally spaced in their list.

@@ -24,8 +24,8 @@ pub struct Effort {
     /// Runs that a chaotic set requires; if fewer have reached it, more runs from its points must
     /// stay.
     pub proved: usize,
-    /// Starts of a grid from which short cycles are sought beside chaos, for each period.
-    pub short_tries: usize,
+    /// Points of a set from which its exponent is measured.
+    pub exponents: usize,
     /// Cells around the circle of a set's region: few enough for its points to fill the visited
     /// part.
     pub cells: usize,
@@ -61,7 +61,7 @@ impl Effort {
         watched_alone: 256,
         watch: 4,
         proved: 16,
-        short_tries: 16,
+        exponents: 256,
         cells: 96,
         trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
     };
@@ -71,6 +71,7 @@ impl Effort {
     pub const CONTINUED: Self = Self {
         first_round: 1024,
         watched_alone: 16,
+        exponents: 16,
         trap: Sampling { levels: 14, rounds: 4, ..Self::THOROUGH.trap },
         ..Self::THOROUGH
     };
@@ -84,7 +85,7 @@ impl Effort {
         watched_alone: 24,
         watch: 4,
         proved: 16,
-        short_tries: 16,
+        exponents: 16,
         cells: 24,
         trap: Sampling { points: 3, rays: 12, levels: 8, ratio: 0.5, rounds: 2, returns: 2 },
     };

@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::capture::{self, Fate, Outcome, Traps};
+use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
-use super::chaos::ChaoticSet;
+use super::chaos::{ChaoticSet, KnownChaos};
 use super::effort::Effort;
 use super::near_returns::{escape_speed, near_returns};
 use super::rest;
@@ -50,6 +50,11 @@ pub struct Catalogue {
     pub(super) rotations: Vec<(Rotation, Option<Band>)>,
     pub(super) rests: Vec<f64>,
     pub(super) sets: Vec<ChaoticSet>,
+    /// Extents of the starts from which short cycles have been sought.
+    #[serde(skip)]
+    pub(super) sought: State,
+    #[serde(skip)]
+    pub(super) known: Vec<KnownChaos>,
 }
 
 impl Catalogue {
@@ -67,9 +72,25 @@ impl Catalogue {
             rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
             rests: rest::centres(&strobe.pendulum),
             sets: Vec::new(),
+            sought: [0.0; 2],
+            known: Vec::new(),
         };
         empty.rebuild(&strobe.pendulum);
         empty
+    }
+
+    /// Takes over what an earlier search of the same pendulum has shown of its chaos: exponents, and that there
+    /// are no other short cycles.
+    pub fn take_over_chaos<'a>(&mut self, attractors: impl Iterator<Item = &'a Attractor>) {
+        let known = |a: &Attractor| KnownChaos {
+            kind: a.kind,
+            sense: a.sense,
+            exponent: [a.exponent, a.exponent_stderr],
+        };
+        self.known.extend(attractors.filter(|a| a.kind.is_chaotic()).map(known));
+        if !self.known.is_empty() {
+            self.sought = [f64::INFINITY; 2];
+        }
     }
 
     /// A stored catalogue, with its attractors and traps.
@@ -84,8 +105,8 @@ impl Catalogue {
     #[must_use]
     pub fn continued(&self, strobe: &Strobe, bound: u32, cancel: &AtomicBool) -> Self {
         let mut next = Self::new(strobe, Effort::CONTINUED);
-        let orbits: Vec<(State, usize)> =
-            self.orbits.iter().map(|(orbit, _)| (orbit.points[0], orbit.n)).collect();
+        let orbits: Vec<Alike> =
+            self.orbits.iter().map(|(orbit, _)| (vec![orbit.points[0]], orbit.n)).collect();
         next.take_over(strobe, &orbits, cancel);
         next.take_over_curves(strobe, &self.sets, bound, cancel);
         if next.attractors.is_empty() {
@@ -122,54 +143,64 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> Vec<Ending> {
         let mut endings: Vec<Ending> = starts.iter().map(|s| Ending::Open(*s)).collect();
+        self.settle(strobe, &mut endings, bound, cancel);
+        self.watch(strobe, &mut endings, bound, cancel);
+        endings
+    }
+
+    /// The first part of [`Catalogue::endings`]: the open ones run for `bound` periods; [`Catalogue::watch`] is
+    /// the second.
+    pub fn settle(
+        &mut self,
+        strobe: &Strobe,
+        endings: &mut [Ending],
+        bound: u32,
+        cancel: &AtomicBool,
+    ) {
+        let is_open = |e: &Ending| matches!(e, Ending::Open(_));
+        let mut alive = endings.iter().any(is_open);
         if !strobe.pendulum.is_dissipative() {
-            return endings;
+            return;
         }
         let map = self.map(strobe);
         let fastest = escape_speed(&strobe.pendulum);
         let (mut elapsed, mut round) = (0, self.effort.first_round);
-        let mut alive = !starts.is_empty();
         while elapsed < bound && alive && !cancel.load(Ordering::Relaxed) {
             let length = round.min(bound - elapsed);
-            self.run(strobe, &mut endings, length, elapsed, cancel);
-            for ending in &mut endings {
+            self.run(strobe, endings, length, elapsed, cancel);
+            for ending in endings.iter_mut() {
                 if matches!(ending, Ending::Open(state) if state[1].abs() > fastest) {
                     *ending = Ending::Failed;
                 }
             }
             elapsed += length;
             round *= 2;
-            let free = open(&endings);
+            let free = open(endings);
             if self.find_cycles(strobe, &map, &free, cancel) {
                 // Trajectories within the new traps are captured at once.
-                self.run(strobe, &mut endings, self.effort.first_round, elapsed, cancel);
+                self.run(strobe, endings, self.effort.first_round, elapsed, cancel);
             }
-            alive = endings.iter().any(|e| matches!(e, Ending::Open(_)));
+            alive = endings.iter().any(is_open);
         }
-        if alive && !cancel.load(Ordering::Relaxed) {
-            self.watch(strobe, &mut endings, bound, cancel);
-        }
-        endings
     }
 
-    /// Newton's method from points of orbits of a similar pendulum, each with its period; returns
-    /// those from which no attracting orbit is found.
+    /// The attracting orbits that [`attracting`] finds; returns the first point of those from which it finds
+    /// none.
     pub fn take_over(
         &mut self,
         strobe: &Strobe,
-        orbits: &[(State, usize)],
+        orbits: &[Alike],
         cancel: &AtomicBool,
     ) -> Vec<State> {
         let map = self.map(strobe);
         let mut left = Vec::new();
-        for (point, n) in orbits {
-            let orbit = newton::find(&map, *point, *n, REACH).filter(|o| attracts(strobe, o));
+        for ((points, _), orbit) in orbits.iter().zip(attracting(strobe, &map, orbits)) {
             match orbit {
                 Some(orbit) if self.knows(&orbit) => {}
                 Some(orbit) => {
                     self.admit(strobe, &map, orbit, cancel);
                 }
-                None => left.push(*point),
+                None => left.push(points[0]),
             }
         }
         self.rebuild(&strobe.pendulum);
@@ -202,14 +233,14 @@ impl Catalogue {
             if matches!(outcome.fate, Fate::Captured(_)) {
                 self.longest_settle = self.longest_settle.max(elapsed + outcome.periods);
             }
-            *ending = self.ending(&outcome);
+            *ending = self.ending(outcome.fate, outcome.state);
         }
     }
 
-    /// How a start has ended by this outcome.
-    pub(super) fn ending(&self, outcome: &Outcome) -> Ending {
-        match outcome.fate {
-            Fate::Open => Ending::Open(outcome.state),
+    /// How a start of this fate has ended.
+    pub(super) fn ending(&self, fate: Fate, state: State) -> Ending {
+        match fate {
+            Fate::Open => Ending::Open(state),
             Fate::Captured(attractor) => Ending::Captured(self.attractors[attractor].mark()),
             Fate::Failed => Ending::Failed,
         }
@@ -217,35 +248,37 @@ impl Catalogue {
 
     /// Tests the trajectories for convergence to cycles; returns whether a new one was found.
     ///
-    /// The closest returns are tried first: those that have converged come before the chance
-    /// returns of chaos, of which only a few are tried.
-    fn find_cycles(
+    /// The closest returns are tried first, a few at a time: those that have converged come before the
+    /// chance returns of chaos, which end the trials.
+    pub(super) fn find_cycles(
         &mut self,
         strobe: &Strobe,
         map: &PoincareMap,
         alive: &[State],
         cancel: &AtomicBool,
     ) -> bool {
-        let returns = near_returns(strobe, alive, self.effort.longest_cycle);
+        let mut returns = near_returns(strobe, alive, self.effort.longest_cycle);
         let steps = PoincareMap::of_steps(strobe);
         let known = self.orbits.len();
-        let (mut found, mut tries) = (Vec::new(), 0);
-        for (_, start, n) in returns {
-            let held = |e: &Ellipse| e.height([strobe.angle.wrapped(start[0]), start[1]]) < 1.0;
-            if tries == self.effort.tries || cancel.load(Ordering::Relaxed) {
+        let mut found: Vec<Ellipse> = Vec::new();
+        while !returns.is_empty() && !cancel.load(Ordering::Relaxed) {
+            let rest = returns.split_off(returns.len().min(self.effort.tries));
+            let tried: Vec<_> = returns.iter().map(|(_, start, n)| (*start, *n)).collect();
+            let mut traps = Vec::new();
+            for orbit in newton::find_others(&steps, &tried, REACH, &[]) {
+                if let Some(orbit) = self.refined(strobe, map, orbit) {
+                    traps.extend(self.admit(strobe, map, orbit, cancel));
+                }
+            }
+            if traps.is_empty() {
                 break;
             }
-            if found.iter().any(held) {
-                continue;
-            }
-            tries += 1;
-            let Some(orbit) = newton::find(&steps, start, n, REACH) else { continue };
-            let Some(orbit) = self.refined(strobe, map, orbit) else { continue };
-            let traps = self.admit(strobe, map, orbit, cancel);
-            if !traps.is_empty() {
-                tries = 0;
-            }
             found.extend(traps);
+            let held = |e: &Ellipse, start: State| {
+                e.height([strobe.angle.wrapped(start[0]), start[1]]) < 1.0
+            };
+            returns = rest;
+            returns.retain(|(_, start, _)| !found.iter().any(|e| held(e, *start)));
         }
         if self.orbits.len() > known {
             self.rebuild(&strobe.pendulum);
@@ -331,6 +364,33 @@ impl Catalogue {
     fn knows(&self, orbit: &PeriodicOrbit) -> bool {
         self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], SAME))
     }
+}
+
+/// Points of similar orbits of similar pendulums, the most similar first, and their period.
+pub type Alike = (Vec<State>, usize);
+
+/// Newton's method from points of orbits of similar pendulums: the attracting orbit that it finds from the
+/// first point of each, or else from the others.
+#[must_use]
+pub fn attracting(
+    strobe: &Strobe,
+    map: &PoincareMap,
+    orbits: &[Alike],
+) -> Vec<Option<PeriodicOrbit>> {
+    let each = |starts: &[(State, usize)]| {
+        let orbits = newton::find_each(map, starts, REACH).into_iter();
+        orbits.map(|orbit| orbit.filter(|o| attracts(strobe, o))).collect::<Vec<_>>()
+    };
+    let first: Vec<_> = orbits.iter().map(|(points, n)| (points[0], *n)).collect();
+    let mut found = each(&first);
+    let without = (0..orbits.len()).filter(|k| found[*k].is_none());
+    let (of, others): (Vec<usize>, Vec<_>) = without
+        .flat_map(|k| orbits[k].0[1..].iter().map(move |point| (k, (*point, orbits[k].1))))
+        .unzip();
+    for (k, orbit) in of.into_iter().zip(each(&others)) {
+        found[k] = found[k].take().or(orbit);
+    }
+    found
 }
 
 /// Whether an orbit is stable, and none of its points one that friction holds for ever.

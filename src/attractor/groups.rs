@@ -24,14 +24,11 @@ impl Groups {
         for windows in runs {
             let mut own = Vec::with_capacity(windows.len());
             for window in windows {
-                let (senses, place) = (window.senses, found.len());
-                let mut region = window.region.clone();
+                let (senses, mut region) = (window.senses, window.region.clone());
+                let place = found.len();
                 for k in 0..place {
                     if parent[k] == k && found[k].0 == senses && found[k].1.meets(&window.region) {
-                        // The smaller one goes into the larger one.
-                        let mut joined = found[k].1.taken();
-                        joined.unite(&region);
-                        region = joined;
+                        region.unite(&found[k].1);
                         parent[k] = place;
                     }
                 }

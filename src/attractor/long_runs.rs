@@ -1,8 +1,8 @@
 //! Long runs of uncaptured trajectories, window by window: visited regions and senses of turns.
 
-use std::f64::consts::PI;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::capture::{Fate, Guard, Sight, Traps, fate_at_bound};
 use super::kind::Kind;
 use super::region::Region;
 use crate::integrate::kernel::block::Block;
@@ -67,83 +67,189 @@ pub struct Cut {
     pub side: usize,
 }
 
-/// The windows of all trajectories from `states`, one list each; `None` if `cancel` was set.
+/// A run, and how it ended.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its windows; if a trap captured it, those before.
+    pub windows: Vec<Window>,
+    /// How it ended.
+    pub fate: Fate,
+    /// Periods until then.
+    pub periods: u32,
+    /// Its last state.
+    pub state: State,
+}
+
+/// The runs from `states`, until one of the `traps` captures them; `None` if `cancel` was set.
 #[must_use]
 pub fn long_runs(
     strobe: &Strobe,
+    traps: &Traps,
     states: &[State],
     cut: Cut,
     cancel: &AtomicBool,
-) -> Option<Vec<Vec<Window>>> {
+) -> Option<Vec<Run>> {
     let width = strobe.block_width(states.len());
     let mut all = Vec::with_capacity(states.len());
     for chunk in states.chunks(width) {
-        all.extend(walk_block(strobe, chunk, width, cut, cancel)?);
+        let mut walk = Walk::new(strobe, traps, chunk, width, cut);
+        for _ in 0..cut.windows * cut.length {
+            if cancel.load(Ordering::Relaxed) {
+                return None;
+            }
+            walk.period();
+            if walk.runs.iter().all(|run| run.fate != Fate::Open) {
+                break;
+            }
+        }
+        all.extend(walk.ended());
     }
     Some(all)
 }
 
-fn walk_block(
-    strobe: &Strobe,
-    states: &[State],
-    width: usize,
+/// The runs in a block.
+struct Walk<'a> {
+    strobe: &'a Strobe,
+    guard: Guard<'a>,
     cut: Cut,
-    cancel: &AtomicBool,
-) -> Option<Vec<Vec<Window>>> {
-    let kick = strobe.schedule.kick;
-    let (theta, velocity): (Vec<f64>, Vec<f64>) = states.iter().map(|s| (s[0], s[1])).unzip();
-    let mut block = Block::new(width);
-    block.fill(&theta, &velocity, kick);
-    block.wrap(strobe.angle);
-    // The well between two upright positions; a passage over the top changes it by one.
-    let well = |block: &Block, i: usize| {
-        (0.5 * block.half_turns[i] + 0.5).floor() as i64 + block.turns[i] as i64
-    };
-    let mut last: Vec<i64> = (0..states.len()).map(|i| well(&block, i)).collect();
-    let mut before = vec![0_i64; states.len()];
-    let empty = Region::new(cut.side, &strobe.pendulum);
-    let mut all: Vec<Vec<Window>> = vec![Vec::with_capacity(cut.windows); states.len()];
-    for _ in 0..cut.windows {
-        let from: Vec<f64> = block.turns[..states.len()].to_vec();
-        for windows in &mut all {
-            windows.push(Window {
-                region: empty.clone(),
-                senses: Senses::default(),
-                points: Vec::with_capacity(cut.length),
-                turns: 0.0,
-            });
-        }
-        for _ in 0..cut.length {
-            if cancel.load(Ordering::Relaxed) {
-                return None;
-            }
-            for k in 0..strobe.steps() {
-                strobe.step(&mut block, k);
-                for i in 0..states.len() {
-                    let now = well(&block, i);
-                    if now == last[i] {
-                        continue;
-                    }
-                    let sense = (now - last[i]).signum();
-                    let Some(window) = all[i].last_mut() else { continue };
-                    window.senses.passes = true;
-                    if before[i] == sense {
-                        window.senses.turns[usize::from(sense > 0)] = true;
-                    }
-                    (before[i], last[i]) = (sense, now);
-                }
-            }
-            block.wrap(strobe.angle);
-            for (i, windows) in all.iter_mut().enumerate() {
-                let Some(window) = windows.last_mut() else { continue };
-                let state = [block.half_turns[i] * PI, block.kick[i] / kick];
-                window.points.push(state);
-                window.turns = block.turns[i] - from[i];
-            }
-        }
-        for window in all.iter_mut().filter_map(|windows| windows.last_mut()) {
-            window.region = empty.of(&window.points);
+    block: Block,
+    clock: u64,
+    runs: Vec<Run>,
+    lanes: Vec<Lane>,
+    /// The middle of the well between two upright positions that each is in, in half turns; a passage over
+    /// the top changes it by two.
+    middles: Vec<f64>,
+}
+
+/// What is known of the run in a lane.
+#[derive(Clone, Copy, Default)]
+struct Lane {
+    sight: Sight,
+    /// Sense of the last passage.
+    before: i64,
+    /// Turns at the beginning of the window.
+    from: f64,
+}
+
+impl<'a> Walk<'a> {
+    fn new(strobe: &'a Strobe, traps: &'a Traps, states: &[State], width: usize, cut: Cut) -> Self {
+        let (theta, velocity): (Vec<f64>, Vec<f64>) = states.iter().map(|s| (s[0], s[1])).unzip();
+        let mut block = Block::new(width);
+        block.fill(&theta, &velocity, strobe.schedule.kick);
+        block.wrap(strobe.angle);
+        let run = |state: &State| Run {
+            windows: Vec::with_capacity(cut.windows),
+            fate: Fate::Open,
+            periods: 0,
+            state: *state,
+        };
+        Self {
+            strobe,
+            guard: Guard::new(strobe, traps),
+            cut,
+            block,
+            clock: 0,
+            runs: states.iter().map(run).collect(),
+            lanes: vec![Lane::default(); states.len()],
+            middles: vec![0.0; states.len()],
         }
     }
-    Some(all)
+
+    /// Begins a window of every run.
+    fn open(&mut self) {
+        let empty = Window {
+            region: Region::new(self.cut.side, &self.strobe.pendulum),
+            senses: Senses::default(),
+            points: Vec::with_capacity(self.cut.length),
+            turns: 0.0,
+        };
+        for (i, (run, lane)) in self.runs.iter_mut().zip(&mut self.lanes).enumerate() {
+            lane.from = self.block.turns[i];
+            if run.fate == Fate::Open {
+                run.windows.push(empty.clone());
+            }
+        }
+    }
+
+    /// Advances all runs by a period.
+    fn period(&mut self) {
+        if self.clock.is_multiple_of(self.cut.length as u64) {
+            self.open();
+        }
+        // Wrapping at the end of a period moves the well with the angle.
+        for (middle, half_turns) in self.middles.iter_mut().zip(&self.block.half_turns) {
+            *middle = well(*half_turns);
+        }
+        for k in 0..self.strobe.steps() {
+            self.strobe.step(&mut self.block, k);
+            let all = self.middles.iter().zip(&self.block.half_turns);
+            if all.fold(false, |passed, (middle, at)| passed | ((at - middle).abs() >= 1.0)) {
+                self.passages();
+            }
+        }
+        self.block.wrap(self.strobe.angle);
+        self.clock += 1;
+        for i in 0..self.runs.len() {
+            if self.runs[i].fate == Fate::Open {
+                self.record(i);
+            }
+        }
+    }
+
+    /// Notes the passages over the top in a step.
+    fn passages(&mut self) {
+        for i in 0..self.runs.len() {
+            let away = self.block.half_turns[i] - self.middles[i];
+            if (-1.0..1.0).contains(&away) || away.is_nan() {
+                continue;
+            }
+            let sense = away.signum() as i64;
+            self.middles[i] = well(self.block.half_turns[i]);
+            let Some(window) = self.runs[i].windows.last_mut() else { continue };
+            window.senses.passes = true;
+            if self.lanes[i].before == sense {
+                window.senses.turns[usize::from(sense > 0)] = true;
+            }
+            self.lanes[i].before = sense;
+        }
+    }
+
+    /// Adds the state of a run to its window, or ends it.
+    fn record(&mut self, i: usize) {
+        let (run, lane) = (&mut self.runs[i], &mut self.lanes[i]);
+        let hit = self.guard.captured(&self.block, i, self.clock, &mut lane.sight);
+        let mut end = hit.map(|hit| (hit.attractor, hit.clock));
+        if end.is_none() && self.strobe.friction && !self.block.held_at[i].is_nan() {
+            let rest = self.guard.at_rest(&self.block, i, self.clock, &mut lane.sight);
+            end = rest.map(|rest| (rest, self.clock));
+        }
+        run.state = self.guard.state(&self.block, i);
+        run.periods = self.clock as u32;
+        if let Some((attractor, at)) = end {
+            run.fate = Fate::Captured(attractor);
+            run.periods = at as u32;
+            run.windows.truncate(at as usize / self.cut.length);
+        } else if let Some(window) = run.windows.last_mut() {
+            window.points.push(run.state);
+            window.turns = self.block.turns[i] - lane.from;
+        }
+    }
+
+    fn ended(self) -> Vec<Run> {
+        let mut runs = self.runs;
+        for run in &mut runs {
+            if run.fate == Fate::Open {
+                run.fate = fate_at_bound(run.state);
+            }
+            for window in &mut run.windows {
+                window.region.mark(&window.points);
+            }
+        }
+        runs
+    }
+}
+
+/// The middle of the well of an angle, both in half turns.
+fn well(half_turns: f64) -> f64 {
+    2.0 * (0.5 * half_turns + 0.5).floor()
 }

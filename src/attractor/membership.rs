@@ -2,12 +2,13 @@
 
 use std::sync::atomic::AtomicBool;
 
+use super::capture::Traps;
 use super::catalogue::Attractor;
 use super::find::{Catalogue, Ending, REACH, SAME, open};
 use super::long_runs::{Cut, Window, long_runs};
 use super::near_returns::{nearest_return, tracks};
 use crate::integrate::{State, Strobe};
-use crate::orbit::newton;
+use crate::orbit::newton::{self, PeriodicOrbit};
 
 /// Number of stroboscopic points that determine the set of a trajectory.
 const LAST_POINTS: usize = 64;
@@ -34,19 +35,23 @@ impl Catalogue {
     pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
         let map = self.map(strobe);
         let longest = self.effort.longest_cycle;
-        let place = |track: &Vec<State>| {
-            let nearest = nearest_return(strobe.angle, track, longest);
-            let orbit = nearest.and_then(|(_, start, n)| newton::find(&map, start, n, REACH));
-            orbit.and_then(|orbit| {
-                let own = |a: &Attractor| {
-                    a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME))
-                };
-                self.attractors.iter().position(own)
-            })
+        let own = |orbit: PeriodicOrbit| {
+            let passes =
+                |a: &Attractor| a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME));
+            self.attractors.iter().position(passes)
         };
         let tracks = tracks(strobe, states, longest);
-        let homes = self.homes(strobe, states).into_iter();
-        tracks.iter().zip(homes).map(|(track, home)| place(track).or(home)).collect()
+        let mut places = self.homes(strobe, states);
+        let nearest = |track: &Vec<State>| nearest_return(strobe.angle, track, longest);
+        let (which, returns): (Vec<usize>, Vec<(State, usize)>) = tracks
+            .iter()
+            .enumerate()
+            .filter_map(|(k, track)| nearest(track).map(|(_, start, n)| (k, (start, n))))
+            .unzip();
+        for (k, orbit) in which.into_iter().zip(newton::find_each(&map, &returns, REACH)) {
+            places[k] = orbit.and_then(own).or(places[k]);
+        }
+        places
     }
 
     /// Whether all starts are open and stay on chaotic attractors.
@@ -64,10 +69,11 @@ impl Catalogue {
             return vec![None; states.len()];
         }
         let cut = Cut { windows: 1, length: LAST_POINTS, side: self.effort.cells };
-        let runs = long_runs(strobe, states, cut, &AtomicBool::new(false)).unwrap_or_default();
+        let (traps, never) = (Traps::default(), AtomicBool::new(false));
+        let runs = long_runs(strobe, &traps, states, cut, &never).unwrap_or_default();
         let home = |window: &Window| {
             self.attractors.iter().position(|a| a.keeps(&window.points, window.senses))
         };
-        runs.iter().map(|windows| windows.last().and_then(home)).collect()
+        runs.iter().map(|run| run.windows.last().and_then(home)).collect()
     }
 }

@@ -13,14 +13,16 @@ use crate::orbit::{PoincareMap, newton};
 const LONGEST: usize = 4;
 /// Starts along each side of the grid.
 const SIDE: usize = 64;
-/// Number of orbits sought from one start.
-const BESIDE: usize = 3;
+/// Starts from which Newton's method is tried, for each period.
+const TRIED: usize = 16;
+/// Number of times that each start is tried, the later ones repelled by the orbits met before.
+const BESIDE: usize = 4;
 /// Factor by which the grid exceeds the largest velocity observed.
 const MARGIN: f64 = 1.1;
 
 impl Catalogue {
     /// Newton's method from where a grid of starts comes back nearest to itself, after 1 to 4 periods; whether
-    /// a stable orbit was found that was not known.
+    /// a stable orbit was found that was not known. Where they have been sought before, they are not again.
     ///
     /// The grid reaches as far as the velocities of `points`, and on the line their angles.
     pub(super) fn find_short_cycles(
@@ -30,19 +32,25 @@ impl Catalogue {
         cancel: &AtomicBool,
     ) -> bool {
         let reach = |part: usize| points.iter().fold(0.0_f64, |most, s| most.max(s[part].abs()));
-        let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * reach(0) };
-        let fastest = MARGIN * reach(1);
+        let extents = [if strobe.angle == Angle::Circle { PI } else { reach(0) }, reach(1)];
+        if extents.iter().zip(&self.sought).all(|(wanted, sought)| wanted <= sought) {
+            return false;
+        }
+        let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * extents[0] };
+        let fastest = MARGIN * extents[1];
+        self.sought = [widest, fastest];
         let (map, steps) = (self.map(strobe), PoincareMap::of_steps(strobe));
         let known = self.orbits.len();
         // Repelled by all orbits met: a stable orbit is next to the one it was created with.
         let mut met: Vec<State> = Vec::new();
         for (starts, n) in least_gaps(strobe, [widest, fastest]).iter().zip(1..) {
-            for start in starts.iter().take(self.effort.short_tries) {
-                for _ in 0..BESIDE {
-                    let found = newton::find_other(&steps, *start, n, REACH, &met);
-                    let Some(orbit) = found.filter(|_| !cancel.load(Ordering::Relaxed)) else {
-                        break;
-                    };
+            let starts: Vec<_> = starts.iter().take(TRIED).map(|start| (*start, n)).collect();
+            for _ in 0..BESIDE {
+                let found = newton::find_others(&steps, &starts, REACH, &met);
+                if found.is_empty() || cancel.load(Ordering::Relaxed) {
+                    break;
+                }
+                for orbit in found {
                     met.extend(&orbit.points);
                     if let Some(orbit) = self.refined(strobe, &map, orbit) {
                         self.admit(strobe, &map, orbit, cancel);
@@ -65,11 +73,14 @@ fn least_gaps(strobe: &Strobe, [widest, fastest]: State) -> [Vec<State>; LONGEST
         let part = |i: usize| (i as f64 + 0.5) / SIDE as f64 - 0.5;
         [2.0 * widest * part(k % SIDE), 2.0 * fastest * part(k / SIDE)]
     };
-    let starts: Vec<State> = (0..SIDE * SIDE).map(at).collect();
+    // Of mirror images one is sufficient: half of the plane, and the row beside it.
+    let symmetric = strobe.pendulum.is_mirror_symmetric();
+    let rows = if symmetric { SIDE / 2 } else { SIDE };
+    let count = rows * SIDE;
+    let starts: Vec<State> = (0..(count + SIDE).min(SIDE * SIDE)).map(at).collect();
     let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) =
         starts.iter().map(|s| (s[0], s[1])).unzip();
     let mut turns = vec![0.0; starts.len()];
-    let symmetric = strobe.pendulum.is_mirror_symmetric();
     std::array::from_fn(|_| {
         // Lengths agree, so this cannot fail.
         let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
@@ -82,8 +93,6 @@ fn least_gaps(strobe: &Strobe, [widest, fastest]: State) -> [Vec<State>; LONGEST
             rows.flat_map(|b| [SIDE - 1, 0, 1].map(|a| b * SIDE + (i + a) % SIDE))
                 .all(|other| gap[*k] <= gap[other])
         };
-        // Of mirror images one is sufficient.
-        let count = if symmetric { starts.len() / 2 } else { starts.len() };
         let mut least: Vec<usize> = (0..count).filter(lowest).collect();
         least.sort_by(|a, b| gap[*a].total_cmp(&gap[*b]));
         least.into_iter().map(|k| starts[k]).collect()

@@ -2,9 +2,9 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::capture::{self, Fate, Outcome};
+use super::capture::{self, Fate};
 use super::chaos::{self, ChaoticSet, spread};
-use super::find::{Catalogue, Ending};
+use super::find::{Catalogue, Ending, open};
 use super::kind::Kind;
 use crate::integrate::{State, Strobe};
 
@@ -12,47 +12,53 @@ use crate::integrate::{State, Strobe};
 /// classified as chaotic.
 const LEAST_DECAY: f64 = 20.0;
 
-/// Periods of observation of chaos that another attractor could end.
-const LONG: u32 = 5000;
+/// Observation of chaos that another attractor could end: trajectories, and periods of each. A transient
+/// ends at a constant rate, so that only their product counts.
+const STAYING: (usize, u32) = (32, 2500);
 
 impl Catalogue {
-    /// Decides which uncaptured trajectories are chaotic.
+    /// Decides which trajectories uncaptured after `bound` periods are chaotic.
     ///
     /// Observed trajectories are set to their final states.
-    pub(super) fn watch(
+    pub fn watch(
         &mut self,
         strobe: &Strobe,
         endings: &mut [Ending],
         bound: u32,
         cancel: &AtomicBool,
     ) {
-        let open: Vec<(usize, State)> = endings
+        let free: Vec<(usize, State)> = endings
             .iter()
             .enumerate()
             .filter_map(|(k, end)| if let Ending::Open(s) = end { Some((k, *s)) } else { None })
             .collect();
         let alone = self.attractors.iter().all(|a| a.kind.is_chaotic());
         let most = if alone { self.effort.watched_alone } else { self.effort.watched };
-        let stride = open.len().div_ceil(most).max(1);
-        let (places, sample): (Vec<usize>, Vec<State>) = open.into_iter().step_by(stride).unzip();
+        let stride = free.len().div_ceil(most).max(1);
+        let (places, sample): (Vec<usize>, Vec<State>) = free.into_iter().step_by(stride).unzip();
         let length = self.effort.watch * bound;
         // Nearly conservative motion takes longer than this to show where it ends.
         let watched = strobe.pendulum.period() * f64::from(bound + length);
         if sample.is_empty() || strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
             return;
         }
-        let Some(outcomes) = capture::outcomes(strobe, &self.traps, length, &sample, cancel) else {
+        let Some(runs) =
+            chaos::observed(strobe, &self.traps, &sample, length, &self.effort, cancel)
+        else {
             return;
         };
-        for (place, outcome) in places.into_iter().zip(&outcomes) {
-            endings[place] = self.ending(outcome);
+        for (place, run) in places.into_iter().zip(&runs) {
+            endings[place] = self.ending(run.fate, run.state);
         }
-        if outcomes.iter().all(|o| o.fate != Fate::Open) {
+        if runs.iter().all(|run| run.fate != Fate::Open) {
             return;
         }
-        let captured: Vec<Option<u32>> = outcomes.iter().map(Outcome::end).collect();
+        if self.find_cycles(strobe, &self.map(strobe), &open(endings), cancel) {
+            // They have settled by now.
+            return self.watch(strobe, endings, bound, cancel);
+        }
         let new: Vec<ChaoticSet> =
-            chaos::sets(strobe, &self.traps, &sample, &captured, length, &self.effort, cancel)
+            chaos::sets(strobe, &self.traps, &self.known, runs, length, &self.effort, cancel)
                 .into_iter()
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
                 .collect();
@@ -97,9 +103,17 @@ impl Catalogue {
             if !open {
                 continue;
             }
-            let none = vec![None; ends.len()];
-            let found =
-                chaos::sets(strobe, &self.traps, &ends, &none, 2 * bound, &self.effort, cancel);
+            let (traps, effort) = (&self.traps, &self.effort);
+            let runs = chaos::observed(strobe, traps, &ends, 2 * bound, effort, cancel);
+            let found = chaos::sets(
+                strobe,
+                traps,
+                &[],
+                runs.unwrap_or_default(),
+                2 * bound,
+                effort,
+                cancel,
+            );
             let new = |set: &ChaoticSet| {
                 set.band.is_some() && !self.sets.iter().any(|other| other.same_as(set))
             };
@@ -111,15 +125,16 @@ impl Catalogue {
 
     /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.
     ///
-    /// Such transients are long: the set is observed for [`LONG`] periods from some of its points,
-    /// or until one run ends.
+    /// Such transients are long: [`STAYING`] trajectories are observed from points of the set, or until one
+    /// ends.
     fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
         if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
             return true;
         }
-        let mut points = spread(&set.points, self.effort.proved);
-        let (mut over, mut part) = (0, length.min(LONG));
-        while over < LONG {
+        let (count, periods) = STAYING;
+        let mut points = spread(&set.points, count);
+        let (mut over, mut part) = (0, length.min(periods));
+        while over < periods {
             let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);
             let Some(outcomes) = found.filter(|all| all.iter().all(|o| o.fate == Fate::Open))
             else {
@@ -127,7 +142,7 @@ impl Catalogue {
             };
             points = outcomes.iter().map(|o| o.state).collect();
             over += part;
-            part = over.min(LONG - over);
+            part = over.min(periods - over);
         }
         true
     }

@@ -7,22 +7,21 @@ use serde::{Deserialize, Serialize};
 
 use super::bounds::cell_periods;
 use crate::attractor::chaos::spread;
+use crate::attractor::find::{Alike, attracting};
 use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
-use crate::orbit::newton::{self, PeriodicOrbit};
+use crate::orbit::newton::PeriodicOrbit;
 
 /// Largest distance between points of corresponding orbits of similar pendulums.
 const LIKE: f64 = 0.25;
 /// Distance within which points belong to one orbit.
 const SAME: f64 = 1e-6;
-/// Largest distance of Newton's method from an orbit of a neighbour.
-const REACH: f64 = 0.3;
 /// Largest number of hints of a search.
 const MOST_HINTS: usize = 16;
 /// Points of a non-periodic attractor in a hint: after a small change one alone may be off it.
-pub const HINTED: usize = 4;
+pub const HINTED: usize = 7;
 
 /// An attractor of a cell.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -44,12 +43,25 @@ pub struct Cell {
     pub failed: f64,
     /// Periods within which no trap captured its chaotic trajectories; 0 without chaos.
     pub watched: u32,
+    /// How each of its starts ended.
+    ends: Vec<End>,
 }
 
-/// An attractor of another cell: one point of it, several if it is not periodic; its kind, period
-/// and turns.
+/// How a start of a cell ended.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+enum End {
+    /// In a trap of the attractor of this index.
+    Captured(usize),
+    /// In no trap, up to this state.
+    Open(State),
+    /// Outside the range of numbers.
+    Failed,
+}
+
+/// Attractors of other cells that are alike: their kind, period and turns.
 #[derive(Clone, Debug)]
 pub struct Hint {
+    /// A point of each, the nearest cell's first; several of the first one if that is not periodic.
     points: Vec<State>,
     kind: Kind,
     n: Option<usize>,
@@ -84,25 +96,75 @@ impl Search {
             // Nothing attracts.
             return Cell { open: 1.0, ..Cell::default() };
         }
-        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
-        // A point exactly at rest stays there even if unstable: such points are no starts.
-        let rests = balances(&strobe.pendulum).map(|theta| ([theta, 0.0], 1));
-        catalogue.take_over(strobe, &rests, cancel);
-        let cycles: Vec<(State, usize)> =
-            hints.iter().filter_map(|hint| Some((hint.points[0], hint.n?))).collect();
-        let mut further = catalogue.take_over(strobe, &cycles, cancel);
-        further.extend(hints.iter().filter(|hint| hint.n.is_none()).flat_map(|h| &h.points));
-        let first = number.wrapping_mul(self.each);
-        let own = |k: usize| self.starts[(first + k) % self.starts.len()];
-        let mut starts: Vec<State> = (0..self.each).map(own).collect();
+        let mut catalogue = with_rests(strobe, cancel);
+        let further = followed(&mut catalogue, strobe, hints, cancel);
+        let mut starts: Vec<State> = self.starts_of(number).collect();
         starts.extend(further);
-        let bound = self.bound.unwrap_or_else(|| cell_periods(&strobe.pendulum));
-        let endings = catalogue.endings(strobe, &starts, bound, cancel);
-        let watched = bound * (1 + Effort::BRISK.watch);
-        Cell {
-            watched: if catalogue.has_chaos() { watched } else { 0 },
-            ..self.told(strobe, &catalogue, &endings)
+        let endings = catalogue.endings(strobe, &starts, self.bound_of(strobe), cancel);
+        self.told(number, strobe, &catalogue, &endings)
+    }
+
+    /// `cell` again, with further `hints`: starts that its orbits have captured stay there, the others go
+    /// on from where they were. `None` if no orbit is new, and what starts from the hints is captured by known
+    /// ones or joins chaos that is known.
+    #[must_use]
+    pub fn again(
+        &self,
+        number: usize,
+        strobe: &Strobe,
+        cell: &Cell,
+        hints: &[Hint],
+        cancel: &AtomicBool,
+    ) -> Option<Cell> {
+        if !strobe.pendulum.is_dissipative() {
+            return None;
         }
+        let mut catalogue = with_rests(strobe, cancel);
+        catalogue.take_over_chaos(cell.found.iter().map(|f| &f.attractor));
+        let own: Vec<Hint> = cell.found.iter().filter_map(|f| Hint::of(&f.attractor)).collect();
+        let restarts = followed(&mut catalogue, strobe, &own, cancel);
+        let known = catalogue.attractors.len();
+        let open = |states: Vec<State>| states.into_iter().map(Ending::Open).collect();
+        let mut further: Vec<Ending> = open(followed(&mut catalogue, strobe, hints, cancel));
+        let bound = self.bound_of(strobe);
+        catalogue.settle(strobe, &mut further, bound, cancel);
+        let gained = catalogue.attractors.len() > known;
+        let ended = further.iter().all(|ending| !matches!(ending, Ending::Open(_)));
+        let joined = cell.watched > 0 && hints.iter().all(|hint| hint.n.is_some());
+        if !gained && (ended || joined) {
+            return None;
+        }
+        let same = |old: &Attractor, new: &Attractor| {
+            old.n.is_some() && old.kind == new.kind && new.passes(old.points[0], SAME)
+        };
+        let ending = |(end, start): (&End, State)| match end {
+            End::Captured(old) => {
+                let old = &cell.found[*old].attractor;
+                let new = catalogue.attractors.iter().find(|new| same(old, new));
+                new.map_or(Ending::Open(start), |new| Ending::Captured(new.mark()))
+            }
+            End::Open(state) => Ending::Open(*state),
+            End::Failed => Ending::Failed,
+        };
+        let mut endings: Vec<Ending> =
+            cell.ends.iter().zip(self.starts_of(number)).map(ending).collect();
+        endings.extend(open(restarts));
+        if gained {
+            catalogue.settle(strobe, &mut endings, bound, cancel);
+        }
+        endings.extend(further);
+        catalogue.watch(strobe, &mut endings, bound, cancel);
+        Some(self.told(number, strobe, &catalogue, &endings))
+    }
+
+    /// The starts of cell `number`.
+    fn starts_of(&self, number: usize) -> impl Iterator<Item = State> {
+        let first = number.wrapping_mul(self.each);
+        (0..self.each).map(move |k| self.starts[(first + k) % self.starts.len()])
+    }
+
+    fn bound_of(&self, strobe: &Strobe) -> u32 {
+        self.bound.unwrap_or_else(|| cell_periods(&strobe.pendulum))
     }
 
     /// Attractors from the `hints` that `cell` lacks: a stable orbit that Newton's method finds from a
@@ -124,25 +186,32 @@ impl Search {
             return hints;
         }
         let map = PoincareMap::of_steps(strobe);
+        let has = |orbit: &PeriodicOrbit| {
+            let own = |p: &State| orbit.contains(*p, SAME);
+            let attractors = cell.found.iter().map(|f| &f.attractor);
+            attractors.filter(|a| a.n.is_some()).any(|a| a.points.iter().any(own))
+        };
+        let mut orbits = attracting(strobe, &map, &cycles(&hints)).into_iter();
         let promises = |hint: &Hint| {
             let Some(n) = hint.n else { return beside };
-            let orbit =
-                newton::find(&map, hint.points[0], n, REACH).filter(PeriodicOrbit::is_stable);
-            let Some(orbit) = orbit else { return beside && !cell.has(n, hint.w) };
-            let has = |orbit: &PeriodicOrbit| {
-                let own = |p: &State| orbit.contains(*p, SAME);
-                cell.found
-                    .iter()
-                    .any(|f| f.attractor.n.is_some() && f.attractor.points.iter().any(own))
-            };
-            !has(&orbit)
+            match orbits.next().flatten() {
+                Some(orbit) => !has(&orbit),
+                None => beside && !cell.has(n, hint.w),
+            }
         };
         hints.into_iter().filter(promises).collect()
     }
 
     /// Shares of the starts; attractors found only from a hint have none, nor have permanent sticks
     /// on which no start ends.
-    fn told(&self, strobe: &Strobe, catalogue: &Catalogue, endings: &[Ending]) -> Cell {
+    fn told(
+        &self,
+        number: usize,
+        strobe: &Strobe,
+        catalogue: &Catalogue,
+        endings: &[Ending],
+    ) -> Cell {
+        let endings = &endings[..self.each];
         let open: Vec<State> = endings
             .iter()
             .filter_map(|e| if let Ending::Open(state) = e { Some(*state) } else { None })
@@ -152,20 +221,22 @@ impl Search {
             catalogue.attractors.iter().enumerate().map(|(i, a)| (a.mark(), i)).collect();
         let mut counts = vec![0_usize; catalogue.attractors.len()];
         let (mut undecided, mut failed) = (0, 0);
-        for (k, ending) in endings.iter().enumerate() {
-            let end = match ending {
-                Ending::Captured(mark) => at.get(mark).copied(),
-                Ending::Open(_) => placed.next().flatten(),
-                Ending::Failed => None,
+        let mut ends = Vec::with_capacity(self.each);
+        for (ending, start) in endings.iter().zip(self.starts_of(number)) {
+            let (on, end) = match ending {
+                Ending::Captured(mark) => {
+                    let on = at.get(mark).copied();
+                    (on, on.map_or(End::Open(start), End::Captured))
+                }
+                Ending::Open(state) => (placed.next().flatten(), End::Open(*state)),
+                Ending::Failed => (None, End::Failed),
             };
-            if k >= self.each {
-                continue;
-            }
-            match (end, ending) {
+            match (on, end) {
                 (Some(i), _) => counts[i] += 1,
-                (None, Ending::Failed) => failed += 1,
+                (None, End::Failed) => failed += 1,
                 (None, _) => undecided += 1,
             }
+            ends.push(end);
         }
         let share = |count: usize| count as f64 / self.each.max(1) as f64;
         let found = catalogue
@@ -179,21 +250,57 @@ impl Search {
                 Found { attractor, share: share(*count) }
             })
             .collect();
-        Cell { found, open: share(undecided), failed: share(failed), watched: 0 }
+        let watched = self.bound_of(strobe) * (1 + Effort::BRISK.watch);
+        let watched = if catalogue.has_chaos() { watched } else { 0 };
+        Cell { found, open: share(undecided), failed: share(failed), watched, ends }
     }
 }
 
+/// The attractors known without a start: rests.
+fn with_rests(strobe: &Strobe, cancel: &AtomicBool) -> Catalogue {
+    let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
+    // A point exactly at rest stays there even if unstable: such points are no starts.
+    let rests = balances(&strobe.pendulum).map(|theta| (vec![[theta, 0.0]], 1));
+    catalogue.take_over(strobe, &rests, cancel);
+    catalogue
+}
+
+/// Adds the orbits that Newton's method finds from `hints`; returns the points of the others.
+fn followed(
+    catalogue: &mut Catalogue,
+    strobe: &Strobe,
+    hints: &[Hint],
+    cancel: &AtomicBool,
+) -> Vec<State> {
+    let mut further = catalogue.take_over(strobe, &cycles(hints), cancel);
+    further.extend(hints.iter().filter(|hint| hint.n.is_none()).flat_map(|h| &h.points));
+    further
+}
+
+/// The points and periods of the periodic ones.
+fn cycles(hints: &[Hint]) -> Vec<Alike> {
+    hints.iter().filter_map(|hint| Some((hint.points.clone(), hint.n?))).collect()
+}
+
 impl Cell {
-    /// Points of the attractors of `others`, each kind of orbit once.
+    /// The attractors of `others`, those that are alike in one hint.
     #[must_use]
     pub fn hints<'a>(others: impl Iterator<Item = &'a Self>, symmetric: bool) -> Vec<Hint> {
         let mut hints: Vec<Hint> = Vec::new();
-        for found in others.flat_map(|cell| &cell.found) {
-            let Some(hint) = Hint::of(&found.attractor) else { continue };
-            if hints.len() < MOST_HINTS
-                && !hints.iter().any(|h| h.is_like(&found.attractor, symmetric))
-            {
-                hints.push(hint);
+        for cell in others {
+            let mut seen = vec![false; hints.len()];
+            for found in &cell.found {
+                let Some(hint) = Hint::of(&found.attractor) else { continue };
+                let alike = hints.iter().position(|h| h.is_like(&found.attractor, symmetric));
+                match alike {
+                    // Of mirror images one is sufficient.
+                    Some(at) if hint.n.is_some() && seen.get(at) == Some(&false) => {
+                        seen[at] = true;
+                        hints[at].points.extend(hint.points);
+                    }
+                    None if hints.len() < MOST_HINTS => hints.push(hint),
+                    _ => {}
+                }
             }
         }
         hints

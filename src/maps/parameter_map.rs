@@ -89,21 +89,24 @@ impl Plane<'_> {
         pendulum
     }
 
-    /// The existing cells at the distance `stride` in both directions, or in one.
+    /// The existing cells at the distance `stride` in one direction, then, if `diagonal`, in both: nearest
+    /// first.
     pub(super) fn neighbours(&self, cell: usize, stride: usize, diagonal: bool) -> Vec<usize> {
         let [columns, rows] = self.size();
         let [i, j] = self.place(cell);
-        let mut found = Vec::with_capacity(8);
+        let mut found: [Vec<usize>; 2] = [Vec::with_capacity(8), Vec::with_capacity(4)];
         for b in [j.checked_sub(stride), Some(j), Some(j + stride)] {
             for a in [i.checked_sub(stride), Some(i), Some(i + stride)] {
                 let (Some(a), Some(b)) = (a, b) else { continue };
                 let own = a == i && b == j;
-                if !own && a < columns && b < rows && (diagonal || a == i || b == j) {
-                    found.push(b * columns + a);
+                if !own && a < columns && b < rows {
+                    found[usize::from(a != i && b != j)].push(b * columns + a);
                 }
             }
         }
-        found
+        let [mut nearest, far] = found;
+        nearest.extend(if diagonal { far } else { Vec::new() });
+        nearest
     }
 }
 

@@ -24,14 +24,14 @@ use crate::model::Pendulum;
 pub const SIDE: usize = 16;
 /// Spacing of the coarsest grid of a block, in cells.
 const COARSEST: usize = 8;
-/// Distances over which cells exchange their attractors in successive passes: a result of one cell
-/// reaches all that can have it.
+/// Distances over which cells exchange their attractors in successive passes, then 1, there also diagonally: a
+/// result of one cell reaches all that can have it.
 const EXCHANGES: [usize; 3] = [8, 4, 2];
 /// Largest number of passes between next neighbours; they end if no cell has gained an attractor.
 const MOST_PASSES: usize = 64;
 /// Memory of a cell, bytes: its attractors, and their arrays.
 const EACH: usize = 4096;
-/// Memory of each stored point of a non-periodic attractor, bytes.
+/// Memory of each stored point of a non-periodic attractor, and of the end of each start, bytes.
 const ROOM: usize = 64;
 /// Starts at which steps are measured.
 const PROBES: usize = 100;
@@ -92,7 +92,7 @@ impl Survey {
             let name = if count == 0 { "cells" } else { "starts" };
             return Err(Error::Range { name, value: 0.0, allowed: "1 or more" });
         }
-        memory::reckon("cells", count, EACH + ROOM * request.kept)?;
+        memory::reckon("cells", count, EACH + ROOM * (request.kept + request.each))?;
         (0..count).try_for_each(|cell| plane.pendulum(cell).check_mappable())?;
         let resolution = resolution(&plane, InstructionSet::choose()?)?;
         let &Request { each, bound, kept, .. } = request;
@@ -148,12 +148,8 @@ impl Survey {
     pub fn around(&self, block: usize) -> Vec<usize> {
         let [across, up] = self.sides();
         let [i, j] = [block % across, block / across];
-        let mut found = vec![block];
-        found.extend((i > 0).then(|| block - 1));
-        found.extend((i + 1 < across).then_some(block + 1));
-        found.extend((j > 0).then(|| block - across));
-        found.extend((j + 1 < up).then_some(block + across));
-        found
+        let beside = |at: usize, count: usize| at.saturating_sub(1)..count.min(at + 2);
+        beside(j, up).flat_map(|j| beside(i, across).map(move |i| j * across + i)).collect()
     }
 
     /// Largest number of exchanges.
@@ -228,7 +224,7 @@ impl Survey {
             control.check()?;
             let cell = own[at];
             let around: Vec<(&Block, usize)> = plane
-                .neighbours(cell, stride, false)
+                .neighbours(cell, stride, stride == 1)
                 .into_iter()
                 .map(|other| self.place(other))
                 .map(|(block, at)| (known(block), at))
@@ -243,9 +239,8 @@ impl Survey {
             if lacking.is_empty() {
                 return Ok(None);
             }
-            let mut hints = Cell::hints(std::iter::once(&old.cells[at]), symmetric);
-            hints.extend(lacking);
-            let found = self.search.cell(cell, &strobe, &hints, control.flag());
+            let again = self.search.again(cell, &strobe, &old.cells[at], &lacking, control.flag());
+            let Some(found) = again else { return Ok(None) };
             Ok(Some((at, found.has_more_than(&old.cells[at], symmetric), found)))
         };
         let all = (0..own.len()).into_par_iter().filter_map(|at| one(at).transpose());

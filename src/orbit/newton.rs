@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use super::floquet::{Multipliers, multipliers};
-use super::poincare::PoincareMap;
+use super::poincare::{Image, PoincareMap};
 use crate::integrate::State;
 use crate::model::Angle;
 
@@ -82,12 +82,7 @@ pub fn find(map: &PoincareMap, start: State, n: usize, reach: f64) -> Option<Per
     find_other(map, start, n, reach, &[])
 }
 
-/// A periodic orbit near `start` that has none of the points `known`.
-///
-/// The gap is divided by the distances to them, `m(x) = prod (1 + 1/|x - r|^2)` times `P^n(x) - x`, which has
-/// its zeros but for theirs: Newton's method is repelled by what it has found already, and finds
-/// zeros that lie next to one another (Farrell, Birkisson & Funke 2015, SIAM J. Sci. Comput. 37,
-/// A2026: deflation).
+/// A periodic orbit near `start` that has none of the points `known`; see [`find_others`].
 #[must_use]
 pub fn find_other(
     map: &PoincareMap,
@@ -96,16 +91,60 @@ pub fn find_other(
     reach: f64,
     known: &[State],
 ) -> Option<PeriodicOrbit> {
-    let mut point = polish(map, [map.angle.wrapped(start[0]), start[1]], n, reach, known)?;
+    find_others(map, &[(start, n)], reach, known).pop()
+}
+
+/// The periodic orbits near `starts`, each with a period, that have none of the points `known`; starts that
+/// lead to one point give one orbit.
+///
+/// The gap is divided by the distances to them, `m(x) = prod (1 + 1/|x - r|^2)` times `P^n(x) - x`, which has
+/// its zeros but for theirs: Newton's method is repelled by what it has found already, and finds
+/// zeros that lie next to one another (Farrell, Birkisson & Funke 2015, SIAM J. Sci. Comput. 37,
+/// A2026: deflation).
+#[must_use]
+pub fn find_others(
+    map: &PoincareMap,
+    starts: &[(State, usize)],
+    reach: f64,
+    known: &[State],
+) -> Vec<PeriodicOrbit> {
+    let mut points = polish(map, starts, reach, known);
     if !known.is_empty() {
         // Near several zeros the gap is small everywhere: repeated without deflation.
-        point = polish(map, point, n, reach, &[])?;
+        let reached: Vec<_> = points.into_iter().flatten().collect();
+        points = polish(map, &reached, reach, &[]);
     }
+    let mut apart: Vec<(State, usize)> = Vec::new();
+    for (point, n) in points.into_iter().flatten() {
+        if apart.iter().all(|(other, _)| map.angle.distance(*other, point) >= SAME_POINT) {
+            apart.push((point, n));
+        }
+    }
+    apart.into_iter().filter_map(|closed| orbit_of(map, closed, reach)).collect()
+}
+
+/// [`find`] from each of several starts with its own period.
+#[must_use]
+pub fn find_each(
+    map: &PoincareMap,
+    starts: &[(State, usize)],
+    reach: f64,
+) -> Vec<Option<PeriodicOrbit>> {
+    let points = polish(map, starts, reach, &[]).into_iter();
+    points.map(|closed| orbit_of(map, closed?, reach)).collect()
+}
+
+/// The orbit of a point that closes after `n` periods, with its smallest period.
+fn orbit_of(map: &PoincareMap, (point, n): (State, usize), reach: f64) -> Option<PeriodicOrbit> {
     let image = |d: usize| map.iterate(point, d);
     let smallest = (1..=n)
         .filter(|d| n.is_multiple_of(*d))
         .find(|d| *d == n || map.angle.distance(image(*d).state, point) < SAME_POINT)?;
-    let point = if smallest == n { point } else { polish(map, point, smallest, reach, &[])? };
+    let (point, _) = if smallest == n {
+        (point, n)
+    } else {
+        polish(map, &[(point, smallest)], reach, &[]).pop()??
+    };
     complete(map, [map.angle.wrapped(point[0]), point[1]], smallest)
 }
 
@@ -119,40 +158,85 @@ fn least_gap(derivative: &Matrix2<f64>) -> f64 {
     RESIDUAL.max(ROUNDING * derivative.norm())
 }
 
-fn polish(map: &PoincareMap, start: State, n: usize, reach: f64, known: &[State]) -> Option<State> {
-    let mut point = start;
-    // Ratio of the gap to the least one.
-    let mut best: Option<(f64, State)> = None;
-    let mut first = f64::INFINITY;
+/// A start of Newton's method on its way.
+struct Way {
+    start: State,
+    n: usize,
+    point: State,
+    /// First ratio of the gap to the least one.
+    first: f64,
+    /// Least ratio, and where.
+    best: Option<(f64, State)>,
+}
+
+/// The points with the least gaps that Newton's method reaches from `starts`, with their periods; none of those
+/// that do not converge.
+fn polish(
+    map: &PoincareMap,
+    starts: &[(State, usize)],
+    reach: f64,
+    known: &[State],
+) -> Vec<Option<(State, usize)>> {
+    let way = |(start, n): &(State, usize)| {
+        let start = [map.angle.wrapped(start[0]), start[1]];
+        Way { start, n: *n, point: start, first: f64::INFINITY, best: None }
+    };
+    let mut ways: Vec<Way> = starts.iter().map(way).collect();
+    let mut going: Vec<usize> = (0..ways.len()).collect();
     for iteration in 0..ITERATIONS {
-        let image = map.iterate(point, n);
-        let gap = map.gap(point, image.state);
+        let points: Vec<_> = going.iter().map(|k| (ways[*k].point, ways[*k].n)).collect();
+        let images = map.iterate_all(&points);
+        let mut images = images.iter();
+        going.retain(|k| {
+            images.next().is_some_and(|image| ways[*k].step(map, image, iteration, reach, known))
+        });
+        if going.is_empty() {
+            break;
+        }
+    }
+    let converged =
+        |way: Way| way.best.filter(|(least, _)| *least < 1.0).map(|(_, point)| (point, way.n));
+    ways.into_iter().map(converged).collect()
+}
+
+impl Way {
+    /// Steps on from the image of the point; false at the end of the way.
+    fn step(
+        &mut self,
+        map: &PoincareMap,
+        image: &Image,
+        iteration: usize,
+        reach: f64,
+        known: &[State],
+    ) -> bool {
+        let gap = map.gap(self.point, image.state);
         let size = gap.norm() / least_gap(&image.derivative);
         if iteration == 0 {
-            first = size;
+            self.first = size;
         }
         // Near an unstable orbit the gap grows first.
-        if iteration == PROMISING && known.is_empty() && size > 0.1 * first && size > 1.0 {
-            break;
+        if iteration == PROMISING && known.is_empty() && size > 0.1 * self.first && size > 1.0 {
+            return false;
         }
-        if !size.is_finite() || map.angle.distance(point, start) > reach {
-            break;
+        if !size.is_finite() || map.angle.distance(self.point, self.start) > reach {
+            return false;
         }
-        match best {
+        match self.best {
             // At the level of rounding the gap no longer falls: the iteration ends.
-            Some((least, _)) if size >= least && least < 1.0 => break,
+            Some((least, _)) if size >= least && least < 1.0 => return false,
             Some((least, _)) if size >= least => {}
-            _ => best = Some((size, point)),
+            _ => self.best = Some((size, self.point)),
         }
         // None if all nearby states close too, as about rest without damping and drive.
-        let Some(step) = (Matrix2::identity() - image.derivative).lu().solve(&gap) else { break };
-        let step = repelled(map.angle, step, point, known);
+        let Some(step) = (Matrix2::identity() - image.derivative).lu().solve(&gap) else {
+            return false;
+        };
+        let step = repelled(map.angle, step, self.point, known);
         let length = step.norm();
         let damped = if length > 0.5 { 0.5 / length } else { 1.0 };
-        point = [point[0] + damped * step[0], point[1] + damped * step[1]];
+        self.point = [self.point[0] + damped * step[0], self.point[1] + damped * step[1]];
+        true
     }
-    let (least, point) = best?;
-    (least < 1.0).then_some(point)
 }
 
 /// Newton's step of the gap times `m(x)`: along the step of the gap, over `1 - step . grad m / m`.

@@ -79,7 +79,7 @@ impl PoincareMap {
                 return Image { product: Some(shrinking), ..flow(self.angle, schedule, state) };
             }
             Way::Any(flow_of) => flow_of,
-            Way::Lanes(strobe) => return stretched(strobe, state),
+            Way::Lanes(strobe) => return stretched(strobe, &[state])[0],
         };
         let arrival = flow_of.carry(state, 0.0, self.pendulum.period());
         let [[a, b], [c, d]] = arrival.derivative;
@@ -98,29 +98,54 @@ impl PoincareMap {
         Vector2::new(self.angle.wrapped(to[0] - from[0]), to[1] - from[1])
     }
 
+    /// Advances several states by one period.
+    fn once_all(&self, states: &[State]) -> Vec<Image> {
+        match &self.way {
+            Way::Lanes(strobe) => stretched(strobe, states),
+            _ => states.iter().map(|state| self.once(*state)).collect(),
+        }
+    }
+
     /// Advances by `periods` periods, with the derivative of the whole.
     #[must_use]
     pub fn iterate(&self, state: State, periods: usize) -> Image {
-        let mut image =
-            Image { state, turns: 0, derivative: Matrix2::identity(), product: Some(1.0) };
-        for _ in 0..periods {
-            let next = self.once(image.state);
-            image = Image {
-                state: next.state,
-                turns: image.turns + next.turns,
-                derivative: next.derivative * image.derivative,
-                product: next.product.zip(image.product).map(|(a, b)| a * b),
-            };
+        self.iterate_all(&[(state, periods)])[0]
+    }
+
+    /// Advances each of several states by a number of periods.
+    #[must_use]
+    pub fn iterate_all(&self, starts: &[(State, usize)]) -> Vec<Image> {
+        let at = |(state, _): &(State, usize)| Image {
+            state: *state,
+            turns: 0,
+            derivative: Matrix2::identity(),
+            product: Some(1.0),
+        };
+        let mut images: Vec<Image> = starts.iter().map(at).collect();
+        for period in 0..starts.iter().map(|(_, periods)| *periods).max().unwrap_or(0) {
+            let going = |image: &usize| starts[*image].1 > period;
+            let going: Vec<usize> = (0..images.len()).filter(going).collect();
+            let states: Vec<State> = going.iter().map(|k| images[*k].state).collect();
+            for (k, next) in going.into_iter().zip(self.once_all(&states)) {
+                images[k] = Image {
+                    state: next.state,
+                    turns: images[k].turns + next.turns,
+                    derivative: next.derivative * images[k].derivative,
+                    product: next.product.zip(images[k].product).map(|(a, b)| a * b),
+                };
+            }
         }
-        image
+        images
     }
 }
 
-/// Advances by one period of `strobe`, a lane for each column of the derivative.
-fn stretched(strobe: &Strobe, state: State) -> Image {
-    let (mut theta, mut velocity) = ([state[0]; 2], [state[1]; 2]);
-    let (mut turns, mut growth) = ([0.0; 2], [0.0; 2]);
-    let (mut along, mut across) = ([1.0, 0.0], [0.0, 1.0]);
+/// Advances each state by one period of `strobe`, with a lane for each column of the derivative.
+fn stretched(strobe: &Strobe, states: &[State]) -> Vec<Image> {
+    let twice = |part: usize| -> Vec<f64> { states.iter().flat_map(|s| [s[part]; 2]).collect() };
+    let (mut theta, mut velocity) = (twice(0), twice(1));
+    let (mut turns, mut growth) = (vec![0.0; theta.len()], vec![0.0; theta.len()]);
+    let (mut along, mut across) =
+        ([1.0, 0.0].repeat(states.len()), [0.0, 1.0].repeat(states.len()));
     // Lengths agree, so this cannot fail.
     let _ = strobe.stretch(
         (&mut theta, &mut velocity),
@@ -129,18 +154,21 @@ fn stretched(strobe: &Strobe, state: State) -> Image {
         &mut growth,
         1,
     );
-    let size = growth.map(f64::exp);
-    Image {
-        state: [theta[0], velocity[0]],
-        turns: turns[0] as i64,
-        derivative: Matrix2::new(
-            along[0] * size[0],
-            along[1] * size[1],
-            across[0] * size[0],
-            across[1] * size[1],
-        ),
-        product: None,
-    }
+    let image = |i: usize| {
+        let size = [growth[i], growth[i + 1]].map(f64::exp);
+        Image {
+            state: [theta[i], velocity[i]],
+            turns: turns[i] as i64,
+            derivative: Matrix2::new(
+                along[i] * size[0],
+                along[i + 1] * size[1],
+                across[i] * size[0],
+                across[i + 1] * size[1],
+            ),
+            product: None,
+        }
+    };
+    (0..theta.len()).step_by(2).map(image).collect()
 }
 
 /// A schedule's flow with its derivative.

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use pendmap::attractor::capture::{Fate, Traps, outcomes};
-use pendmap::attractor::chaos::sets;
+use pendmap::attractor::chaos::{observed, sets};
 use pendmap::attractor::{Effort, Kind};
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, Strobe};
@@ -43,7 +43,9 @@ fn trajectories_that_leave_their_region_form_no_set() {
     for simd in instruction_sets() {
         let strobe = Strobe::new(&runaway(), 60, simd);
         let (effort, cancel) = (Effort::THOROUGH, AtomicBool::new(false));
-        let found = sets(&strobe, &Traps::default(), &states, &[None; 6], 200, &effort, &cancel);
+        let traps = Traps::default();
+        let runs = observed(&strobe, &traps, &states, 200, &effort, &cancel).expect("runs");
+        let found = sets(&strobe, &traps, &[], runs, 200, &effort, &cancel);
         assert!(found.is_empty(), "{simd}");
     }
 }

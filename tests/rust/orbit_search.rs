@@ -2,7 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use pendmap::attractor::find::attracting;
 use pendmap::error::Error;
+use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;
 use pendmap::maps::control::Control;
 use pendmap::maps::orbits::{Orbits, Request, orbits};
@@ -11,7 +13,7 @@ use pendmap::model::Pendulum;
 use pendmap::orbit::newton::{RESIDUAL, find};
 use pendmap::orbit::{PeriodicOrbit, PoincareMap};
 
-use crate::support::{driven, undriven};
+use crate::support::{driven, instruction_sets, undriven};
 use crate::truths::{attractors, list, number, truths};
 
 fn request(n: usize, w: i64, cells: usize) -> Request {
@@ -57,6 +59,24 @@ fn a_rotation_has_its_saddle_and_no_orbit_stands_twice() {
     let mirrored = all(&pendulum, 1, -1).closed;
     let images: Vec<PeriodicOrbit> = found.iter().map(|o| o.mirrored().0).collect();
     assert!(same(&images, &mirrored));
+}
+
+#[test]
+fn where_no_orbit_attracts_near_the_first_point_the_others_are_tried() {
+    let pendulum = driven(0.1, 1.0, 2.0);
+    let both = all(&pendulum, 1, 1).closed;
+    let point = |stable: bool| {
+        both.iter().find(|o| o.is_stable() == stable).expect("a saddle and a node").points[0]
+    };
+    let [saddle, node] = [false, true].map(point);
+    let strobe = Strobe::new(&pendulum, 40, instruction_sets()[0]);
+    let map = PoincareMap::of_steps(&strobe);
+    let starts = [(vec![saddle], 1), (vec![node], 1), (vec![saddle, saddle, node], 1)];
+    let found = attracting(&strobe, &map, &starts);
+    assert!(found[0].is_none());
+    for orbit in &found[1..] {
+        assert!(orbit.as_ref().is_some_and(|o| o.is_stable() && o.contains(node, 1e-3)));
+    }
 }
 
 #[test]

@@ -131,7 +131,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     stable orbit of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that
     captures it. A run continues while its last group has no known successor, and a set of fewer
     than 16 runs gets 16 more from its points. If the cell has another attractor, which could end
-    chaos, none of 16 runs may end within 5000 periods. All other starts are undecided.
+    chaos, none of 32 runs may end within 2500 periods. All other starts are undecided.
 
     Parameters
     ----------

@@ -42,6 +42,8 @@ pub struct Block {
     /// Angles over pi at which friction has held a trajectory during the last period; NaN where it
     /// has not.
     pub held_at: Vec<f64>,
+    /// Lanes without a trajectory: they stay at rest at 0.
+    pub idle: Vec<bool>,
     pub(super) held: Vec<Held>,
     pub(super) queue: Vec<EventSearch>,
     /// Values transferred from lanes to the queue.
@@ -58,17 +60,20 @@ impl Block {
             kick: zeros.clone(),
             turns: zeros,
             held_at: vec![f64::NAN; width],
+            idle: vec![false; width],
             held: Vec::new(),
             queue: Vec::new(),
             scratch: Box::new([[0.0; MAX_WIDTH]; 11]),
         }
     }
 
-    /// These states in front, rest behind them; `kick` is the schedule's.
+    /// These states in front, idle lanes behind them; `kick` is the schedule's.
     pub fn fill(&mut self, theta: &[f64], velocity: &[f64], kick: f64) {
         self.half_turns.fill(0.0);
         self.kick.fill(0.0);
         self.turns.fill(0.0);
+        self.idle.fill(true);
+        self.idle[..theta.len()].fill(false);
         for (slot, theta) in self.half_turns.iter_mut().zip(theta) {
             *slot = theta * FRAC_1_PI;
         }
@@ -89,7 +94,12 @@ impl Block {
     /// Keeps the held lanes at rest through the step, and releases those whose time has come.
     #[inline(never)]
     pub(super) fn let_go(&mut self, time: [f64; 2]) {
-        let Self { half_turns, kick, held, queue, .. } = self;
+        let Self { half_turns, kick, held, queue, idle, .. } = self;
+        for ((half_turns, kick), _) in
+            half_turns.iter_mut().zip(kick.iter_mut()).zip(idle).filter(|(_, idle)| **idle)
+        {
+            (*half_turns, *kick) = (0.0, 0.0);
+        }
         held.retain(|h| {
             half_turns[h.lane] = h.half_turns;
             kick[h.lane] = 0.0;

@@ -171,7 +171,7 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
         block.queue.clear();
         block.held_at.fill(f64::NAN);
         for lane in 0..block.kick.len() {
-            if block.kick[lane] != 0.0 {
+            if block.kick[lane] != 0.0 || block.idle[lane] {
                 continue;
             }
             let half_turns = block.half_turns[lane];
