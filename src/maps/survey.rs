@@ -228,8 +228,9 @@ impl Survey {
                 .into_iter()
                 .map(|other| self.place(other))
                 .map(|(block, at)| (known(block), at))
+                .filter(|(block, at)| block.gained_in(pass - 1, *at))
                 .collect();
-            if !around.iter().any(|(block, at)| block.gained_in(pass - 1, *at)) {
+            if around.is_empty() {
                 return Ok(None);
             }
             let strobe = self.strobe(cell);
