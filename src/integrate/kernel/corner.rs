@@ -17,7 +17,7 @@ pub const REACH: f64 = 0.4;
 
 /// The equation over numbers that carry the derivatives of the switching function along the motion.
 #[derive(Clone, Debug)]
-pub struct Corner<L: Lane>(Equation<Tangent<L, 2>>, L);
+pub struct Corner<L: Lane>(Box<Equation<Tangent<L, 2>>>, L);
 
 /// The drive at one time, with its rates.
 pub type Moving<L> = Forcing<Tangent<L, 2>>;
@@ -38,7 +38,7 @@ impl<L: Lane> Corner<L> {
         let zero = number.like(0.0);
         let shape = Tangent { value: zero, slope: [zero; 2] };
         // No closure: it would lose the instruction set.
-        if equation.has_corner() { Some(Self(equation.map(shape), zero)) } else { None }
+        if equation.has_corner() { Some(Self(Box::new(equation.map(shape)), zero)) } else { None }
     }
 
     /// The drive at time `tau`.
