@@ -180,37 +180,19 @@ impl<'a> Walk<'a> {
         for (middle, half_turns) in self.middles.iter_mut().zip(&self.block.half_turns) {
             *middle = well(*half_turns);
         }
-        for k in 0..self.strobe.steps() {
-            self.strobe.step(&mut self.block, k);
-            let all = self.middles.iter().zip(&self.block.half_turns);
+        let Self { strobe, block, runs, lanes, middles, .. } = self;
+        strobe.period_seen(block, &mut |block| {
+            let all = middles.iter().zip(&block.half_turns);
             if all.fold(false, |passed, (middle, at)| passed | ((at - middle).abs() >= 1.0)) {
-                self.passages();
+                passages(&block.half_turns, middles, runs, lanes);
             }
-        }
+        });
         self.block.wrap(self.strobe.angle);
         self.clock += 1;
         for i in 0..self.runs.len() {
             if self.runs[i].fate == Fate::Open {
                 self.record(i);
             }
-        }
-    }
-
-    /// Notes the passages over the top in a step.
-    fn passages(&mut self) {
-        for i in 0..self.runs.len() {
-            let away = self.block.half_turns[i] - self.middles[i];
-            if (-1.0..1.0).contains(&away) || away.is_nan() {
-                continue;
-            }
-            let sense = away.signum() as i64;
-            self.middles[i] = well(self.block.half_turns[i]);
-            let Some(window) = self.runs[i].windows.last_mut() else { continue };
-            window.senses.passes = true;
-            if self.lanes[i].before == sense {
-                window.senses.turns[usize::from(sense > 0)] = true;
-            }
-            self.lanes[i].before = sense;
         }
     }
 
@@ -246,6 +228,24 @@ impl<'a> Walk<'a> {
             }
         }
         runs
+    }
+}
+
+/// Notes the passages over the top in a step that has ended at `half_turns`.
+fn passages(half_turns: &[f64], middles: &mut [f64], runs: &mut [Run], lanes: &mut [Lane]) {
+    for (i, run) in runs.iter_mut().enumerate() {
+        let away = half_turns[i] - middles[i];
+        if (-1.0..1.0).contains(&away) || away.is_nan() {
+            continue;
+        }
+        let sense = away.signum() as i64;
+        middles[i] = well(half_turns[i]);
+        let Some(window) = run.windows.last_mut() else { continue };
+        window.senses.passes = true;
+        if lanes[i].before == sense {
+            window.senses.turns[usize::from(sense > 0)] = true;
+        }
+        lanes[i].before = sense;
     }
 }
 

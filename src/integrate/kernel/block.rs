@@ -6,7 +6,6 @@
 //! each with its own phase and step ([`super::event`]). Lanes that are held fast wait for their release.
 
 use std::f64::consts::{FRAC_1_PI, PI};
-use std::ops::Range;
 
 use super::event::EventSearch;
 use super::runner::{run, smooth};
@@ -129,19 +128,19 @@ impl Strobe {
 
     /// Advances by one forcing period; the block is [`Strobe::block_width`] wide.
     pub fn period(&self, block: &mut Block) {
-        dispatch::run(self.simd, Steps { strobe: self, block, range: 0..self.steps() });
+        dispatch::run(self.simd, Steps { strobe: self, block, see: None });
     }
 
-    /// Step `k` of a period alone; the steps of a period follow one another from 0 on.
-    pub fn step(&self, block: &mut Block, k: usize) {
-        dispatch::run(self.simd, Steps { strobe: self, block, range: k..k + 1 });
+    /// [`Strobe::period`] that shows the block to `see` after each step.
+    pub fn period_seen(&self, block: &mut Block, see: &mut dyn FnMut(&Block)) {
+        dispatch::run(self.simd, Steps { strobe: self, block, see: Some(see) });
     }
 
     /// Runs a block of any width, one trajectory at a time with the arithmetic of a lane.
     // Compiled where it is called: in tests alone.
     #[inline]
     pub fn period_singly(&self, block: &mut Block) {
-        dispatch::run(self.simd, Singly(Steps { strobe: self, block, range: 0..self.steps() }));
+        dispatch::run(self.simd, Singly(Steps { strobe: self, block, see: None }));
     }
 }
 
@@ -159,21 +158,24 @@ impl Job for Widths {
     }
 }
 
+/// What sees a block after each step.
+pub(super) type See<'a> = Option<&'a mut dyn FnMut(&Block)>;
+
 struct Steps<'a> {
     strobe: &'a Strobe,
     block: &'a mut Block,
-    range: Range<usize>,
+    see: See<'a>,
 }
 
 impl Job for Steps<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
-        let Self { strobe, block, range } = self;
+        let Self { strobe, block, see } = self;
         if block.kick.len() == S::Few::WIDTH && strobe.is_plain() {
-            smooth::<S::Few>(strobe, isa, block, range);
+            smooth::<S::Few>(strobe, isa, block, see);
         } else {
-            run::<S::Lanes, S::Narrow>(strobe, (isa, isa), block, range);
+            run::<S::Lanes, S::Narrow>(strobe, (isa, isa), block, see);
         }
     }
 }
@@ -184,7 +186,7 @@ impl Job for Singly<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, _: S) {
-        let Steps { strobe, block, range } = self.0;
-        run::<S::Single, S::Single>(strobe, ((), ()), block, range);
+        let Steps { strobe, block, see } = self.0;
+        run::<S::Single, S::Single>(strobe, ((), ()), block, see);
     }
 }

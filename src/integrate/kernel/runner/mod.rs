@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use crate::integrate::kernel::block::{Block, Held};
+use crate::integrate::kernel::block::{Block, Held, See};
 use crate::integrate::kernel::corner::{self, Corner};
 use crate::integrate::kernel::general::{Clock, Running, STEP, Shared, Stages, Stepping};
 use crate::integrate::kernel::step::{Moving, Rubbing};
@@ -29,27 +29,32 @@ pub(super) fn run<L: Lane, Q: Lane>(
     strobe: &Strobe,
     tokens: (L::Token, Q::Token),
     block: &mut Block,
-    range: Range<usize>,
+    see: See,
 ) {
     if strobe.is_plain() {
-        smooth::<L>(strobe, tokens.0, block, range);
+        smooth::<L>(strobe, tokens.0, block, see);
     } else {
-        Runner::<L, Q>::new(strobe, tokens).run(block, range);
+        Runner::<L, Q>::new(strobe, tokens).run(block, see);
     }
 }
 
-/// Steps of a block without events or effects.
+/// A period of a block without events or effects: at once if nothing sees the steps.
 #[inline(always)]
-pub(super) fn smooth<L: Lane>(
-    strobe: &Strobe,
-    token: L::Token,
-    block: &mut Block,
-    range: Range<usize>,
-) {
-    if strobe.fine {
-        L::apart(token, Smooth::<L, Fine> { strobe, token, block, range, degree: PhantomData });
-    } else {
-        L::apart(token, Smooth::<L, Coarse> { strobe, token, block, range, degree: PhantomData });
+pub(super) fn smooth<L: Lane>(strobe: &Strobe, token: L::Token, block: &mut Block, mut see: See) {
+    let length = if see.is_some() { 1 } else { strobe.steps() };
+    let mut first = 0;
+    while first < strobe.steps() {
+        let range = first..first + length;
+        if strobe.fine {
+            L::apart(token, Smooth::<L, Fine> { strobe, token, block, range, degree: PhantomData });
+        } else {
+            let degree = PhantomData;
+            L::apart(token, Smooth::<L, Coarse> { strobe, token, block, range, degree });
+        }
+        if let Some(see) = &mut see {
+            see(block);
+        }
+        first += length;
     }
 }
 
@@ -139,14 +144,14 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
     }
 
     #[inline(always)]
-    fn run(&self, block: &mut Block, range: Range<usize>) {
+    fn run(&self, block: &mut Block, mut see: See) {
         let Strobe { route, events, extra, .. } = *self.strobe;
-        if events && range.start == 0 {
+        if events {
             self.begin(block);
         }
         let stages = &mut Stages::new(Q::splat(self.tokens.1, 0.0));
         let steps = self.strobe.steps();
-        for k in range {
+        for k in 0..steps {
             let time = [k, k + 1].map(|k| self.length * k as f64 / steps as f64);
             let step = Step { runner: self, block, k, time, stages };
             match (route, extra) {
@@ -160,6 +165,9 @@ impl<'a, L: Lane, Q: Lane> Runner<'a, L, Q> {
                     let step = Step { runner: self, block, k, time, stages };
                     Q::apart(self.tokens.1, Queue(step));
                 }
+            }
+            if let Some(see) = &mut see {
+                see(block);
             }
         }
     }
