@@ -87,19 +87,20 @@ def _entry(dataset: xr.Dataset, place: Place, k: int) -> dict[str, Any]:
     }
 
 
+def _span(dim: str, low: float, high: float) -> str:
+    return f"{dim} = {low:.4g}" if low == high else f"{dim} = {low:.4g} to {high:.4g}"
+
+
 def summary(dataset: xr.Dataset) -> list[str]:
     """Return the findings, a sentence a line."""
     a = facts(dataset)
     every = attractors(dataset)
-    spans = [
-        f"{dim} = {dataset[dim].values[0]:g} to {dataset[dim].values[-1]:g}"
-        for dim in varied_names(dataset)
-    ]
+    spans = [_span(dim, *dataset[dim].values[[0, -1]]) for dim in varied_names(dataset)]
     said = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
     lines = [f"{', '.join(spans)}: {said}, {counted(len(every), 'attractor')}."]
     most = sorted(every, key=lambda one: -one["largest_fraction"])
     for one in most[:_LISTED]:
-        ends = [f"{dim} = {low:g} to {high:g}" for dim, (low, high) in one["ranges"].items()]
+        ends = [_span(dim, *own) for dim, own in one["ranges"].items()]
         share = percent(100 * one["largest_fraction"])
         lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts.")
     if len(every) > _LISTED:

@@ -211,7 +211,7 @@ def _names(names: list[str], first: list[Place], axes: Sequence[Varied]) -> list
     """Return names of which no two are the same: where each one appears tells equal ones apart."""
     found: list[str] = []
     for name, place in zip(names, first, strict=True):
-        at = ", ".join(f"{a.name} = {a.values[k]:g}" for a, k in zip(axes, place, strict=True))
+        at = ", ".join(f"{a.name} = {a.values[k]:.4g}" for a, k in zip(axes, place, strict=True))
         told = name if names.count(name) == 1 else f"{name} from {at}"
         number = 2
         while told in found:
