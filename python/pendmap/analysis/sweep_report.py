@@ -10,7 +10,7 @@ import numpy as np
 from pendmap.analysis.sweep_table import COUNTS, KINDS, MEASURES
 from pendmap.analysis.sweep_tiles import PLANES
 from pendmap.files import facts
-from pendmap.formatting import counted, percent
+from pendmap.formatting import counted, percent, span
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,20 +87,16 @@ def _entry(dataset: xr.Dataset, place: Place, k: int) -> dict[str, Any]:
     }
 
 
-def _span(dim: str, low: float, high: float) -> str:
-    return f"{dim} = {low:.4g}" if low == high else f"{dim} = {low:.4g} to {high:.4g}"
-
-
 def summary(dataset: xr.Dataset) -> list[str]:
     """Return the findings, a sentence a line."""
     a = facts(dataset)
     every = attractors(dataset)
-    spans = [_span(dim, *dataset[dim].values[[0, -1]]) for dim in varied_names(dataset)]
+    spans = [span(dim, *dataset[dim].values[[0, -1]]) for dim in varied_names(dataset)]
     said = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
     lines = [f"{', '.join(spans)}: {said}, {counted(len(every), 'attractor')}."]
     most = sorted(every, key=lambda one: -one["largest_fraction"])
     for one in most[:_LISTED]:
-        ends = [_span(dim, *own) for dim, own in one["ranges"].items()]
+        ends = [span(dim, *own) for dim, own in one["ranges"].items()]
         share = percent(100 * one["largest_fraction"])
         lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts.")
     if len(every) > _LISTED:
