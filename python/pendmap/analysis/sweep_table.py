@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from pendmap.analysis.grid import Grid
-    from pendmap.analysis.sweep import Varied
     from pendmap.analysis.sweep_tiles import Mapped, Place
+    from pendmap.analysis.varied import Varied
     from pendmap.units import Units
 
     Maps = Mapping[Place, Mapped]
