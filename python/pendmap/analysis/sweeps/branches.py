@@ -21,7 +21,7 @@ from pendmap.analysis.orbit_table import distance, plain
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pendmap.analysis.sweep_tiles import Found, Mapped, Place, SweepTiles
+    from pendmap.analysis.sweeps.tiles import Found, Mapped, Place, SweepTiles
     from pendmap.signal import Floats
 
     Node = tuple[Place, int]

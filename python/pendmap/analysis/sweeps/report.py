@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.sweep_table import COUNTS, KINDS, MEASURES
-from pendmap.analysis.sweep_tiles import PLANES
+from pendmap.analysis.sweeps.table import COUNTS, KINDS, MEASURES
+from pendmap.analysis.sweeps.tiles import PLANES
 from pendmap.files import facts
 from pendmap.formatting import counted, percent, span
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.analysis.sweep_tiles import Place
+    from pendmap.analysis.sweeps.tiles import Place
 
 _LISTED: Final = 8  # Attractors that the summary names
 

@@ -12,7 +12,7 @@ from pendmap.analysis import result
 from pendmap.analysis.grid import coordinate
 from pendmap.analysis.orbit_table import plain
 from pendmap.analysis.result import NO_YES, flag, variable
-from pendmap.analysis.sweep_tiles import PLANES
+from pendmap.analysis.sweeps.tiles import PLANES
 from pendmap.formatting import span
 from pendmap.units import RATE, VELOCITY
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from pendmap.analysis.grid import Grid
-    from pendmap.analysis.sweep_tiles import Mapped, Place
+    from pendmap.analysis.sweeps.tiles import Mapped, Place
     from pendmap.analysis.varied import Varied
     from pendmap.units import Units
 
