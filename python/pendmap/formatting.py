@@ -47,6 +47,11 @@ def percent(value: float) -> str:
     return f"{value:.3g} %" if math.isfinite(value) else ""
 
 
+def span(name: str, low: float, high: float) -> str:
+    """Return ``p = 0.4 to 1.25``, or ``p = 0.4`` if both ends are equal, to four digits."""
+    return f"{name} = {low:.4g}" + ("" if low == high else f" to {high:.4g}")
+
+
 def moment(time: float) -> str:
     """Return a time in s to six digits, from 1000 s on to a millisecond."""
     return f"{time:.6g}" if abs(time) < LONG_AGO else f"{round(time, 3):.15g}"

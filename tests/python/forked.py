@@ -104,6 +104,7 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "lyapunov": lambda: pendmap.lyapunov(pendmap.Pendulum(p=2.0), 1.0, 0.0, precision=0.1),
         "melnikov": lambda: pendmap.melnikov(pendulum, [1.0]),
         "merge": merged,
+        "sweep": lambda: pendmap.sweep(pendulum, {"p": (0.6, 0.8, 3)}, grid=small),
         "noise_floor": lambda: pendmap.noise_floor(free.runs[0]),
         "orbit": lambda: pendmap.orbit(pendulum, 1, 1, small),
         "parameter_map": lambda: pendmap.parameter_map(pendulum, plane),

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis import result, sweep_report
-from pendmap.analysis import sweep as parameters
+from pendmap.analysis import result, varied
 from pendmap.analysis.basins import choices_of
-from pendmap.analysis.branches import branches
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.stored import Kept
-from pendmap.analysis.sweep_table import sweep_dataset
-from pendmap.analysis.sweep_tiles import SweepTiles
+from pendmap.analysis.sweeps import report
+from pendmap.analysis.sweeps.branches import branches
+from pendmap.analysis.sweeps.table import sweep_dataset
+from pendmap.analysis.sweeps.tiles import SweepTiles
 from pendmap.engine import Layout
 from pendmap.errors import InputError, short_repr
 from pendmap.model import without_dimensions
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.sweep import Varied
-    from pendmap.analysis.sweep_table import Numbers
+    from pendmap.analysis.sweeps.table import Numbers
+    from pendmap.analysis.varied import Varied
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
 
@@ -52,9 +52,9 @@ SCHEMA = Schema(
         "attractors",
         "",
         "attractors with the ranges in which they exist",
-        read=sweep_report.attractors,
+        read=report.attractors,
     ),
-    Field("maps", "", "maps, each with its attractors", read=sweep_report.maps),
+    Field("maps", "", "maps, each with its attractors", read=report.maps),
     Found(
         "undecided",
         "1",
@@ -170,9 +170,10 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     if analysis not in ANALYSES:
         raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
+    pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     two = isinstance(ranges, dict) and len(ranges) == 2  # noqa: PLR2004
-    axes = parameters.varied(pendulum, ranges, 2 if two else 1, listed=True)
+    axes = varied.varied(pendulum, ranges, 2 if two else 1, listed=True)
     for axis in axes if two else ():
         if not axis.even:
             raise InputError(f"{axis.name} must be evenly spaced where two parameters vary")
@@ -213,8 +214,8 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         }
         replaced = [name for axis in axes for name in axis.replaced]
         SCHEMA.complete(dataset, pendulum, values, None, replaced)
-        dataset.attrs["title"] = parameters.title(pendulum, *axes)
-        lines = [*sweep_report.summary(dataset), *parameters.without_damping(pendulum, *axes)]
+        dataset.attrs["title"] = varied.title(pendulum, *axes)
+        lines = [*report.summary(dataset), *varied.without_damping(pendulum, *axes)]
         summarised(dataset, lines, pendulum, "basins are")
         return dataset, ["label"]
 

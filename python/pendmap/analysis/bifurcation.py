@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import result, sweep
+from pendmap.analysis import cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
 from pendmap.analysis.stored import Kept
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.sweep import Varied
+    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Indices, Mask
@@ -54,7 +54,7 @@ SCHEMA = Schema(
     Field("varied", "", "parameter that varies"),
     Field("branches", "", "attractors followed along the parameter", read=_branches),
     Field("points", "1", "stroboscopic points"),
-    *sweep.SEARCH,
+    *cell_search.SEARCH,
 )
 
 
@@ -63,7 +63,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges: Mapping[str, tuple[float, float, int]],
     *,
     start: tuple[float, float] | None = None,
-    starts: int = sweep.STARTS,
+    starts: int = cell_search.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -126,11 +126,12 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(result.sizes)
     ['bound', 'branch', 'entry', 'kind', 'loose', 'p', 'point']
     """
+    pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
-    (axis,) = sweep.varied(pendulum, ranges, 1)
+    (axis,) = varied.varied(pendulum, ranges, 1)
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    search = sweep.CellSearch(starts, box, numerics)
+    search = cell_search.CellSearch(starts, box, numerics)
     first = None
     if start is not None:
         if np.asarray(start, dtype=object).shape != (2,):
@@ -155,8 +156,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
             "points": dataset.sizes["point"],
         }
         SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
-        dataset.attrs["title"] = sweep.title(pendulum, axis)
-        lines = [*_summary(dataset), *sweep.without_damping(pendulum, axis)]
+        dataset.attrs["title"] = varied.title(pendulum, axis)
+        lines = [*_summary(dataset), *varied.without_damping(pendulum, axis)]
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
@@ -165,7 +166,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    kinds, which = sweep.kinds_of(raw)
+    kinds, which = cell_search.kinds_of(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
     value = axis.values[raw.cell]
@@ -180,7 +181,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     kind, meanings = which[ends[:, 0]].astype(np.int16), dict(enumerate(kinds.tolist()))
     on = "entry of the attractor that the sweep {} is on"
     data: dict[str, Any] = {
-        **sweep.entries(raw, kinds, which, units),
+        **cell_search.entries(raw, kinds, which, units),
         "entry_value": ("entry", value, axis.attributes),
         "entry_branch": variable("entry", of_entry, "1", "number of the branch"),
         "branch_kind": variable("branch", kind, "", "kind of attractor", flags=meanings),
@@ -192,7 +193,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         **point("point", raw.point_theta, speed, units.of_velocity, "point_{}"),
         "up": variable(axis.name, raw.up.on, "1", on.format("up"), "-1: none", missing=-1),
         "down": variable(axis.name, raw.down.on, "1", on.format("down"), "-1: none", missing=-1),
-        **sweep.shares(raw, (axis.name,), axis.values.shape),
+        **cell_search.shares(raw, (axis.name,), axis.values.shape),
         "loose_sweep": variable("loose", way, "", "sweep", flags={-1: "down", 1: "up"}),
         "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
         **point("loose", loose["theta"], loose_speed, units.of_velocity, "loose_{}"),
@@ -223,7 +224,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
-    lines += [*sweep.chaos(a), *sweep.undecided(a)]
+    lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():
         lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")

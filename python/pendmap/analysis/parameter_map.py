@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result, sweep
+from pendmap.analysis import cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.numerics import part as progress_part
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.sweep import Varied
+    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
@@ -55,7 +55,7 @@ def sets(dataset: xr.Dataset, which: str = "regime_has", kind: str = "kind") -> 
     """Return the kinds of attractor in each regime, rest first, chaos last."""
     names = dataset[kind].values
     found = (names[has.astype(bool)].tolist() for has in dataset[which].transpose(..., kind).values)
-    return [sorted(one, key=sweep.order) or [sweep.UNDECIDED] for one in found]
+    return [sorted(one, key=cell_search.order) or [cell_search.UNDECIDED] for one in found]
 
 
 def having(dim: str, sets: Iterable[Collection[str]], kinds: Iterable[str]) -> tuple[Any, ...]:
@@ -89,7 +89,7 @@ SCHEMA = Schema(
     Field("rows", "", "parameter that varies along rows"),
     Field("regimes", "", "sets of attractors with their shares of the cells", read=_regimes),
     Field("cells", "1", "cells of the plane"),
-    *sweep.SEARCH,
+    *cell_search.SEARCH,
     drawn_regimes,
     references="Xu, Wiercigroch & Cartmell (2005), Chaos, Solitons & Fractals 23, 1537",
 )
@@ -99,7 +99,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, tuple[float, float, int]],
     *,
-    starts: int = sweep.STARTS,
+    starts: int = cell_search.STARTS,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
@@ -142,7 +142,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
         dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
         ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
-        ``EFFECT.PARAMETER`` of an effect that the model has.
+        ``EFFECT.PARAMETER`` of an effect that the model has, or that has no other parameter.
     starts : int
         Initial conditions of each cell.
     box : Grid, optional
@@ -195,11 +195,12 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> sorted(pendmap.parameter_map(pendulum, ranges, starts=4).sizes)
     ['bound', 'entry', 'kind', 'omega', 'p', 'set']
     """
+    pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
-    columns, rows = sweep.varied(pendulum, ranges, 2)
+    columns, rows = varied.varied(pendulum, ranges, 2)
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
-    search = sweep.CellSearch(starts, box, numerics)
+    search = cell_search.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
         kept.refuse("draws")
@@ -231,8 +232,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         }
         replaced = [*columns.replaced, *rows.replaced]
         SCHEMA.complete(dataset, pendulum, values, raw, replaced)
-        dataset.attrs["title"] = sweep.title(pendulum, columns, rows)
-        lines = [*_summary(dataset), *sweep.without_damping(pendulum, columns, rows)]
+        dataset.attrs["title"] = varied.title(pendulum, columns, rows)
+        lines = [*_summary(dataset), *varied.without_damping(pendulum, columns, rows)]
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
@@ -246,8 +247,8 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
     cell, n, w = raw.cell, raw.n, raw.w
-    kinds, which = sweep.kinds_of(raw)
-    sets, regime, frequency = sweep.regimes(kinds[which].tolist(), cell, cells)
+    kinds, which = cell_search.kinds_of(raw)
+    sets, regime, frequency = cell_search.regimes(kinds[which].tolist(), cell, cells)
     share = np.zeros((kinds.size, cells))
     np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
@@ -272,8 +273,8 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
         "winding": over(winding, "turns", "net turns in that period"),
         "exponent": over(units.given(exponent, RATE), units.of_rate, "largest Lyapunov exponent"),
         "share": variable(("kind", *dims), share.reshape((kinds.size, *shape)), "1", on_kind),
-        **sweep.shares(raw, dims, shape),
-        **sweep.entries(raw, kinds, which, units),
+        **cell_search.shares(raw, dims, shape),
+        **cell_search.entries(raw, kinds, which, units),
     }
     coordinates = {
         **columns.coordinates,
@@ -337,8 +338,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    lines += [*sweep.chaos(a), *sweep.undecided(a)]
-    places = sweep.undecided_cells(dataset)
+    lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
+    places = cell_search.undecided_cells(dataset)
     if places:
         listed = "; ".join(_place_text(place) for place in places[:_PLACES])
         more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
@@ -371,7 +372,7 @@ def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
             counts.setdefault(kinds, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
     share = np.array([[one.get(kinds, 0.0) for one in shares] for kinds in counts])
     order = np.argsort(-share.mean(axis=1), kind="stable")
-    every = sorted(set().union(*counts) - {sweep.UNDECIDED})
+    every = sorted(set().union(*counts) - {cell_search.UNDECIDED})
     ranked = [list(counts)[k] for k in order]
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
     found = dataset.assign(outcome_has=having("outcome", ranked, every))

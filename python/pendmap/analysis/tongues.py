@@ -16,7 +16,7 @@ from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
-from pendmap.analysis.sweep import title_without
+from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts
 from pendmap.formatting import counted

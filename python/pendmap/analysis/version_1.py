@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.cell_search import UNDECIDED
 from pendmap.analysis.parameter_map import having
-from pendmap.analysis.sweep import UNDECIDED
 from pendmap.files.dataset import FORMAT_VERSION
 from pendmap.model import Effect, Formula, Pendulum, Rig
 from pendmap.model.labels import LABELS

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.orbit_table import plain
-from pendmap.analysis.sweep_report import varied_names
+from pendmap.analysis.sweeps.report import varied_names
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
@@ -50,7 +50,7 @@ LAYERS: Final = {
 """Layers over two parameters by the name a user types: variable, title and unit."""
 _LEADING: Final = ("entropy", "attractors", "main")
 _SIZE: Final = (7.4, 8.4)  # Size of a figure over one parameter, inches
-_HEIGHTS: Final = (2.6, 1.2, 1.2, 1.3)
+_HEIGHTS: Final = {"fraction": 2.6, "entropy": 1.2, "uncertainty": 1.2, "exponent": 1.3}
 _MOST_COUNT: Final = 8  # Largest count that has its own colour
 
 
@@ -112,38 +112,29 @@ def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)
     entropies, exponents = _entropies(dataset, x), _growth(dataset, x, every)
     known = dataset["exponent"].values
     rates = plane.padded(np.append(known[np.isfinite(known)], 0.0))
+    axes = {
+        "fraction": Axis("share of the starts", (0.0, 1.0)),
+        "entropy": Axis("entropy\n(nat)", _from_0(entropies, math.log(2))),
+        "uncertainty": Axis("uncertainty\nexponent", (0.0, 1.1)),
+        "exponent": Axis(f"exponent\n{names.per_time(units)}", rates),
+    }
+    marks = {
+        "fraction": _stack(dataset, dim, every),
+        "entropy": entropies,
+        "uncertainty": _uncertainty(dataset, x),
+        "exponent": exponents,
+    }
+    shown = [name for name in axes if name != "uncertainty" or marks[name]]
     panels = [
-        Panel(
-            "fraction",
-            "",
-            bare,
-            Axis("share of the starts", (0.0, 1.0)),
-            _stack(dataset, dim, every),
-        ),
-        Panel(
-            "entropy", "", bare, Axis("entropy\n(nat)", _from_0(entropies, math.log(2))), entropies
-        ),
-        Panel(
-            "uncertainty",
-            "",
-            bare,
-            Axis("uncertainty\nexponent", (0.0, 1.1)),
-            _uncertainty(dataset, x),
-        ),
-        Panel(
-            "exponent",
-            "",
-            below,
-            Axis(f"exponent\n{names.per_time(units)}", rates),
-            exponents,
-        ),
+        Panel(name, "", below if name == shown[-1] else bare, axes[name], marks[name])
+        for name in shown
     ]
     return Chart(
         title,
         subtitle,
         [[panel] for panel in panels],
         recorded=panels,
-        heights=_HEIGHTS,
+        heights=[_HEIGHTS[name] for name in shown],
         size=_SIZE,
         letters=False,
         tabs=True,
@@ -183,24 +174,28 @@ def _entropies(dataset: xr.Dataset, x: Floats) -> list[Mark]:
     whole, edge = dataset["basin_entropy"].values, dataset["boundary_basin_entropy"].values
     edge = np.where(dataset["boundary_boxes"].values > 0, edge, np.nan)
     error = dataset["boundary_basin_entropy_stderr"].values
-    dark, blue = palette.colour("rotation 1:+1"), palette.colour("rotation 1:-1")
     return [
         Level(math.log(2), colour=QUIET, dash=DASHED),
-        Line(x, whole, colour=blue, name="basin entropy", path="whole"),
+        Line(x, whole, colour=QUIET, name="basin entropy", path="whole"),
         Line(
             x,
             edge,
-            colour=dark,
+            colour=INK,
             name="of the boundary (dashed: ln 2, fractal above)",
             path="boundary",
         ),
-        *_error(x, edge, error, dark),
+        *_error(x, edge, error, INK),
     ]
 
 
 def _uncertainty(dataset: xr.Dataset, x: Floats) -> list[Mark]:
-    """Return the uncertainty exponent with its error: 1 where the boundary is smooth."""
+    """Return the uncertainty exponent with its error: 1 where the boundary is smooth.
+
+    There are no marks where no grid is fine enough for it.
+    """
     value, error = (dataset[f"uncertainty_exponent{end}"].values for end in ("", "_stderr"))
+    if not np.isfinite(value).any():
+        return []
     level = Level(1.0, colour=QUIET, dash=DASHED)
     return [level, Line(x, value, colour=INK, path="value"), *_error(x, value, error, INK)]
 
@@ -256,12 +251,12 @@ def _image(  # noqa: PLR0913, PLR0917 (parts of an image)
 ) -> tuple[str, Image]:
     """Return the title and the image of a layer."""
     name, text, unit = LAYERS[layer if which is None else "main"]
-    array = dataset[name]
+    array, title = dataset[name], text
     if name == "fraction":
         total = array.sum([*array.dims[:-1]]).values
         which = int(np.argmax(total)) if which is None else which
         array = array.isel(attractor=which)
-        text = f"{text} on {typeset(str(dataset['attractor'].values[which]))}"
+        title = f"{text} on {typeset(str(dataset['attractor'].values[which]))}"
     values = np.asarray(plane.pixels(dataset, array, cells), dtype=np.float64)
     if layer == "boundary":
         values = np.where(
@@ -277,4 +272,4 @@ def _image(  # noqa: PLR0913, PLR0917 (parts of an image)
         known = values[np.isfinite(values)]
         high = 1.0 if unit == "" else max(float(known.max(initial=0.0)), 1e-3)
         look = Colours(said, "magma" if unit else "cividis", 0.0, high)
-    return text, Image(values, across, up, colours=look, path="values")
+    return title, Image(values, across, up, colours=look, path="values")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pendmap.analysis.sweep import kind_of
+from pendmap.analysis.cell_search import kind_of
 from pendmap.comparison.itinerary import LONGEST
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.analysis.sweep_report import varied_names
+from pendmap.analysis.sweeps.report import varied_names
 from pendmap.charts import basin_sweep as shown
 from pendmap.charts import names, palette, plane
 from pendmap.files import facts

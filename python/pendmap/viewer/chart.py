@@ -173,7 +173,8 @@ def _points(stream: rr.RecordingStream, path: str, mark: charts.Points, place: P
 
 
 def _band(stream: rr.RecordingStream, path: str, mark: charts.Band, place: Place) -> None:
-    edges = (place.points(mark.x, edge) for edge in (mark.low, mark.high))
+    low, high = (np.asarray(edge) for edge in (mark.low, mark.high))
+    edges = (place.points(mark.x, np.where(low < high, edge, np.nan)) for edge in (low, high))
     _strips(stream, path, mark, place.lines(*edges), 0.7)
 
 

@@ -14,8 +14,8 @@ from scipy.optimize import fsolve
 
 import pendmap
 from pendmap import Grid, InputError, Pendulum
-from pendmap.analysis import branches
-from pendmap.analysis.sweep_tiles import Found, Mapped, SweepTiles
+from pendmap.analysis.sweeps import branches
+from pendmap.analysis.sweeps.tiles import Found, Mapped, SweepTiles
 
 if TYPE_CHECKING:
     from pathlib import Path

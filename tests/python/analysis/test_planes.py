@@ -13,7 +13,7 @@ import xarray as xr
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig, render
-from pendmap.analysis.sweep import kind_of, regimes, spread, undecided_cells
+from pendmap.analysis.cell_search import kind_of, regimes, spread, undecided_cells
 from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 
@@ -97,6 +97,9 @@ def test_parameters_of_effects_vary_too() -> None:
     found = pendmap.parameter_map(Pendulum(effects=(drag,)), ranges, starts=5)
     free = pendmap.parameter_map(Pendulum(), {"p": (0.7, 1.0, 2), "omega": (2.0, 2.0, 1)}, starts=5)
     assert (by_cell(found)[:, 0] == by_cell(free)[0]).all()
+    added = pendmap.parameter_map(Pendulum(), ranges, starts=5)
+    assert (by_cell(added) == by_cell(found)).all()
+    assert added.attrs["model"] != free.attrs["model"]
     rig = Rig(w0=5.0, p=1.0, Omega=10.0, c_over_m=0.5, effects=(drag,))
     si = pendmap.parameter_map(
         rig, {"quadratic_drag.q": (0.0, 0.4, 3), "p": (0.7, 1.0, 2)}, starts=5
@@ -109,6 +112,8 @@ def test_parameters_of_effects_vary_too() -> None:
     [
         ({"p": (0, 1, 3)}, "must be a mapping"),
         ({"p": (0, 1, 3), "Omega": (1, 2, 3)}, "'Omega' is no parameter of this model"),
+        ({"p": (0, 1, 3), "magnet.amplitude": (0, 1, 3)}, "'magnet.amplitude' is no parameter"),
+        ({"p": (0, 1, 3), "viscous_damping.gamma": (0, 1, 3)}, "is no parameter of this model"),
         ({"p": (0, 1, 3), "gamma": (-1, 2, 3)}, "gamma = -1: gamma must be 0 or more, got -1"),
         ({"p": (0, 1, 3), "omega": (0, 2, 3)}, "omega must be a number above 0, got 0"),
         ({"p": (1, 0, 3), "omega": (1, 2, 3)}, "the lower one first"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pendmap import Grid, Pendulum, _core
-from pendmap.analysis.sweep import spread
+from pendmap.analysis.cell_search import spread
 
 P = ("p", np.linspace(0.2, 1.2, 19).tolist())
 OMEGA = ("omega", np.linspace(1.7, 2.2, 17).tolist())

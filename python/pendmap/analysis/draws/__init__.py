@@ -13,7 +13,7 @@ import numpy as np
 
 from pendmap.analysis.numerics import part
 from pendmap.analysis.result import Field, indices, variable
-from pendmap.analysis.sweep import with_values
+from pendmap.analysis.varied import with_values
 from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
 from pendmap.formatting import counted
 from pendmap.model.covariance import covariance_of

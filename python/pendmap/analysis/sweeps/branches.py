@@ -4,8 +4,8 @@ An orbit is followed from one model to the next by Newton's method, in halved st
 parameters where a whole one fails; global continuation as by Attractors.jl (Datseris & Wagemakers
 2022, Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151) compares the
 distances of sets instead. So are here the attractors that no orbit leads to: chaos, and what an
-orbit becomes where its period doubles. Nothing depends on the order in which the models were
-mapped.
+orbit becomes where its period doubles. Tumbling chaos is followed by its kind alone. Nothing
+depends on the order in which the models were mapped.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pendmap.analysis.orbit_table import distance, plain
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pendmap.analysis.sweep_tiles import Found, Mapped, Place, SweepTiles
+    from pendmap.analysis.sweeps.tiles import Found, Mapped, Place, SweepTiles
     from pendmap.signal import Floats
 
     Node = tuple[Place, int]
@@ -31,6 +31,8 @@ _SAME: Final = 1e-4
 """Distance within which an orbit of the integration steps is the precise one."""
 _LIKE: Final = 0.25
 """Largest mean distance between the points of two sets that follow one another."""
+_EVERYWHERE: Final = "tumbling_chaos"
+"""Kind that one attractor of a model has at most; its samples lie apart by their own spacing."""
 _HALVED: Final = 4  # Number of times that a step of the parameters is halved
 
 
@@ -133,7 +135,8 @@ def _links(
     others: list[tuple[int, int]] = []
     for k, m in sorted(far, key=lambda pair: (far[pair], pair)):
         taken = any(k == one or m == other for one, other in others)
-        if far[k, m] < _LIKE and not taken:
+        near = far[k, m] < _LIKE or old[k].kind == _EVERYWHERE
+        if near and not taken:
             others.append((k, m))
     return orbits, others
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.analysis.fractality import uncertainty_exponent
-from pendmap.analysis.sweep import with_values
+from pendmap.analysis.varied import with_values
 from pendmap.engine import Tile, pack, unpack
 from pendmap.errors import InputError, core_errors
 

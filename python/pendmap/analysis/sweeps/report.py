@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.sweep_table import COUNTS, KINDS, MEASURES
-from pendmap.analysis.sweep_tiles import PLANES
+from pendmap.analysis.sweeps.table import COUNTS, KINDS, MEASURES
+from pendmap.analysis.sweeps.tiles import PLANES
 from pendmap.files import facts
-from pendmap.formatting import counted, percent
+from pendmap.formatting import counted, percent, span
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.analysis.sweep_tiles import Place
+    from pendmap.analysis.sweeps.tiles import Place
 
 _LISTED: Final = 8  # Attractors that the summary names
 
@@ -91,15 +91,12 @@ def summary(dataset: xr.Dataset) -> list[str]:
     """Return the findings, a sentence a line."""
     a = facts(dataset)
     every = attractors(dataset)
-    spans = [
-        f"{dim} = {dataset[dim].values[0]:g} to {dataset[dim].values[-1]:g}"
-        for dim in varied_names(dataset)
-    ]
+    spans = [span(dim, *dataset[dim].values[[0, -1]]) for dim in varied_names(dataset)]
     said = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
     lines = [f"{', '.join(spans)}: {said}, {counted(len(every), 'attractor')}."]
     most = sorted(every, key=lambda one: -one["largest_fraction"])
     for one in most[:_LISTED]:
-        ends = [f"{dim} = {low:g} to {high:g}" for dim, (low, high) in one["ranges"].items()]
+        ends = [span(dim, *own) for dim, own in one["ranges"].items()]
         share = percent(100 * one["largest_fraction"])
         lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts.")
     if len(every) > _LISTED:

@@ -12,15 +12,16 @@ from pendmap.analysis import result
 from pendmap.analysis.grid import coordinate
 from pendmap.analysis.orbit_table import plain
 from pendmap.analysis.result import NO_YES, flag, variable
-from pendmap.analysis.sweep_tiles import PLANES
+from pendmap.analysis.sweeps.tiles import PLANES
+from pendmap.formatting import span
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from pendmap.analysis.grid import Grid
-    from pendmap.analysis.sweep import Varied
-    from pendmap.analysis.sweep_tiles import Mapped, Place
+    from pendmap.analysis.sweeps.tiles import Mapped, Place
+    from pendmap.analysis.varied import Varied
     from pendmap.units import Units
 
     Maps = Mapping[Place, Mapped]
@@ -211,7 +212,7 @@ def _names(names: list[str], first: list[Place], axes: Sequence[Varied]) -> list
     """Return names of which no two are the same: where each one appears tells equal ones apart."""
     found: list[str] = []
     for name, place in zip(names, first, strict=True):
-        at = ", ".join(f"{a.name} = {a.values[k]:g}" for a, k in zip(axes, place, strict=True))
+        at = ", ".join(span(a.name, *a.values[[k, k]]) for a, k in zip(axes, place, strict=True))
         told = name if names.count(name) == 1 else f"{name} from {at}"
         number = 2
         while told in found:

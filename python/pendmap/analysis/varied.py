@@ -1,0 +1,239 @@
+"""Parameters that vary: their values, names and units."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pendmap import _core
+from pendmap.analysis.grid import ascending, coordinate
+from pendmap.analysis.result import variable
+from pendmap.errors import (
+    MOST_CELLS,
+    InputError,
+    check_number,
+    check_whole,
+    short_repr,
+)
+from pendmap.model import Effect, without_dimensions
+from pendmap.model.effects import effects
+from pendmap.model.labels import LABELS
+from pendmap.model.quantities import COUNTERPARTS, check
+from pendmap.model.rig import Rig
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from pendmap.model import Pendulum
+    from pendmap.signal import Floats
+
+
+@dataclasses.dataclass(frozen=True)
+class Varied:
+    """A parameter and its values: ascending, evenly spaced unless they were listed."""
+
+    name: str
+    """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
+    values: Floats
+    """Values in the units of the parameter."""
+    parameter: str
+    """Name of the parameter in the core."""
+    bare: Floats
+    """The values without dimensions."""
+    unit: str
+    """Unit of the values; empty where they have none."""
+    meaning: str
+    """Meaning of the parameter."""
+
+    @property
+    def kernel(self) -> tuple[str, list[float]]:
+        """Name and values as passed to the core."""
+        return self.parameter, self.bare.tolist()
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a quantity with these values."""
+        return variable((), 0.0, self.unit or "1", self.meaning)[2]
+
+    @property
+    def coordinates(self) -> dict[str, Any]:
+        """Coordinate of a dataset; with more than one value also their bounds."""
+        x = self.values
+        if x.size == 1:
+            return {self.name: (self.name, x, self.attributes)}
+        if self.even:
+            half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
+            edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
+        else:
+            middle = 0.5 * (x[1:] + x[:-1])
+            edges = np.array([2 * x[0] - middle[0], *middle, 2 * x[-1] - middle[-1]])
+        return coordinate(self.name, x, edges, **self.attributes)
+
+    @property
+    def even(self) -> bool:
+        """Whether the values are evenly spaced."""
+        steps = np.diff(self.values)
+        return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
+
+    @property
+    def replaced(self) -> tuple[str, ...]:
+        """Names of the model's own parameter that this one replaces."""
+        return self.parameter, COUNTERPARTS.get(self.parameter, ("",))[0]
+
+
+def varied(
+    model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int, *, listed: bool = False
+) -> tuple[Varied, ...]:
+    """Return the ``count`` parameters that vary, from their first and last value and number.
+
+    Where they may be ``listed``, what is no tuple is an array of values.
+    """
+    if not isinstance(ranges, dict) or len(ranges) != count:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+        example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
+        few = dict(list(example.items())[:count])
+        raise InputError(f"ranges must be a mapping like {few}, got {given or 'nothing'}")
+    found = tuple(_one(model, name, given, listed=listed) for name, given in ranges.items())
+    pendulum, _ = without_dimensions(model)
+    for axis in found:
+        for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
+            try:
+                with_values(pendulum, {axis.parameter: float(bare)})
+            except InputError as error:
+                units = "" if value == bare else f" (without dimensions, w0 is {model.units.w0:g})"
+                raise InputError(f"{axis.name} = {value:g}: {error}{units}") from None
+    if len({one.parameter for one in found}) < len(found):
+        raise InputError(
+            f"{found[0].name} and {found[1].name} must be two parameters, they are one"
+        )
+    if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
+        raise InputError(
+            "stroke_mm and a frequency must not both vary: vary p = Y Omega^2 / g instead"
+        )
+    return found
+
+
+def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum | Rig:
+    """Return the model with each effect that it lacks and whose only parameter varies."""
+    there = {effect.name for effect in model.effects}
+    own = without_dimensions(model)[0].numbers()  # gamma and theta_r are effects, too
+    lacking = {
+        f"{one.name}.{one.parameters[0].name}": Effect(one.name, {one.parameters[0].name: 0.0})
+        for one in effects()
+        if one.name not in there and len(one.parameters) == 1 and one.parameters[0].name not in own
+    }
+    new = (lacking[name] for name in ranges if name in lacking) if isinstance(ranges, dict) else ()
+    return dataclasses.replace(model, effects=(*model.effects, *new))
+
+
+def title(model: Pendulum | Rig, *axes: Varied) -> str:
+    """Return one line: the ranges of the parameters that vary, and the other parameters."""
+    spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
+    rest = title_without(model, *(a.parameter for a in axes))
+    return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
+
+
+def title_without(model: Pendulum | Rig, *names: str) -> str:
+    """Return the model in one line without some of its parameters, by the core's names."""
+    whole = [effect.title(model.units) for effect in model.effects]
+    own = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
+    both = [(name, COUNTERPARTS[name][0]) for name in names if name in COUNTERPARTS]
+    symbols = {LABELS[name].symbol for pair in both for name in pair}
+    kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
+    return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
+
+
+def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+    """Return a summary line if some of the pendulums have no damping, hence no attractors."""
+    pendulum, _ = without_dimensions(model)
+    least = {axis.parameter: float(axis.bare[0]) for axis in axes}
+    if any(effect.brakes for effect in model.effects):
+        return []
+    if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
+        return []
+    return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
+
+
+def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varied:  # noqa: ANN401
+    pendulum, units = without_dimensions(model)
+    known = _core.parameter_names(pendulum)
+    # Name in the core, factor and power of w0 of each quantity.
+    own = {bare: (bare, 1.0, 0) for bare in known if "." not in bare}
+    if isinstance(model, Rig):
+        for bare in ("gamma", "omega", "phase", "theta_r"):
+            si, power = COUNTERPARTS[bare]
+            own[si] = (bare, 1.0, power)
+        own["frequency_hz"] = ("omega", math.tau, 1)
+        if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
+            own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
+    effects = {e.name: e for e in model.effects}
+    shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
+    if name not in own and name not in shared:
+        there = ", ".join([*own, *shared])
+        raise InputError(
+            f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
+        )
+    by_ends = isinstance(given, tuple) or not listed
+    values = _values(name, given) if by_ends else ascending(name, given)
+    if name in own:
+        bare, factor, power = own[name]
+        if name in {"frequency_hz", "stroke_mm"}:
+            check(name, values[0])
+        plain = units.bare(factor * values, power)
+        # ``torque`` has no dimensions here, also for a rig.
+        unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
+        meaning = LABELS[name].meaning
+    else:
+        bare, unit = name, ""
+        which, parameter = name.split(".", 1)
+        entries = effects[which].definition.parameters
+        if units.si and any(entry.power_of_w0_less == parameter for entry in entries):
+            raise InputError(
+                f"{name} changes the units of others: the model must be one without dimensions"
+            )
+        one = dataclasses.replace(effects[which], ci95={})
+        changed = ({**one.parameters, parameter: float(x)} for x in values)
+        bared = [dataclasses.replace(one, parameters=mine).bare(units) for mine in changed]
+        plain = np.array([effect.parameters[parameter] for effect in bared])
+        meaning = f"{parameter} of {which}: {effects[which].definition[parameter].meaning}"
+        if units.si:
+            unit = effects[which].definition[parameter].unit
+    if known.count(bare) > 1:
+        raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
+    return Varied(name, values, bare, plain, unit, meaning)
+
+
+def _values(name: str, given: object) -> Floats:
+    wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
+    if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
+        raise InputError(f"{wanted}, got {short_repr(given)}")
+    low, high = (check_number(name, end) for end in given[:2])
+    count = check_whole(f"{name}: how many", given[2], 1, MOST_CELLS)
+    if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
+        raise InputError(f"{wanted}, the lower one first, got {low:g} to {high:g}")
+    if count == 1 and low < high:
+        raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
+    return np.linspace(low, high, count)
+
+
+def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
+    """Return the model with these parameters; its effects without their intervals."""
+    own = {name: x for name, x in values.items() if name in model.numbers()}
+    effects = tuple(
+        dataclasses.replace(
+            effect,
+            parameters={
+                name: values.get(f"{effect.name}.{name}", x)
+                for name, x in effect.parameters.items()
+            },
+            ci95={},
+        )
+        for effect in model.effects
+    )
+    changed: dict[str, Any] = {**own, "effects": effects}
+    return dataclasses.replace(model, **changed)
