@@ -48,7 +48,8 @@ def duration(seconds: float) -> str:
 def size_of(size: float) -> str:
     """Return a number of bytes as ``0.3 MB``, ``45 MB``, ``1.2 GB``."""
     power = max(2, min(4, int(math.log10(max(size, 1)) / 3)))
-    return f"{size / 1000**power:.2g} {['MB', 'GB', 'TB'][power - 2]}"
+    scaled, unit = size / 1000**power, ("MB", "GB", "TB")[power - 2]
+    return f"{scaled:.0f} {unit}" if scaled >= 10 else f"{scaled:.2g} {unit}"  # noqa: PLR2004
 
 
 def listed(texts: Sequence[str], most: int) -> str:

@@ -32,8 +32,8 @@ T = TypeVar("T")
 _FIRST: Final = {"bifurcation": 32, "parameter_map": 64, "lifetime": 500}
 """Cells of the first sample; of others ``_FEW``."""
 _FEW: Final = 256
-_ENOUGH: Final = 2.0  # Time of a sample that is long enough, s
-_AIM: Final = 4.0  # Time of the cells of a further sample, s
+_ENOUGH: Final = 4.0  # Time of a sample that is long enough, s
+_AIM: Final = 6.0  # Time of the cells of a further sample, s
 _SHARE: Final = 0.1  # Part of the whole time that a sample may take where it is shorter
 _GROWTH: Final = 2.0  # Least ratio of the sizes of two samples
 _BYTES: Final = {
@@ -142,7 +142,7 @@ class Request:
             wanted = cells if grid is None else max(models, cells // grid.cells)
             counts = _fewer([*self.counts.values()], wanted)
             spans = zip(own["ranges"].items(), counts, strict=True)
-            own["ranges"] = {name: _parts(*span, count) for (name, span), count in spans}
+            own["ranges"] = {name: _parts(span, count) for (name, span), count in spans}
             cells = -(-cells // math.prod(counts))
         if grid is not None:
             axes = (grid.theta, grid.velocity)
@@ -296,8 +296,9 @@ def _fewer(counts: list[int], cells: int) -> list[int]:
     return [*found.values()]
 
 
-def _parts(low: float, high: float, had: int, count: int) -> tuple[float, float, int]:
+def _parts(span: tuple[float, float, int], count: int) -> tuple[float, float, int]:
     """Return the range of the middles of ``count`` equal parts of a range, or the range itself."""
+    low, high, had = span
     if count == had:
         return low, high, had
     half = (high - low) / count / 2

@@ -68,9 +68,7 @@ class Kept:
         else:
             show(dataset, dataclasses.replace(outputs, out=None), schema, [str(store)])
 
-    def _tell_cost(
-        self, analysis: partial[xr.Dataset], outputs: Outputs, schema: Schema
-    ) -> None:
+    def _tell_cost(self, analysis: partial[xr.Dataset], outputs: Outputs, schema: Schema) -> None:
         """Report what the command would take."""
         from pendmap.cli.dry_run import show_cost
 

@@ -24,9 +24,7 @@ REQUESTS = {
         "parameter_map", {"ranges": {"p": (*SPAN, 200), "omega": (*SPAN, 50)}, "starts": 9}
     ),
     "bifurcation": Request("bifurcation", {"ranges": {"p": (*SPAN, 5000)}, "starts": 4}),
-    "basin_sweep": Request(
-        "basin_sweep", {"ranges": {"p": (*SPAN, 90)}, "grid": Grid.square(100)}
-    ),
+    "basin_sweep": Request("basin_sweep", {"ranges": {"p": (*SPAN, 90)}, "grid": Grid.square(100)}),
     "lifetime": Request("lifetime", {"starts": 400_000, "draws": 4}),
 }
 SIZES = {

@@ -67,7 +67,7 @@ def test_its_json_has_plain_names(pendmap_command: Run, tmp_path: Path) -> None:
 
 
 def test_json_alone_needs_no_disk(pendmap_command: Run) -> None:
-    run = pendmap_command(*"bifurcation --p 0.2:0.4:3 --dry-run --json".split())
+    run = pendmap_command(*["bifurcation", "--p", "0.2:0.4:3", "--dry-run", "--json"])
     assert json.loads(run.stdout)["disk_bytes"] == 0
 
 
@@ -76,13 +76,13 @@ def test_it_is_refused_beside(pendmap_command: Run, tmp_path: Path, other: str) 
     words = f"basins --grid 10 --out map.zarr --dry-run {other}"
     run = pendmap_command(*words.split())
     assert run.returncode == 2
-    assert f"--dry-run must be given without {other.split()[0]}" in run.stderr
+    assert f"--dry-run must be given without {other.split(maxsplit=1)[0]}" in run.stderr
     assert len(run.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_dry_run_refuses_what_the_command_refuses(pendmap_command: Run) -> None:
-    run = pendmap_command(*"basins --grid 10 --tol 1 --dry-run".split())
+    run = pendmap_command(*["basins", "--grid", "10", "--tol", "1", "--dry-run"])
     assert run.returncode == 2
     assert "--tol" in run.stderr
 
