@@ -134,8 +134,8 @@ def compare(
     free: list[RunComparison] = []
     forced: list[ForcedComparison] = []
     out: list[tuple[str, str]] = []
-    for k, run in enumerate(experiment.runs):
-        own = part(progress, k, len(experiment.runs))
+    driven = [run.name for run in experiment.runs if run.kind != "free"]
+    for run in experiment.runs:
         try:
             _check_comparable(model, run)
             if run.kind == "free":
@@ -143,7 +143,11 @@ def compare(
             else:
                 forced.append(
                     compare_forced(
-                        model, run, ensemble or Ensemble(), threads=threads, progress=own
+                        model,
+                        run,
+                        ensemble or Ensemble(),
+                        threads=threads,
+                        progress=part(progress, driven.index(run.name), len(driven)),
                     )
                 )
         except (FitDiverged, InputError) as error:  # the other runs are still compared
