@@ -37,6 +37,21 @@ def counted(count: int, noun: str, several: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {several or noun + 's'}"
 
 
+def duration(seconds: float) -> str:
+    """Return ``75 seconds``, ``3 minutes``, ``5 hours``, ``4 days``: two of a unit or more."""
+    for size, word in ((86400.0, "day"), (3600.0, "hour"), (60.0, "minute")):
+        if seconds >= 2 * size:
+            return counted(round(seconds / size), word)
+    return counted(max(1, round(seconds)), "second")
+
+
+def size_of(size: float) -> str:
+    """Return a number of bytes as ``0.3 MB``, ``45 MB``, ``1.2 GB``."""
+    power = max(2, min(4, int(math.log10(max(size, 1)) / 3)))
+    scaled, unit = size / 1000**power, ("MB", "GB", "TB")[power - 2]
+    return f"{scaled:.0f} {unit}" if scaled >= 10 else f"{scaled:.2g} {unit}"  # noqa: PLR2004
+
+
 def listed(texts: Sequence[str], most: int) -> str:
     """Return the first ``most`` texts joined by commas, with ``, ...`` if there are more."""
     return ", ".join(texts[:most]) + (", ..." if len(texts) > most else "")

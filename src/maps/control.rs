@@ -48,6 +48,35 @@ impl Control {
     }
 }
 
+/// Parts of a computation in an order that spreads every beginning of it over the whole, so that the time of the first
+/// ones tells that of all. Steps are nearly the golden section of the whole, whose multiples are even (Knuth, The Art
+/// of Computer Programming 3, section 6.4).
+#[derive(Clone, Copy, Debug)]
+pub struct Spread {
+    count: usize,
+    step: usize,
+}
+
+impl Spread {
+    /// The order of `count` parts.
+    #[must_use]
+    pub fn of(count: usize) -> Self {
+        let nearest = (count as f64 * 0.618_033_988_749_895) as usize;
+        let step = (nearest.max(1)..).find(|step| coprime(*step, count)).unwrap_or(1);
+        Self { count, step }
+    }
+
+    /// The part in place `k` of the order, for `k` below the count.
+    #[must_use]
+    pub fn part(&self, k: usize) -> usize {
+        (k as u128 * self.step as u128 % self.count as u128) as usize
+    }
+}
+
+fn coprime(a: usize, b: usize) -> bool {
+    if b == 0 { a == 1 } else { coprime(b, a % b) }
+}
+
 /// Largest number of workers; more only wait for one another.
 const MOST_THREADS: usize = 256;
 

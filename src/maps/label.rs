@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI16, AtomicI32, AtomicUsize, Ordering};
 
-use super::control::Control;
+use super::control::{Control, Spread};
 use super::finite_time::FiniteTime;
 use super::starts::Starts;
 use crate::attractor::Catalogue;
@@ -83,6 +83,7 @@ struct Shared<'a> {
     picks: Option<&'a [usize]>,
     control: &'a Control,
     next: AtomicUsize,
+    tasks: Spread,
     label: Vec<AtomicI16>,
     settle: Vec<AtomicI32>,
     turns: Vec<AtomicI32>,
@@ -116,9 +117,12 @@ impl Source for Worker<'_> {
 
     fn next(&mut self) -> Option<(usize, State)> {
         if self.range.is_empty() {
-            let begin = self.shared.next.fetch_add(TAKE, Ordering::Relaxed);
-            let end = (begin + TAKE).min(self.shared.count());
-            self.range = begin..end.max(begin);
+            let count = self.shared.count();
+            let next = self.shared.next.fetch_add(1, Ordering::Relaxed);
+            if next < count.div_ceil(TAKE) {
+                let begin = self.shared.tasks.part(next) * TAKE;
+                self.range = begin..(begin + TAKE).min(count);
+            }
         }
         self.range.next().map(|k| (k, self.shared.start(k)))
     }
@@ -189,6 +193,7 @@ pub fn label(
         picks,
         control,
         next: AtomicUsize::new(0),
+        tasks: Spread::of(count.div_ceil(TAKE)),
         label: (0..count).map(|_| AtomicI16::new(UNDECIDED)).collect(),
         settle: (0..count).map(|_| AtomicI32::new(NEVER)).collect(),
         turns: (0..count).map(|_| AtomicI32::new(0)).collect(),

@@ -1,9 +1,11 @@
 //! The attractors over a plane of two parameters: all blocks of a [`Survey`] in one process.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
 use super::cell::Cell;
-use super::control::{Control, pool};
+use super::control::{Control, Spread, pool};
 use super::resolution::Resolution;
 use super::survey::{Block, Survey};
 use crate::error::Error;
@@ -126,9 +128,11 @@ pub fn parameter_map(
         let survey = Survey::new(base, request)?;
         control.begin(survey.plane().size().iter().product());
         let all = 0..survey.blocks();
-        let search = |block| survey.search(block, control);
-        let mut blocks: Vec<Block> =
-            all.clone().into_par_iter().map(search).collect::<Result<_, Error>>()?;
+        let order = Spread::of(survey.blocks());
+        let search = |k| Ok((order.part(k), survey.search(order.part(k), control)?));
+        let found = all.clone().into_par_iter().map(search);
+        let found: BTreeMap<usize, Block> = found.collect::<Result<_, Error>>()?;
+        let mut blocks: Vec<Block> = found.into_values().collect();
         for pass in 1..=survey.passes() {
             let known = &blocks;
             let exchange = |block| survey.exchange(pass, block, |other| &known[other], control);

@@ -6,7 +6,7 @@ use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
-use pendmap::maps::control::{Control, pool};
+use pendmap::maps::control::{Control, Spread, pool};
 use pendmap::maps::finite_time::finite_time;
 use pendmap::model::Pendulum;
 
@@ -119,5 +119,22 @@ fn progress_ends_at_the_number_of_cells() {
         let omega = if p > 1.0 { 1.8 } else { 2.0 };
         basins(&driven(0.1, p, omega), &plane(30), &unchecked(), &control).expect("a map");
         assert_eq!(control.progress(), (900, 900));
+    }
+}
+
+#[test]
+fn work_is_spread_and_done_once() {
+    for count in [1, 2, 3, 10, 64, 169, 1000, 31_250] {
+        let order = Spread::of(count);
+        let parts: Vec<usize> = (0..count).map(|k| order.part(k)).collect();
+        let mut sorted = parts.clone();
+        sorted.sort_unstable();
+        assert!(sorted.into_iter().eq(0..count));
+        // The first tenth meets each fifth of the whole about as often.
+        for fifth in 0..5 {
+            let first = &parts[..count / 10];
+            let met = first.iter().filter(|part| **part * 5 / count == fifth).count();
+            assert!(met.abs_diff(first.len() / 5) <= 2, "{met} of {} at {count}", first.len());
+        }
     }
 }

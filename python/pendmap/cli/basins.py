@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
 from pendmap.cli.types import AXIS, whole
@@ -56,5 +55,4 @@ def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, 
     if outputs.shows_progress:  # the summary repeats it after the computation
         for line in unlimited_rotation(without_dimensions(model)[0]):
             click.echo(line, err=True)
-    price.say(model, grid.cells, given, quiet=outputs.quiet)
     return {"grid": grid, **given}

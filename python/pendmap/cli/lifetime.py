@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pendmap.cli import price
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
 from pendmap.cli.types import whole
 from pendmap.errors import MOST_PERIODS
-
-if TYPE_CHECKING:
-    from pendmap.cli.show import Outputs
-    from pendmap.model import Pendulum, Rig
 
 _STARTS = (100, 10_000_000)
 
@@ -39,7 +34,6 @@ _STARTS = (100, 10_000_000)
     draws_option,
     stored=True,
 )
-def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401
+def command(*_: object, **given: Any) -> dict[str, Any]:  # noqa: ANN401
     """Measure how long transient chaos lives, or find that it persists."""
-    price.say(model, given["starts"], given, quiet=outputs.quiet)
     return given

@@ -140,6 +140,9 @@ search_options = added(
 drawing_options = added(plot_option, rerun_option, view_option, json_option("; alone, no files"))
 store_options = added(
     click.option("--resume", is_flag=True, help="Go on with the unfinished run in --out F.zarr."),
+    click.option(
+        "--dry-run", is_flag=True, help="Only tell time, memory and disk, from timed samples."
+    ),
     option(
         "--part",
         PART,

@@ -15,6 +15,8 @@ from pendmap.cli.types import PICTURES, default_file, output_file
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+_LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
+
 
 @click.command("paper")
 @click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
@@ -62,6 +64,8 @@ def command(  # noqa: PLR0913 (an option each)
     folder = out or Path()
     for key in keys if plot is None else ():  # before anything is computed
         default_file(folder / _name(key))
+    if _LONG in keys and not quiet:
+        click.echo(f"Figure {_LONG} takes about 2 minutes.", err=True)
     written = write_all(_files(keys, folder, plot, seed))
     if as_json:
         write_json({"files": written})

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.forecast import Forecast
 from pendmap.cli.options import RESULTS
 from pendmap.cli.types import Address, default_file
 from pendmap.errors import InputError, NotWrittenError, named, one_line
@@ -106,9 +107,15 @@ class Outputs:
 
     @contextlib.contextmanager
     def progress(self, name: str) -> Iterator[Callable[[int, int], None] | None]:
-        """Show a progress bar with the time left on stderr; yield its callback, or None."""
-        if not self.shows_progress:
+        """Yield the callback of progress, None with --quiet.
+
+        On stderr a line tells the time of long work; a terminal has a bar with the time left.
+        """
+        if self.quiet:
             yield None
+            return
+        if not sys.stderr.isatty():
+            yield Forecast(functools.partial(click.echo, err=True)).report
             return
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -121,8 +128,10 @@ class Outputs:
         )
         with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
             task = bar.add_task(name, total=None)
+            forecast = Forecast(bar.console.print)
 
             def report(done: int, total: int) -> None:
+                forecast.report(done, total)
                 bar.update(task, completed=done, total=total or None)
 
             yield report

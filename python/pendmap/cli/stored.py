@@ -30,16 +30,25 @@ class Kept:
     mix: bool
     count: int | None
     scheduler: str | None
+    dry_run: bool
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Kept:
-        """Remove these options from ``given``."""
-        return cls(**{field.name: given.pop(field.name) for field in dataclasses.fields(cls)})
+        """Remove these options from ``given``; refuse what a dry run cannot have."""
+        kept = cls(**{field.name: given.pop(field.name) for field in dataclasses.fields(cls)})
+        if kept.dry_run:
+            others = {"--part": kept.part, "--resume": kept.resume, "--view": given["view"]}
+            for option in (option for option, other in others.items() if other):
+                raise click.UsageError(f"--dry-run must be given without {option}, got both")
+        return kept
 
     def run(
         self, analysis: partial[xr.Dataset], outputs: Outputs, name: str, schema: Schema
     ) -> None:
         """Compute a result, write its files, and show it or what a part has done."""
+        if self.dry_run:
+            self._tell_cost(analysis, outputs, schema)
+            return
         store = outputs.store
         if analysis.keywords.get("draws") and not isinstance(store, Address):
             store = None  # draws are written when all are computed
@@ -58,6 +67,16 @@ class Kept:
             show(dataset, outputs, schema)
         else:
             show(dataset, dataclasses.replace(outputs, out=None), schema, [str(store)])
+
+    def _tell_cost(self, analysis: partial[xr.Dataset], outputs: Outputs, schema: Schema) -> None:
+        """Report what the command would take."""
+        from pendmap.cli.dry_run import show_cost
+
+        count = self.count
+        if self.scheduler is not None:
+            with workers(self.scheduler, count, quiet=outputs.quiet) as client:
+                count = max(1, sum(client.nthreads().values()))
+        show_cost(analysis, outputs, schema.kind, count)
 
 
 @contextlib.contextmanager

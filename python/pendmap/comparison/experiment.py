@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.numerics import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
 from pendmap.comparison.free import MODEL, RunComparison, compare_free
 from pendmap.errors import (
@@ -133,6 +134,7 @@ def compare(
     free: list[RunComparison] = []
     forced: list[ForcedComparison] = []
     out: list[tuple[str, str]] = []
+    driven = [run.name for run in experiment.runs if run.kind != "free"]
     for run in experiment.runs:
         try:
             _check_comparable(model, run)
@@ -141,7 +143,11 @@ def compare(
             else:
                 forced.append(
                     compare_forced(
-                        model, run, ensemble or Ensemble(), threads=threads, progress=progress
+                        model,
+                        run,
+                        ensemble or Ensemble(),
+                        threads=threads,
+                        progress=part(progress, driven.index(run.name), len(driven)),
                     )
                 )
         except (FitDiverged, InputError) as error:  # the other runs are still compared

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 STEP: Final = "map"
 _STATE: Final = "sweep"  # Record that all blocks need: there is nothing in it
-_SIDES: Final = {1: (16,), 2: (8, 8)}
+SIDES: Final = {1: (16,), 2: (8, 8)}
 """Models of a block along each parameter: one search alone among 16, or 64."""
 _POINTS: Final = 128  # Largest number of points of an attractor that are kept
 PLANES: Final = ("basins", "only_chaos", "conservative")
@@ -91,7 +91,7 @@ class SweepTiles:
     @property
     def side(self) -> Place:
         """Number of models of a block along each parameter."""
-        return _SIDES[len(self.varied)]
+        return SIDES[len(self.varied)]
 
     @property
     def blocks(self) -> int:
