@@ -141,7 +141,7 @@ class Tally:
         high = betaincinv(wrong + 1, drawn - wrong, 0.975) if wrong < drawn else 1.0
         return {
             "adaptive": 1,
-            "computed_share": 1 - rest,
+            "computed_share": (self._cells[COMPUTED:].sum() / self._cells.sum()).item(),
             "audited": drawn,
             "audited_wrong": wrong,
             "label_error": rest * wrong / max(drawn, 1),
