@@ -24,16 +24,19 @@ PLANES: tuple[dict[str, Any], ...] = (
     {"gamma": 0.1, "p": 0.6, "omega": 2.0},
     {"gamma": 0.05, "p": 0.4, "omega": 2.0},
     {"gamma": 0.2, "p": 0.8, "omega": 1.8},
-    {"gamma": 0.3, "p": 1.2, "omega": 1.8},
-    {"gamma": 0.1, "p": 0.6, "omega": 2.0, "theta_r": 0.02},
-    {"gamma": 0.1, "p": 0.6, "omega": 2.0, "torque": 0.1},
+    {"gamma": 0.3, "p": 0.5, "omega": 2.0, "torque": 0.6},
+    {"gamma": 0.1, "p": 0.0, "omega": 2.0, "torque": 0.5},
+    {"gamma": 0.1, "p": 0.0, "omega": 2.0, "theta_r": 0.1},
+    {"gamma": 0.5, "p": 1.2, "omega": 1.6},
     {"gamma": 0.2, "p": 0.5, "omega": 2.0, "torque": 0.4},
+    {"gamma": 0.1, "p": 0.6, "omega": 2.0, "theta_r": 0.02},
     {"gamma": 0.1, "p": 0.8, "omega": 2.0},
+    {"gamma": 0.2, "p": 0.8, "omega": 1.8, "theta_r": 0.05},
     {"gamma": 0.1, "p": 1.0, "omega": 2.0},
     {"gamma": 0.1, "p": 1.7, "omega": 2.0},
-    {"gamma": 0.05, "p": 1.1, "omega": 1.9, "theta_r": 0.05},
     {"gamma": 0.1, "p": 1.5, "omega": 1.1},
 )
+"""Smooth boundaries first; then those that are fractal here and there, then everywhere."""
 
 
 def timed(
