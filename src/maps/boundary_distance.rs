@@ -81,11 +81,18 @@ impl Nearness {
         for d in &distance {
             within[*d as usize] += 1;
         }
+        // Sorting by counting: the cells of a distance come after those that are nearer, in rising order.
+        let mut next = vec![0; within.len()];
         for d in 1..within.len() {
+            next[d] = within[d - 1];
             within[d] += within[d - 1];
         }
-        let mut order: Vec<u32> = (0..labels.len() as u32).collect();
-        order.sort_by_key(|k| distance[*k as usize]);
+        let mut order = vec![0; labels.len()];
+        for (cell, d) in (0..).zip(&distance) {
+            let place = &mut next[*d as usize];
+            order[*place] = cell;
+            *place += 1;
+        }
         Self { order, within, columns }
     }
 

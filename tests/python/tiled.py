@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 TILE = 1500
 _DRY = Pendulum(gamma=0.05, theta_r=0.05, p=1.1, omega=1.9)
+_SLOW = Pendulum(gamma=0.03, p=0.5, omega=2.6)  # A further search finds attractors
 _WINDOW = {"p": (0.2, 2.0, 20), "omega": (1.5, 2.2, 18)}
 _SMALL = {"p": (0.4, 0.9, 9), "omega": (1.8, 2.2, 9)}
 _STARTS = np.random.default_rng(1).uniform(-3, 3, (2, 1500))
@@ -32,6 +33,7 @@ _CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, no
 CASES: dict[str, Callable[..., xr.Dataset]] = {
     "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(103), **keep),
     "chaos": lambda **keep: pendmap.basins(Pendulum(p=1.5, omega=1.1), Grid.square(103), **keep),
+    "adaptive": lambda **keep: pendmap.basins(_SLOW, Grid.square(163), adaptive=True, **keep),
     "map": lambda **keep: pendmap.parameter_map(Pendulum(), _WINDOW, starts=3, **keep),
     "sweep": lambda **keep: pendmap.sweep(Pendulum(), {"p": (0.4, 1.6, 40)}, grid=16, **keep),
     "plane": lambda **keep: pendmap.sweep(Pendulum(), _SMALL, grid=10, **keep),

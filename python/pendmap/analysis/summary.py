@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.analysis import adaptive
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.result import of_model, rows
 from pendmap.files import facts
@@ -65,6 +66,7 @@ def summarise(
                 "With dry friction alone (gamma = 0) phase area shrinks only where the motion "
                 "turns back: a rotation sustained by the drive approaches no attractor."
             )
+    lines += adaptive.said(a)
     lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "

@@ -133,15 +133,18 @@ def _marker(
 def _layer(
     dataset: xr.Dataset, layer: str, cells: int, window: tuple[tuple[float, float], ...]
 ) -> list[Mark]:
-    """Return one layer; cells without a value have the colour of their label."""
+    """Return one layer; cells without a value have the colour of their label, or are grey."""
     label = plane.pixels(dataset, dataset["label"], cells)
     colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
-    classes = [("", colour) for colour in colours]
-    labels = Image(label.astype(np.int16) + 1, *window, classes=classes)
+    classes = [("", colour) for colour in (*colours, palette.FILLED)]
+    shown = label.astype(np.int16) + 1
+    if layer != "labels" and has_filled(dataset):
+        shown[filled(dataset, cells)] = len(colours)
+    labels = Image(shown, *window, classes=classes)
     if layer == "labels":
         return [labels]
-    values = plane.pixels(dataset, dataset[VARIABLES[layer]], cells).astype(np.float32)
-    absent = (values < 0) if layer == "settle" else ~np.isfinite(values) | (label < 0)
+    own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
+    absent, values = missing(dataset, layer, own) | (label < 0), own.astype(np.float32)
     if layer == "settle":
         np.maximum(values, 1.0, out=values)
     values[absent] = np.nan
@@ -208,6 +211,24 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
     note = [(exponents(dataset), QUIET)]
     title = "its attractor, once a period"
     return Panel("section", title, *sides, dots, share=SMALL, note=note)
+
+
+def missing(dataset: xr.Dataset, layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return which values of a layer are missing: of cells that never settled or were filled."""
+    if layer == "settle":
+        return np.asarray(values < 0)
+    fill = dataset[VARIABLES[layer]].attrs.get("_FillValue", np.nan)
+    return np.asarray(~np.isfinite(values) | (values == fill))
+
+
+def has_filled(dataset: xr.Dataset) -> bool:
+    """Return whether an adaptive map has cells that were not computed."""
+    return "computed" in dataset and not bool(dataset["computed"].all())
+
+
+def filled(dataset: xr.Dataset, cells: int) -> npt.NDArray[np.bool_]:
+    """Return which pixels of an image are cells that were not computed."""
+    return np.asarray(plane.pixels(dataset, dataset["computed"], cells) == 0)
 
 
 def reliable(dataset: xr.Dataset) -> bool:
@@ -301,10 +322,11 @@ def what(dataset: xr.Dataset, layer: str) -> str:
         turns = f"after {periods}"
     elif not settles(dataset):
         turns = f"after {counted(int(dataset.attrs['max_periods']), 'period')}"
+    grey = "; filled cells grey" if has_filled(dataset) else ""
     return {
         "labels": "basins of attraction",
-        "settle": "settle time",
-        "turns": f"net turns {turns}",
+        "settle": f"settle time{grey}",
+        "turns": f"net turns {turns}{grey}",
         "exponent": f"finite-time exponent over {periods}",
         "probability": f"most likely end over {draws}",
         "entropy": f"doubt of the end over {draws}",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pendmap.analysis.adaptive import Tally
 from pendmap.charts import plane
 from pendmap.errors import InputError
 from pendmap.files import facts, with_facts
@@ -49,7 +50,16 @@ _CELLS = {
 }
 """Variables over the axes of an image."""
 
-_OF_THE_WHOLE = ("basin_entropy", "mean_periods", "boundary_", "uncertainty_", "neighbours_")
+_OF_THE_WHOLE = (
+    "basin_entropy",
+    "mean_periods",
+    "boundary_",
+    "uncertainty_",
+    "neighbours_",
+    "computed_share",
+    "audited",
+    "label_error",
+)
 """Prefixes of facts that hold for a whole map alone."""
 
 _BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is never converted whole
@@ -122,7 +132,10 @@ def _rising(dataset: xr.Dataset) -> xr.Dataset:
 
 def _basins(dataset: xr.Dataset) -> xr.Dataset:
     """Recompute the shares of a part of a basin map from its cells."""
-    label, settle = dataset["label"].values, dataset["settle_periods"].values
+    label = dataset["label"].values
+    cells = {
+        name: dataset[name].values for name in ("settle_periods", "computed") if name in dataset
+    }
     whole = int(dataset.attrs["cells"])
     ids = dataset["id"].values.astype(int)
     present = np.unique(label)
@@ -131,12 +144,10 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
     if label.size == whole:
         return dataset
     counts = np.zeros(int(ids.max(initial=0)) + 2, dtype=np.int64)
-    settled, total, longest = 0, 0, -1
+    tally = Tally()
     for rows in np.array_split(np.arange(label.shape[0]), -(-label.size // _BLOCK)):
         counts += np.bincount(label[rows].ravel().astype(np.int64) + 1, minlength=counts.size)
-        known = settle[rows][settle[rows] >= 0]
-        settled, total = settled + known.size, total + int(known.sum())
-        longest = max(longest, int(known.max(initial=-1)))
+        tally.add({name: values[rows] for name, values in cells.items()})
     share = counts / label.size
     fraction = share[ids + 1]
     error = np.sqrt(fraction * (1 - fraction) / label.size)
@@ -149,8 +160,8 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
         cells=label.size,
         failed=float(share[0]),
         undecided=float(share[1]),
-        mean_settle=total / settled if settled else -1.0,
-        longest_settle=longest,
+        mean_settle=tally.mean_settle,
+        longest_settle=tally.longest,
     )
     return _note_selection(part, f"{counted(label.size, 'cell')} of {whole}")
 

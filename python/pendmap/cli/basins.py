@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     ),
     option("--layer-periods", whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),
+    click.option(
+        "--adaptive",
+        is_flag=True,
+        help="Compute the cells at boundaries alone, and a sample of the others.",
+    ),
     draws_option,
     stored=True,
 )
