@@ -18,7 +18,7 @@ import numpy as np
 import pendmap
 from benchmarks.peers.report import machine, note, say, table
 from pendmap import _core
-from pendmap.analysis.sweep import with_values
+from pendmap.analysis.varied import with_values
 from pendmap.errors import instruction_set
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from pendmap import _core
 from pendmap.analysis.basin_tiles import TILE, Starts
 from pendmap.analysis.grid import Axis, Grid
-from pendmap.analysis.sweep_tiles import SIDES
+from pendmap.analysis.sweeps.tiles import SIDES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
