@@ -50,8 +50,10 @@ _WORKER: Final = 200 * 2**20  # Memory of a worker without its tile, bytes
 _TILES: Final = {"basins": 32 * TILE, "lifetime": 32 * TILE}  # Memory of large tiles, bytes
 _LABELLED: Final = ("basins", "lifetime")
 """Analyses that search first, then label each start."""
-_BLOCKS: Final = ("parameter_map", "bifurcation")
-"""Analyses whose tiles have one thread each in a store."""
+_BLOCKS: Final = ("parameter_map", "bifurcation", "basin_sweep")
+"""Analyses whose tiles have one thread each in a store, those of a sweep always."""
+_MODELS: Final = 16  # Least number of models of a sample of a sweep
+_MAP: Final = 10_000  # Most cells of a map of its first sample
 _BLOCK: Final = 16  # Cells along a side of a block of a map over parameters
 _CHECKED: Final = 6000  # Starts of the check of labels
 _UNCERTAIN: Final = (30_000, 0.125, 150_000)
@@ -162,8 +164,9 @@ class Request:
 
     def samples(self, run: Run, threads: int) -> Iterator[tuple[Sample, xr.Dataset]]:
         """Yield samples of growing size with their results, until one tells enough."""
-        side = math.prod(SIDES[len(self.counts)]) if self.kind == "basin_sweep" else 1
-        models, cells = min(self.models, side * threads), _FIRST.get(self.kind, _FEW)
+        models, cells = min(self.models, _MODELS), _FIRST.get(self.kind, _FEW)
+        if self.kind == "basin_sweep":  # one search alone among these, as in a block
+            cells = models * min(self.cells // self.models, _MAP)
         found: list[Sample] = []
         while True:
             one, watch = self.fewer(cells, models), _Watch()
@@ -179,12 +182,12 @@ class Request:
                 return
             cells = math.ceil(one.cells * max(_GROWTH, _AIM / max(grown, 1e-4)))
 
-    def seconds(self, samples: Sequence[Sample]) -> float:
-        """Return the time of the request, without the draws."""
+    def seconds(self, samples: Sequence[Sample], *, check: bool = True) -> float:
+        """Return the time of one model of the request; those of draws are not checked."""
         if self.kind == "basin_sweep":
             return self.extended(samples, [sample.seconds for sample in samples])
         last = samples[-1]
-        share = (self.cells + self.checks) / last.cells
+        share = (self.cells + check * self.checks) / last.cells
         return last.fixed + share * (last.seconds - last.fixed)
 
     def extended(self, samples: Sequence[Sample], values: Sequence[float]) -> float:
@@ -235,6 +238,8 @@ def cost(  # noqa: PLR0913 (a request, and how it is computed and written)
     here = _core.default_threads()
     threads = workers or request.arguments["threads"] or here
     used = threads if workers is None else min(threads, here)
+    if request.kind == "basin_sweep":
+        used = 1
     samples: list[Sample] = []
     sizes, times = [], []
     for sample, dataset in request.samples(run, used):
@@ -243,10 +248,11 @@ def cost(  # noqa: PLR0913 (a request, and how it is computed and written)
         sizes.append(size)
         times.append(seconds)
     figures, drawing = _timed(draw, dataset)
-    models = 1 + (request.arguments.get("draws") or 0)
-    seconds = models * request.seconds(samples)
-    if workers is not None or (stored and request.kind in _BLOCKS):
-        rounds = -(-request.tiles // threads)  # a tile has one thread
+    draws = request.arguments.get("draws") or 0
+    seconds = request.seconds(samples) + draws * request.seconds(samples, check=False)
+    of_one = workers is not None or stored or request.kind == "basin_sweep"
+    if of_one and (workers is not None or request.kind in _BLOCKS):  # a tile has one thread
+        rounds = -(-request.tiles // threads)
         seconds *= used * rounds / request.tiles
     seconds += request.extended(samples, times) + drawing
     if request.arguments.get("curves"):

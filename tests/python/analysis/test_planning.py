@@ -94,9 +94,11 @@ def test_a_fixed_part_and_a_part_for_each_cell_are_told(
     )
     drawn = 1 + (request.arguments.get("draws") or 0)
     whole = fixed * request.models + each * (request.cells + request.checks)
+    if kind == "basin_sweep":  # six blocks, two at once
+        whole /= 2
     assert found.seconds == pytest.approx(drawn * whole, rel=1e-6)
     assert found.sample_cells < request.cells
-    assert now[0] < max(0.1 * whole, 60 * fixed)
+    assert now[0] < max(0.1 * whole, 400 * fixed)
     assert found.threads == 2
     assert found.worker_memory_bytes is None
     assert found.disk_bytes > 107
