@@ -62,7 +62,7 @@ impl Spread {
     #[must_use]
     pub fn of(count: usize) -> Self {
         let nearest = (count as f64 * 0.618_033_988_749_895) as usize;
-        let step = (nearest.max(1)..).find(|step| coprime(*step, count)).unwrap_or(1);
+        let step = (nearest.max(1)..=count).find(|step| coprime(*step, count)).unwrap_or(1);
         Self { count, step }
     }
 

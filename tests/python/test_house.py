@@ -24,7 +24,7 @@ LINES = 48_000
 """Ratchet: lines of Python in python/pendmap, in thousands: a small addition changes no limit."""
 DIRECT = 370
 """Ratchet: format specifications of numbers outside formatting.py."""
-INTERNAL = 107
+INTERNAL = 108
 """Ratchet: modules inside packages that tests import."""
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from pendmap.cli.forecast import Forecast
+from pendmap.cli.show import Forecast
 
 if TYPE_CHECKING:
     from pathlib import Path
