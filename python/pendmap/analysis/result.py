@@ -217,12 +217,13 @@ def variable(  # noqa: PLR0913 (attributes of CF)
         units, long_name = "1", f"{long_name}, in {units}"
     attributes: dict[str, Any] = {"units": units, "long_name": long_name, "comment": comment}
     attributes = {key: text for key, text in attributes.items() if text}
+    dtype = getattr(values, "dtype", None) or np.asarray(values).dtype  # reads no lazy array
     if flags is not None:
-        attributes["flag_values"] = np.array([*flags], dtype=np.asarray(values).dtype)
+        attributes["flag_values"] = np.array([*flags], dtype=dtype)
         meanings = (_NOT_IN_FLAGS.sub("_", meaning) for meaning in flags.values())
         attributes["flag_meanings"] = " ".join(meanings)
     if missing is not None:
-        attributes["_FillValue"] = np.asarray(values).dtype.type(missing)
+        attributes["_FillValue"] = dtype.type(missing)
     return dims, values, attributes
 
 
