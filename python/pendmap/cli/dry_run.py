@@ -54,7 +54,7 @@ _BYTES: Final = {
     "bifurcation": 8192,
 }
 """Memory of a cell at the peak, bytes, measured on cells with few attractors."""
-_STORED: Final = {"basins": 12}  # Likewise, where a store has the cells
+_IN_WORK: Final = {"basins": 4 * TILE}  # Cells in memory at most, where a store has the others
 _PROCESS: Final = 320 * 2**20  # Memory of a process with all libraries, bytes
 _WORKER: Final = 200 * 2**20  # Memory of a worker without its tile, bytes
 _TILES: Final = {"basins": 32 * TILE, "lifetime": 32 * TILE}  # Memory of large tiles, bytes
@@ -251,9 +251,10 @@ def cost(  # noqa: PLR0913 (a request, and how it is computed and written)
     if request.kind == "basin_sweep":
         used = 1
     samples: list[Sample] = []
-    sizes, times = [], []
+    sizes, times, least = [], [], 0  # least: memory at the peak of the first sample
     for sample, dataset in request.samples(run, used):
         samples.append(sample)
+        least = least or _peak()
         size, seconds = _timed(save, dataset)
         sizes.append(size)
         times.append(seconds)
@@ -271,15 +272,16 @@ def cost(  # noqa: PLR0913 (a request, and how it is computed and written)
     # The first sample imports what the analysis needs.
     others = samples[0].seconds + times[0] - samples[1].seconds - times[1] if samples[1:] else 0.0
     seconds += begun + max(others, 0.0)
-    each = _STORED.get(request.kind, _BYTES[request.kind]) if stored else _BYTES[request.kind]
-    grown = each * max(request.cells - samples[-1].cells, 0)
+    peak, cells = _peak(), request.cells - samples[-1].cells
+    if stored and request.kind in _IN_WORK:
+        peak, cells = least, min(request.cells, _IN_WORK[request.kind])
     return Cost(
         cells=request.cells,
         starts=request.starts,
         tiles=request.tiles,
         seconds=seconds,
         threads=threads,
-        memory_bytes=_peak() + grown,
+        memory_bytes=peak + _BYTES[request.kind] * max(cells, 0),
         worker_memory_bytes=None if workers is None else _WORKER + _TILES.get(request.kind, 0),
         disk_bytes=round(request.extended(samples, sizes)) + figures,
         sample_cells=samples[-1].cells,
