@@ -71,7 +71,7 @@ def test_all_figures_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.chdir(tmp_path)
     run = CliRunner().invoke(command, ["all", "--out", "out", "--json"])
     assert run.exit_code == 0, run.output
-    files = json.loads(run.output)["files"]
+    files = json.loads(run.stdout)["files"]
     names = [*(f"figure_{k}.png" for k in range(1, 10)), "table_1.csv"]
     assert files == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(names)
