@@ -61,9 +61,10 @@ def executor_of(
             quiet = {"distributed.worker.memory.terminate": False}
             stack.enter_context(dask.config.set(quiet))
             # The scheduler's status page listens even when it is off, at 8787 unless told.
-            local = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
+            page = "127.0.0.1:0"
+            local = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": page}
             try:
-                target = stack.enter_context(distributed.LocalCluster(count, **local))
+                target = stack.enter_context(distributed.LocalCluster(**local))
             except (OSError, RuntimeError) as error:
                 raise InputError(f"workers cannot be started: {error}") from error
         try:

@@ -44,7 +44,9 @@ def pool() -> Iterator[Executor]:
 @contextlib.contextmanager
 def local_cluster() -> Iterator[Executor]:
     with (
-        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=ANY_PORT) as own,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=ANY_PORT
+        ) as own,
         distributed.Client(own, set_as_default=False) as client,
     ):
         yield client
@@ -111,6 +113,7 @@ def test_workers_start_where_the_port_of_dask_is_taken() -> None:
             stack.enter_context(socket.create_server(("", 8787)))
         executor = stack.enter_context(executor_of(workers=1))
         assert executor.submit(sum, (1, 2)).result() == 3
+        assert len(executor.nthreads()) == 1
 
 
 @pytest.mark.thorough
