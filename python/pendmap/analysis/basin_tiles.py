@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     Cells = dict[str, NDArray[Any]]
 
 TILE: Final = 2**20
-"""Number of starts of a tile in a store: 0.3 CPU seconds of a smooth map, 5 of a chaotic one."""
+"""Largest number of starts of a tile: 0.3 CPU seconds of a smooth map, 5 of a chaotic one."""
+_LEAST_TILE: Final = 2**18
+_TILES: Final = 64  # Least number of tiles of a map of larger ones: workers end together
 _BOX: Final = 5  # Tiles begin with a row of boxes of the basin entropy
 _SAMPLE: Final = 256  # Largest number of undecided starts from which a further search begins
 _CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int32"}
@@ -70,6 +72,11 @@ _PLAN: Final = (
 
 
 _NOTHING: Final = np.zeros(0)
+
+
+def tile_of(cells: int, most: int = TILE) -> int:
+    """Return the number of starts of a tile of a map."""
+    return min(most, max(_LEAST_TILE, cells // _TILES))
 
 
 class Starts:

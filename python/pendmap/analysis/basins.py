@@ -11,7 +11,7 @@ import xarray as xr
 from pendmap.analysis import adaptive as refinement
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.basin_dataset import LAYERS, boundary, cells_of, uncertain_starts
-from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts
+from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts, tile_of
 from pendmap.analysis.draws import drawn
 from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.grid import Grid, coordinate, starts
@@ -281,7 +281,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         own = same(pendulum, check=check, progress=several.first)
         return basins_over(own, several, partial(same, check=False))
     starts_of = Starts(grid.bare(units))
-    cells, rate = TILE if kept.tiled else None, units.given(1.0, RATE)
+    cells = tile_of(grid.cells, TILE) if kept.tiled else None
+    rate = units.given(1.0, RATE)
     check_flag("adaptive", adaptive)
     of_tile = kept.threads(threads)
     job = BasinTiles(bare, starts_of, choices, rate, cells, threads=of_tile, adaptive=adaptive)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis import result, survival
-from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts
+from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts, tile_of
 from pendmap.analysis.basins import choices_of, ends_of_list
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import FASTEST
@@ -228,7 +228,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         request |= {"theta": angles, "velocity": speeds}
     states = Starts(None, angles, units.bare(speeds, VELOCITY))
     choices = choices_of(numerics, None, check=False)
-    cells = TILE if kept.tiled else None
+    cells = tile_of(angles.size, TILE) if kept.tiled else None
     rate, of_tile = units.given(1.0, RATE), kept.threads(threads)
     job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=of_tile)
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from pendmap import _core
-from pendmap.analysis.basin_tiles import TILE, Starts
+from pendmap.analysis.basin_tiles import TILE, Starts, tile_of
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.sweeps.tiles import SIDES
 from pendmap.cli.show import write_json
@@ -138,7 +138,7 @@ class Request:
         grid = self.arguments.get("grid")
         sides = (1, self.cells) if grid is None else (grid.theta.count, grid.velocity.count)
         starts = Starts(((0.0, 1.0, sides[0]), (0.0, 1.0, sides[1])))
-        return -(-sides[1] // starts.height(TILE))
+        return -(-sides[1] // starts.height(tile_of(self.cells)))
 
     def fewer(self, cells: int, models: int) -> Request:
         """Return the request with about this number of cells, at least of this many models."""
