@@ -17,7 +17,7 @@ pub struct Effort {
     pub tries: usize,
     /// Number of uncaptured trajectories that are observed.
     pub watched: usize,
-    /// The same where no attractor is known that could capture them.
+    /// Number of uncaptured trajectories that are observed while no attractor is known.
     pub watched_alone: usize,
     /// Uncaptured trajectories are observed for this multiple of the first bound.
     pub watch: u32,
