@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.types import (
+    AXIS,
     INSTRUCTION_SET,
     NUMBER,
     PART,
@@ -28,6 +29,8 @@ from pendmap.errors import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from pendmap.analysis.grid import Grid
 
     Command = Callable[..., Any]
     Decorator = Callable[[Command], Command]
@@ -128,6 +131,34 @@ start_options = added(
     option("--theta", NUMBER, "Angle at the start, rad.", 1.0),
     option("--velocity", NUMBER, "Velocity at the start, in SI rad/s.", 0.0),
 )
+
+
+def window_options(cells: int) -> Decorator:
+    """Return the options of a window with this many cells on each side by default."""
+    return added(
+        option("--theta", AXIS, f"Initial angles, rad.  [default: -pi:pi:{cells}]"),
+        option(
+            "--velocity",
+            AXIS,
+            f"Initial velocities, in SI rad/s.  [default: -3:3:{cells}, in SI times w0]",
+        ),
+        option("--grid", whole(1, MOST_CELLS), "Cells on each side of the window."),
+    )
+
+
+def take_window(given: dict[str, Any], cells: int, w0: float) -> Grid:
+    """Remove the options of a window from ``given``; return their grid."""
+    from pendmap.analysis.grid import Grid
+
+    theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
+    if count is not None and (theta is not None or velocity is not None):
+        raise click.UsageError(
+            "--grid must be given alone; --theta and --velocity name their own cells"
+        )
+    usual = Grid.of(count, cells, w0)
+    return Grid(theta or usual.theta, velocity or usual.velocity)
+
+
 search_options = added(
     option("--starts", whole(1, MOST_CELLS), "Starts each.", 9),
     tol_option,

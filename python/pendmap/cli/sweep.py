@@ -9,13 +9,23 @@ import click
 
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.model_options import varied_model_options
-from pendmap.cli.options import max_periods_option, option, seed_option, tol_option
-from pendmap.cli.types import AXIS, whole
-from pendmap.errors import MOST_CELLS, MOST_PERIODS
+from pendmap.cli.options import (
+    max_periods_option,
+    option,
+    seed_option,
+    take_window,
+    tol_option,
+    window_options,
+)
+from pendmap.cli.types import whole
+from pendmap.errors import MOST_PERIODS
 
 if TYPE_CHECKING:
     from pendmap.cli.show import Outputs
     from pendmap.model import Pendulum, Rig
+
+
+_CELLS = 100  # Default number of cells on each side
 
 
 @analysis_command(
@@ -26,11 +36,7 @@ if TYPE_CHECKING:
         show_default=True,
         help="What is done for each model: basins.",
     ),
-    option("--theta", AXIS, "Initial angles, rad.  [default: -pi:pi:100]"),
-    option(
-        "--velocity", AXIS, "Initial velocities, in SI rad/s.  [default: -3:3:100, in SI times w0]"
-    ),
-    option("--grid", whole(1, MOST_CELLS), "Cells on each side of the window."),
+    window_options(_CELLS),
     tol_option,
     max_periods_option("Bound after which a start is undecided.  [default: as for basins]"),
     option("--layer-periods", whole(1, MOST_PERIODS), "Periods of planes without basins."),
@@ -44,16 +50,7 @@ def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, 
     Parameters are ranges A:B:N, like --p 0.5:2:61, or by name: --vary quadratic_drag.q 0:0.1:20.
     Each attractor has one number in all maps.
     """
-    from pendmap.analysis.basin_sweep import DEFAULT_CELLS
-    from pendmap.analysis.grid import Grid
-
-    theta, velocity, count = (given.pop(name) for name in ("theta", "velocity", "grid"))
-    if count is not None and (theta is not None or velocity is not None):
-        raise click.UsageError(
-            "--grid must be given alone; --theta and --velocity name their own cells"
-        )
-    usual = Grid.of(count, DEFAULT_CELLS, model.units.w0)
-    grid = Grid(theta or usual.theta, velocity or usual.velocity)
+    grid = take_window(given, _CELLS, model.units.w0)
     models = math.prod(span.cells for span in given["ranges"].values())
     outputs.check_room(models * grid.cells)
     return {"grid": grid, **given}
