@@ -62,7 +62,6 @@ _LABELLED: Final = ("basins", "lifetime")
 """Analyses that search first, then label each start."""
 _BLOCKS: Final = ("parameter_map", "bifurcation", "basin_sweep")
 """Analyses whose tiles have one thread each in a store, those of a sweep always."""
-_MODELS: Final = 16  # Least number of models of a sample of a sweep
 _MAP: Final = 10_000  # Most cells of a map of its first sample
 _BLOCK: Final = 16  # Cells along a side of a block of a map over parameters
 _CHECKED: Final = 6000  # Starts of the check of labels
@@ -174,8 +173,9 @@ class Request:
 
     def samples(self, run: Run, threads: int) -> Iterator[tuple[Sample, xr.Dataset]]:
         """Yield samples of growing size with their results, until one tells enough."""
-        models, cells = min(self.models, _MODELS), _FIRST.get(self.kind, _FEW)
+        models, cells = 1, _FIRST.get(self.kind, _FEW)
         if self.kind == "basin_sweep":  # one search alone among these, as in a block
+            models = min(self.models, math.prod(SIDES[len(self.counts)]))
             cells = models * min(self.cells // self.models, _MAP)
         found: list[Sample] = []
         while True:
