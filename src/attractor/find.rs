@@ -47,6 +47,9 @@ pub struct Catalogue {
     pub longest_settle: u32,
     pub(super) effort: Effort,
     pub(super) orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
+    /// Attracting orbits that no trap was found for: they are not tried again.
+    #[serde(skip)]
+    pub(super) untrapped: Vec<PeriodicOrbit>,
     pub(super) rotations: Vec<(Rotation, Option<Band>)>,
     pub(super) rests: Vec<f64>,
     pub(super) sets: Vec<ChaoticSet>,
@@ -69,6 +72,7 @@ impl Catalogue {
             longest_settle: 0,
             effort,
             orbits: Vec::new(),
+            untrapped: Vec::new(),
             rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
             rests: rest::centres(&strobe.pendulum),
             sets: Vec::new(),
@@ -298,6 +302,7 @@ impl Catalogue {
         // An orbit without a trap exists all the same: a brisk search lists it, and assigns
         // trajectories near it by Newton's method.
         if own.is_empty() && self.effort.precise {
+            self.untrapped.push(orbit);
             return own;
         }
         let mut traps = own.clone();
@@ -360,9 +365,10 @@ impl Catalogue {
         (attracts(strobe, &orbit) && !self.knows(&orbit)).then_some(orbit)
     }
 
-    /// Whether this orbit is one of those found.
+    /// Whether this orbit is one of those found, or of those without a trap.
     fn knows(&self, orbit: &PeriodicOrbit) -> bool {
-        self.orbits.iter().any(|(o, _)| o.contains(orbit.points[0], SAME))
+        let found = self.orbits.iter().map(|(o, _)| o);
+        found.chain(&self.untrapped).any(|o| o.contains(orbit.points[0], SAME))
     }
 }
 

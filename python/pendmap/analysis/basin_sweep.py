@@ -120,8 +120,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         The model; parameters that vary replace its own.
     ranges : mapping of str to array_like or (float, float, int)
         One or two parameters with an array of ascending values, or a tuple of first value, last
-        value (both included) and how many; names as for :func:`pendmap.parameter_map`. Two have
-        evenly spaced values.
+        value (both included) and how many; names as for :func:`pendmap.parameter_map`.
     analysis : str
         What is done for each model: ``basins``.
     grid : Grid or int, optional
@@ -174,9 +173,6 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     bare, units = without_dimensions(pendulum)
     two = isinstance(ranges, dict) and len(ranges) == 2  # noqa: PLR2004
     axes = varied.varied(pendulum, ranges, 2 if two else 1, listed=True)
-    for axis in axes if two else ():
-        if not axis.even:
-            raise InputError(f"{axis.name} must be evenly spaced where two parameters vary")
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)

@@ -70,7 +70,7 @@ class Kept:
 
     def _tell_cost(self, analysis: partial[xr.Dataset], outputs: Outputs, schema: Schema) -> None:
         """Report what the command would take."""
-        from pendmap.cli.dry_run import show_cost
+        from pendmap.cli.planning import show_cost
 
         count = self.count
         if self.scheduler is not None:

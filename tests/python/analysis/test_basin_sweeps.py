@@ -16,6 +16,7 @@ import pendmap
 from pendmap import Grid, InputError, Pendulum
 from pendmap.analysis.sweeps import branches
 from pendmap.analysis.sweeps.tiles import Found, Mapped, SweepTiles
+from pendmap.charts import plane
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -281,12 +282,21 @@ def test_values_may_be_any_that_ascend(tmp_path: Path) -> None:
     assert merged["fraction"].values.tolist() == found["fraction"].values[:3].tolist()
 
 
+def test_two_parameters_may_have_any_values() -> None:
+    gammas = np.geomspace(0.05, 0.2, 3)
+    found = pendmap.sweep(Pendulum(), {"p": [0.4, 0.5, 0.9], "gamma": gammas}, grid=12, check=False)
+    assert found["gamma"].values.tolist() == gammas.tolist()
+    assert found["label"].shape == (3, 3, 12, 12)
+    image, own = plane.pixels(found, found["attractors"], 1200), found["attractors"].values
+    assert image.shape[0] > 3  # pixels are equal, cells are not
+    assert [image[0, 0], image[-1, 0], image[-1, -1]] == [own[0, 0], own[-1, 0], own[-1, -1]]
+
+
 @pytest.mark.parametrize(
     ("ranges", "said"),
     [
         ({"p": [0.5, 0.4]}, "p must be ascending values"),
         ({"p": []}, r"p must be an array \(N,\) of numbers"),
-        ({"p": [0.4, 0.5, 0.9], "omega": (1.9, 2.1, 3)}, "p must be evenly spaced"),
     ],
 )
 def test_other_values_are_refused(ranges: dict[str, list[float]], said: str) -> None:

@@ -6,13 +6,14 @@ import math
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 import xarray as xr
 
 import pendmap
 from pendmap import Grid, Pendulum
-from pendmap.cli import dry_run
-from pendmap.cli.dry_run import Request, Sample
+from pendmap.cli.planning import cost, samples, sweep
+from pendmap.cli.planning.request import Request
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,6 +28,7 @@ REQUESTS = {
     "basin_sweep": Request("basin_sweep", {"ranges": {"p": (*SPAN, 90)}, "grid": Grid.square(100)}),
     "lifetime": Request("lifetime", {"starts": 400_000, "draws": 4}),
 }
+OTHERS = [kind for kind in REQUESTS if kind != "basin_sweep"]  # sampled alike
 SIZES = {
     "basins": (120_000, 120_000),
     "parameter_map": (10_000, 90_000),
@@ -42,73 +44,128 @@ def test_cells_and_starts_are_those_of_the_result(kind: str) -> None:
     assert (request.cells, request.starts) == SIZES[kind]
 
 
-@pytest.mark.parametrize("kind", REQUESTS)
+@pytest.mark.parametrize("kind", OTHERS)
 @pytest.mark.parametrize("cells", [100, 1000, 50_000])
 def test_a_sample_has_about_as_many_cells_as_asked_for(kind: str, cells: int) -> None:
     request = REQUESTS[kind]
-    least = min(request.models, 16)
-    sample = request.fewer(cells, least)
-    assert min(cells, request.cells) <= sample.cells <= max(2.0 * cells, least)
-    assert sample.models >= least or request.models > least
+    sample = request.fewer(cells)
+    assert min(cells, request.cells) <= sample.cells <= 2.0 * cells
     assert sample.arguments.get("draws") is None
 
 
 def test_values_of_a_sample_lie_in_the_middle_of_equal_parts() -> None:
     own = {"ranges": {"p": (*SPAN, 200), "omega": (*SPAN, 3)}}
-    ranges = Request("parameter_map", own).fewer(12, 1).arguments["ranges"]
+    ranges = Request("parameter_map", own).fewer(12).arguments["ranges"]
     assert ranges["p"] == pytest.approx((0.6875, 1.8125, 4))
     assert ranges["omega"] == (*SPAN, 3)
 
 
-@pytest.mark.parametrize("kind", REQUESTS)
+@pytest.mark.parametrize("kind", OTHERS)
 def test_a_sample_as_large_as_the_request_is_the_request(kind: str) -> None:
     request = REQUESTS[kind]
-    sample = request.fewer(request.cells, request.models)
+    sample = request.fewer(request.cells)
     own = {**request.arguments, "draws": None, "check": False}
     assert all(own[name] == value for name, value in sample.arguments.items())
 
 
-@pytest.mark.parametrize("kind", REQUESTS)
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Return the time that samples see, to be set."""
+    now = [0.0]
+    seen = SimpleNamespace(perf_counter=lambda: now[0], process_time=lambda: 0.0)
+    for module in (cost, samples, sweep):
+        monkeypatch.setattr(module, "time", seen)
+    return now
+
+
+@pytest.mark.parametrize("kind", OTHERS)
 def test_a_fixed_part_and_a_part_for_each_cell_are_told(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    request, now = REQUESTS[kind], [0.0]
-    searched = kind in {"basins", "basin_sweep", "lifetime"}
-    fixed, each = 0.7 if searched else 0.0, 4000 / request.cells
+    request, now = REQUESTS[kind], clock(monkeypatch)
+    fixed, each = 0.7 if kind in {"basins", "lifetime"} else 0.0, 4000 / request.cells
 
     def run(arguments: dict[str, Any]) -> xr.Dataset:
-        one = Request(kind, arguments)
-        now[0] += fixed * one.models
+        now[0] += fixed
         arguments["progress"](0, 1000)
-        now[0] += each * one.cells
+        now[0] += each * Request(kind, arguments).cells
         arguments["progress"](1000, 1000)
         return xr.Dataset()
 
-    clock = SimpleNamespace(perf_counter=lambda: now[0], process_time=lambda: 0.0)
-    monkeypatch.setattr(dry_run, "time", clock)
-    arguments = {**request.arguments, "threads": 2}
-    of_two = Request(kind, arguments)
+    of_two = Request(kind, {**request.arguments, "threads": 2})
     sizes = iter(range(100, 10_000, 100))
-    found = dry_run.cost(
-        of_two, run, lambda _: next(sizes), lambda _: 7, workers=None, stored=False
-    )
+    found = cost.cost(of_two, run, lambda _: next(sizes), lambda _: 7, workers=None, stored=False)
     drawn = 1 + (request.arguments.get("draws") or 0)
-    whole = fixed * request.models + each * (request.cells + request.checks)
-    if kind == "basin_sweep":  # six blocks, two at once
-        whole /= 2
+    whole = fixed + each * (request.cells + request.checks)
     assert found.seconds == pytest.approx(drawn * whole, rel=1e-6)
     assert found.sample_cells < request.cells
-    assert now[0] < 0.1 * whole or kind == "basin_sweep"  # whole maps
+    assert now[0] < 0.1 * whole
     assert found.threads == 2
     assert found.worker_memory_bytes is None
     assert found.disk_bytes > 107
 
 
-def test_models_of_a_sweep_have_the_fixed_part() -> None:
-    request = REQUESTS["basin_sweep"]
-    samples = [Sample(16, 16 * 100, 0.0), Sample(32, 32 * 400, 0.0)]
-    values = [sample.models * (2.0 + 0.01 * sample.cells / sample.models) for sample in samples]
-    assert request.extended(samples, values) == pytest.approx(90 * (2.0 + 0.01 * 10_000))
+SWEEPS = {
+    "one": {"ranges": {"p": (*SPAN, 90)}, "grid": Grid.square(100)},
+    "fine": {"ranges": {"p": (*SPAN, 90)}, "grid": Grid.square(1000)},
+    "two": {"ranges": {"p": (*SPAN, 40), "omega": (*SPAN, 20)}, "grid": Grid.square(50)},
+    "models": {"ranges": {"p": (1.0, 1.0, 1), "omega": (*SPAN, 2)}, "grid": Grid.square(200)},
+}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_a_sweep_is_told_from_its_searches_models_and_cells(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request, now = Request("basin_sweep", {**SWEEPS[name], "threads": 2}), clock(monkeypatch)
+    first, later, each = 3.0, 0.4, 2e-5
+
+    def took(blocks: int, one: Request) -> float:
+        models = math.prod(one.counts.values())
+        return blocks * first + (models - blocks) * later + each * one.cells
+
+    def run(arguments: dict[str, Any]) -> xr.Dataset:
+        one, begun = Request("basin_sweep", arguments), now[0]
+        assert arguments["threads"] == 1
+        models = math.prod(one.counts.values())
+        arguments["progress"](0, 1000)
+        now[0] = begun + first + each * one.cells / models
+        arguments["progress"](1000 // models, 1000)
+        now[0] = begun + took(1, one)
+        arguments["progress"](1000, 1000)
+        dims = tuple(one.counts)
+        shape = tuple(one.counts.values())
+        exists = np.ones((*shape, 1), dtype=np.int8)
+        points = {f"point_{dim}": ("point", np.zeros(1)) for dim in dims}
+        coordinates = {dim: np.arange(n) for dim, n in one.counts.items()}
+        return xr.Dataset({"exists": ((*dims, "attractor"), exists), **points}, coordinates)
+
+    def save(dataset: xr.Dataset) -> int:
+        return 5000 + 30 * dataset["exists"].size
+
+    found = cost.cost(request, run, save, lambda _: 7, workers=None, stored=False)
+    models = math.prod(request.counts.values())
+    whole = took(request.tiles, request)
+    rounds = -(-request.tiles // 2) if request.tiles > 1 else 0.5
+    assert found.seconds == pytest.approx(whole * rounds / request.tiles, rel=1e-6)
+    assert found.disk_bytes == 5000 + 30 * models + 7
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_places_of_a_sweep_are_pairs_of_its_neighbours(name: str) -> None:
+    request = Request("basin_sweep", SWEEPS[name])
+    places = sweep.Places(request)
+    every = [*places]
+    assert len({tuple(place.values()) for place in every}) == len(every)
+    pair = request.counts[places.along] - places.neighbours + 1
+    others = math.prod(n for dim, n in request.counts.items() if dim != places.along)
+    assert len(every) == pair * others
+    for place in every[:20]:
+        ranges = places.at(place, places.neighbours, 100).arguments["ranges"]
+        for dim, span in request.arguments["ranges"].items():
+            known = np.linspace(*span)
+            assert np.isin(np.linspace(*ranges[dim]), known).all()
+    low = [place[places.along] for place in every[:8]]
+    assert np.ptp(low) >= 0.6 * (pair - 1)  # spread from the beginning
 
 
 @pytest.mark.parametrize(("cells", "checks"), [(100, 300), (9000, 6000), (10**6, 131_000)])
@@ -134,4 +191,4 @@ def test_tiles_are_those_of_a_store(name: str, tmp_path: Path) -> None:
 def test_tiles_of_a_large_map() -> None:
     rows = 5 * math.ceil(2**20 / 500_000)
     assert Request("basins", {"grid": Grid.square(100_000)}).tiles == math.ceil(1e5 / rows)
-    assert REQUESTS["lifetime"].tiles == 1
+    assert REQUESTS["lifetime"].tiles == math.ceil(400_000 / 2**18)
