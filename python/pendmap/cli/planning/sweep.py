@@ -1,41 +1,45 @@
-"""Samples of a sweep: pairs of neighbouring models at places spread over its ranges.
+"""Samples of a sweep: a few neighbouring models at places spread over its ranges.
 
-A sweep of M models with g starts each, in B blocks, takes B F + (M - B) C + M k (g - g0): F for a
-model that is searched alone, C for one that starts from its neighbour, both with g0 starts, and k
-for a further start. Each place tells the three: its first model, then its neighbour, then the
-first model with more starts where g is large. Places are added until the standard error of the sum
-is small. What files take, and the time to write them, has the same form with one fixed part.
+In a sweep with g starts each a model takes F + k (g - g0) if it is searched alone, as the first of
+each block is, and C + k (g - g0) if it starts from its neighbour. Some neighbours tell F and C,
+those with more starts k where g is large. Places are added until the standard error of the sum is
+small. Then each model takes what the nearest place tells, which gives the time of each block, and
+the threads take block after block. What files take has the same form with one fixed part.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import heapq
 import itertools
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from pendmap import _core
+from pendmap.analysis.sweeps.tiles import SIDES
 from pendmap.cli.planning.request import Request, fewer_starts
 from pendmap.cli.planning.samples import Estimate, peak, timed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     import xarray as xr
 
     from pendmap.cli.planning.request import Run, Save
     from pendmap.signal import Floats
 
-_FEWEST: Final = 4  # Places at least
-_SPREAD: Final = 8  # Places that tell a standard error
+_NEIGHBOURS: Final = 3  # Models of a place
+_FEWEST: Final = 8  # Places at least
+_TOLD: Final = 12  # Places that tell a standard error
 _ERROR: Final = 0.1  # Relative standard error of the time that is small enough
 _SHARE: Final = 0.25  # Part of the whole time that samples may take
-_STARTS: Final = (10_000, 40_000)  # Most starts of a map of a sample, and of one with more
-_GOLDEN: Final = {1: 1.618033988749895, 2: 1.324717957244746}
-"""The root of x^(d + 1) = x + 1 for d parameters, whose powers spread places evenly."""
+_STARTS: Final = (40_000, 160_000)  # Most starts of a map of a sample, and of one with more
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,8 +56,8 @@ class Places:
 
     @property
     def neighbours(self) -> int:
-        """Number of models of a place: 2, or 1 if there is one model."""
-        return min(2, self.request.counts[self.along])
+        """Number of models of a place."""
+        return min(_NEIGHBOURS, self.request.counts[self.along])
 
     @property
     def starts(self) -> tuple[int, int, int]:
@@ -63,13 +67,13 @@ class Places:
         return few, more, grid.cells
 
     def __iter__(self) -> Iterator[dict[str, int]]:
-        """Yield the first model of each place by its indices, spread by an additive recurrence."""
+        """Yield the first model of each place by its indices, in the order of Halton's points."""
         counts = self.request.counts
         sides = {n: c - (self.neighbours - 1) * (n == self.along) for n, c in counts.items()}
-        powers = _GOLDEN[len(sides)] ** -np.arange(1.0, len(sides) + 1)
         seen: set[tuple[int, ...]] = set()
-        for k in itertools.count():
-            place = tuple(((0.5 + k * powers) % 1.0 * [*sides.values()]).astype(int).tolist())
+        for k in itertools.count(1):
+            both = zip(sides.values(), (2, 3), strict=False)
+            place = tuple(int(side * _reversed(k, base)) for side, base in both)
             if place not in seen:
                 seen.add(place)
                 yield dict(zip(sides, place, strict=True))
@@ -87,76 +91,129 @@ class Places:
         return Request(self.request.kind, {**own, "grid": grid, "ranges": ranges})
 
     def extended(self, values: Floats, blocks: int = 1) -> float:
-        """Return a quantity of the whole sweep, of which each block has the fixed part.
-
-        ``values`` are those of one model, of the pair, and of one with more starts.
-        """
-        (one, pair, larger), (few, more, every) = values, self.starts
+        """Return a quantity of the whole sweep from ``values`` of a place; see ``of_models``."""
+        first, later = self.of_models(values)
         models = math.prod(self.request.counts.values())
-        step = max(pair - one, 0.0)
-        slope = max(larger - one, 0.0) / max(more - few, 1)
-        return float(blocks * one + (models - blocks) * step + models * slope * (every - few))
+        return float(blocks * first + (models - blocks) * later)
+
+    def of_models(self, values: Floats) -> Floats:
+        """Return a quantity of the first model of a block, and of a later one.
+
+        ``values`` are those of the first model of a place, of a later one, and of a later one with
+        more starts.
+        """
+        (first, later, larger), (few, more, every) = values, self.starts
+        slope = max(larger - later, 0.0) / max(more - few, 1)
+        both: Floats = np.array([first, max(later, 0.0)]) + slope * (every - few)
+        return both
+
+    def of_blocks(self, places: Sequence[Mapping[str, int]], times: Sequence[Floats]) -> Floats:
+        """Return the time of each block, each model as at the nearest place."""
+        shape = [*self.request.counts.values()]
+        sides = SIDES[len(shape)]
+        models = np.indices(shape).reshape(len(shape), -1)
+        known = np.array([[*place.values()] for place in places])
+        nearest = cKDTree(known / shape).query(models.T / shape)[1]
+        alone = np.all([own % side == 0 for own, side in zip(models, sides, strict=True)], axis=0)
+        first, later = np.array([self.of_models(own) for own in times]).T
+        each = np.where(alone, first[nearest], later[nearest])
+        corners = [own // side for own, side in zip(models, sides, strict=True)]
+        numbers = [-(-n // side) for n, side in zip(shape, sides, strict=True)]
+        return np.bincount(np.ravel_multi_index(corners, numbers), each).astype(float)
+
+
+def _reversed(k: int, base: int) -> float:
+    """Return the number whose digits after the point are those of a whole number, backward."""
+    found, place = 0.0, 1.0
+    while k:
+        place /= base
+        k, digit = divmod(k, base)
+        found += digit * place
+    return found
 
 
 class _Watch:
-    """Progress of a pair of models: the time until the second one begins."""
+    """Progress of a few models: the time until the second one begins."""
 
-    def __init__(self) -> None:
-        self.first, self._second, self._began = 0.0, False, time.perf_counter()
+    def __init__(self, models: int) -> None:
+        self.first, self._models, self._began = 0.0, models, time.perf_counter()
+        self._second = False
 
     def __call__(self, done: int, total: int) -> None:
-        self._second |= 2 * done > total
+        self._second |= self._models * done > total
         if not self._second:
             self.first = time.perf_counter() - self._began
 
 
-def estimate(request: Request, run: Run, save: Save) -> Estimate:
-    """Return what a sweep takes on one thread, from samples at some places."""
-    places = Places(request)
-    _, imports = timed(partial(_sampled, places, run=run, save=save), next(iter(places)))
+def estimate(request: Request, run: Run, save: Save, threads: int, each: int) -> Estimate:
+    """Return what a sweep takes, from samples at some places.
+
+    ``threads`` take blocks at once; ``each`` threads work on a block if there are few blocks.
+    Samples are computed at once, too, on the processors of this machine.
+    """
+    places, used = Places(request), min(threads, _core.default_threads())
+    sampled = partial(_sampled, places, run)
+    taken = iter(places)
+    _, imports = timed(sampled, next(iter(places)))
     first_peak, began = peak(), time.perf_counter()
+    chosen: list[Mapping[str, int]] = []
     found: list[Floats] = []
-    for place in places:
-        dataset, values = _sampled(places, place, run, save)
-        found.append(values)
-        spent = time.perf_counter() - began
-        if len(found) == 1:
-            imports -= spent
-        every = [places.extended(own[0], request.tiles) for own in found]
-        error = float(np.std(every)) / math.sqrt(len(every)) if len(every) >= _SPREAD else math.inf
-        if len(every) < _FEWEST:
-            continue
-        if error < _ERROR * np.mean(every) or spent > _SHARE * np.mean(every):
-            break
-    seconds, size, writing = np.mean(found, axis=0)
+    with ThreadPoolExecutor(used) as pool:
+        while some := [*itertools.islice(taken, used)]:
+            for runs in pool.map(sampled, some):
+                dataset = runs[0][0]
+                found.append(_values(places, runs, save))
+            chosen += some
+            spent = time.perf_counter() - began
+            if len(chosen) == len(some):
+                imports -= spent
+            every = [places.extended(own[0], request.tiles) for own in found]
+            error = np.std(every) / math.sqrt(len(every))
+            whole = np.mean(every) / used
+            sure = len(every) >= _TOLD and error < _ERROR * used * whole
+            if len(every) >= _FEWEST and (sure or spent > _SHARE * whole):
+                break
+    _, size, writing = np.mean(found, axis=0)
+    ends = [0.0] * threads
+    for block in places.of_blocks(chosen, [own[0] for own in found]):
+        heapq.heapreplace(ends, ends[0] + float(block) / each)
     few, more, _ = places.starts
     return Estimate(
         dataset,
-        places.extended(seconds, request.tiles),
+        max(ends),
         places.extended(writing),
         places.extended(size),
         max(imports, 0.0),
         first_peak,
-        len(found) * (places.neighbours * few + (more if more > few else 0)),
+        len(found) * places.neighbours * (few + (more if more > few else 0)),
         spent,
     )
 
 
 def _sampled(
-    places: Places, place: Mapping[str, int], run: Run, save: Save
-) -> tuple[xr.Dataset, Floats]:
-    """Return times, sizes and times of writing at a place, shape (3, 3): see ``extended``."""
-    few, more, _ = places.starts
-    watch = _Watch()
-    given = {"threads": 1, "progress": watch}
-    dataset, pair = timed(run, {**places.at(place, places.neighbours, few).arguments, **given})
-    first = watch.first if places.neighbours > 1 else pair
-    rows = [(first, *timed(save, _first_model(dataset, places.along)))]
-    rows += [(pair, *timed(save, dataset)), rows[0]]
-    if more > few:
-        larger, seconds = timed(run, {**places.at(place, 1, more).arguments, **given})
-        rows[2] = (seconds, *timed(save, larger))
-    return dataset, np.array(rows).T
+    places: Places, run: Run, place: Mapping[str, int]
+) -> list[tuple[xr.Dataset, float, float]]:
+    """Return the results of a place, with few starts and with more if there are more.
+
+    Each comes with the time of its first model and that of all.
+    """
+    found = []
+    for starts in dict.fromkeys(places.starts[:2]):
+        own = places.at(place, places.neighbours, starts).arguments
+        watch = _Watch(places.neighbours)
+        dataset, every = timed(run, {**own, "threads": 1, "progress": watch})
+        found.append((dataset, watch.first if places.neighbours > 1 else every, every))
+    return found
+
+
+def _values(places: Places, runs: list[tuple[xr.Dataset, float, float]], save: Save) -> Floats:
+    """Return times, sizes and times of writing at a place, shape (3, 3): see ``of_models``."""
+    columns = []
+    for dataset, first, every in runs:
+        alone = np.array([first, *timed(save, _first_model(dataset, places.along))])
+        whole, later = np.array([every, *timed(save, dataset)]), places.neighbours - 1
+        columns += [alone, (whole - alone) / later if later else alone]
+    return np.array([columns[0], columns[1], columns[-1]]).T
 
 
 def _first_model(dataset: xr.Dataset, along: str) -> xr.Dataset:

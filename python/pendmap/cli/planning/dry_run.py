@@ -36,8 +36,8 @@ _BYTES: Final = {
 _IN_WORK: Final = {"basins": 4 * TILE}  # Cells in memory at most, where a store has the others
 _WORKER: Final = 200 * 2**20  # Memory of a worker without its tile, bytes
 _TILES: Final = {"basins": 32 * TILE, "lifetime": 32 * TILE}  # Memory of large tiles, bytes
-_BLOCKS: Final = ("parameter_map", "bifurcation", "basin_sweep")
-"""Analyses whose tiles have one thread each in a store, those of a sweep always."""
+_BLOCKS: Final = ("parameter_map", "bifurcation")
+"""Analyses whose tiles have one thread each in a store."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,18 +71,16 @@ def cost(  # noqa: PLR0913 (a request, and how it is computed and written)
     threads = workers or request.arguments["threads"] or here
     used = threads if workers is None else min(threads, here)
     if request.kind == "basin_sweep":
-        used = 1
-        found = sweep.estimate(request, run, save)
+        each = 1 if workers else max(threads // request.tiles, 1)
+        found = sweep.estimate(request, run, save, threads, each)
     else:
         found = samples.estimate(request, run, save, used)
     figures, drawing = samples.timed(draw, found.dataset)
     seconds = found.seconds
-    tiled = workers is not None or stored or request.kind == "basin_sweep"
-    if tiled and (workers is not None or request.kind in _BLOCKS):  # a tile has one thread
+    of_one = workers is not None or (stored and request.kind in _BLOCKS)
+    if of_one and request.kind != "basin_sweep":  # a tile has one thread
         rounds = -(-request.tiles // threads)
         seconds *= used * rounds / request.tiles
-        if request.kind == "basin_sweep" and workers is None:  # or more, if tiles are few
-            seconds /= max(threads // request.tiles, 1)
     seconds += found.writing + drawing
     if request.arguments.get("curves"):
         own = {**request.fewer(4).arguments, "curves": True, "starts": 1}
