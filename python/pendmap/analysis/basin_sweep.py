@@ -169,10 +169,15 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     if analysis not in ANALYSES:
         raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
+    if not isinstance(ranges, dict) or len(ranges) not in {1, 2}:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+        raise InputError(
+            "ranges must have one or two parameters, like {'p': (0.5, 2.0, 25)}, or on the command "
+            f"line --p 0.5:2:25; got {given or 'nothing'}"
+        )
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
-    two = isinstance(ranges, dict) and len(ranges) == 2  # noqa: PLR2004
-    axes = varied.varied(pendulum, ranges, 2 if two else 1, listed=True)
+    axes = varied.varied(pendulum, ranges, len(ranges), listed=True)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)

@@ -105,7 +105,8 @@ class Grid:
     def of(cls, given: object, count: int, w0: float) -> Grid:
         """Return a grid as given, or the default window with ``count`` cells on each side."""
         if given is None or (isinstance(given, numbers.Integral) and not isinstance(given, bool)):
-            return cls.square(count if given is None else int(given), w0)
+            side = count if given is None else check_whole("grid", given, 1, MOST_CELLS)
+            return cls.square(side, w0)
         example = "100, Grid.square(100) or Grid(Axis(-pi, pi, 100), Axis(-3, 3, 100))"
         check_type("grid", given, cls, example)
         return given  # type: ignore[return-value]

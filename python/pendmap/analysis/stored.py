@@ -52,6 +52,8 @@ class Kept:
     chunks: Any = None
 
     def __post_init__(self) -> None:
+        if self.store is not None:
+            _address(self.store)
         check_flag("resume", self.resume)
         check_flag("mix", self.mix)
         if self.part is not None:
@@ -199,7 +201,7 @@ def merge(
     """
     import pendmap  # noqa: PLC0415 (the public functions, which import this module)
 
-    place = ZarrStore(os.fspath(store))
+    place = ZarrStore(_address(store))
     mark = place.mark()
     if not mark:
         raise InputError(f"{place.address}: must be a store of a run, there is none")
@@ -221,6 +223,17 @@ def merge(
     more = {"executor": executor, "threads": threads, "progress": progress}
     found: xr.Dataset = run(model, **arguments, store=store, resume=True, **more)
     return found
+
+
+def _address(store: str | os.PathLike[str]) -> str:
+    """Return the address of a store; a folder must be named like one."""
+    name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
+    if "://" not in name and not name.rstrip("/").endswith(".zarr"):
+        raise InputError(
+            "store must be a folder NAME.zarr, or an address like s3://bucket/map.zarr, got "
+            f"{short_repr(store)}"
+        )
+    return name
 
 
 def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -201,7 +201,8 @@ def _settling(dataset: xr.Dataset) -> list[str]:
         time = f" = {units.given(math.tau, TIME):.4g} s" if units.si else ""
         own = f" (without drive a period is {units.own_period}{time})"
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
-    return [f"Settling takes {times}{own}."]
+    which = " in the computed cells" if a.get("computed_share", 1) < 1 else ""
+    return [f"Settling takes {times}{which}{own}."]
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:

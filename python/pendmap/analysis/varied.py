@@ -97,7 +97,11 @@ def varied(
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
-        raise InputError(f"ranges must be a mapping like {few}, got {given or 'nothing'}")
+        options = " ".join(f"--{name} {low:g}:{high:g}:{n}" for name, (low, high, n) in few.items())
+        raise InputError(
+            f"ranges must be a mapping like {few}, or on the command line {options}; "
+            f"got {given or 'nothing'}"
+        )
     found = tuple(_one(model, name, given, listed=listed) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
@@ -177,6 +181,7 @@ def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varie
         there = ", ".join([*own, *shared])
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
+            f"{_of_effect(name)}"
         )
     by_ends = isinstance(given, tuple) or not listed
     values = _values(name, given) if by_ends else ascending(name, given)
@@ -206,6 +211,16 @@ def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varie
     if known.count(bare) > 1:
         raise InputError(f"{name} must be in the model once, got it {known.count(bare)} times")
     return Varied(name, values, bare, plain, unit, meaning)
+
+
+def _of_effect(name: str) -> str:
+    """Return what else a name like EFFECT.PARAMETER may be."""
+    which = name.partition(".")[0]
+    known = next((one for one in effects() if one.name == which), None)
+    if known is None:
+        return ""
+    has = ", ".join(f"{which}.{one.name}" for one in known.parameters)
+    return f"; {which} has {has}" + ("" if len(known.parameters) == 1 else " if it is in the model")
 
 
 def _values(name: str, given: object) -> Floats:

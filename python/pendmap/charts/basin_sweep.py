@@ -235,7 +235,7 @@ def _plane(  # noqa: PLR0913, PLR0917 (parts of a chart)
     shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
     if layer is not None and layer not in (*LAYERS, *shares):
         known = ", ".join([*LAYERS, *shares])
-        raise InputError(f"layer must be one of this sweep, {known}, got {layer!r}")
+        raise InputError(f"layer must be one of this sweep: {known}, got {layer!r}")
     up, across = (plane.outer_edges(dataset, one) for one in varied_names(dataset))
     sides = Axis(symbols[1], across), Axis(symbols[0], up)
     panels = []

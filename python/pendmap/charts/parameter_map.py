@@ -148,7 +148,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
     if layer is not None and layer not in (*known, *shares):
         layers = ", ".join([*known, *shares])
-        raise InputError(f"layer must be one of this map, {layers}, got {layer!r}")
+        raise InputError(f"layer must be one of this map: {layers}, got {layer!r}")
     leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
     others = [one for one in _RECORDED if one in known and one not in leading]
     shown = [layer] if layer else [*leading, *others]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import importlib.util
+import logging
 import os
 import time
 from typing import TYPE_CHECKING, Any, Final
@@ -58,7 +59,9 @@ def executor_of(
             target: Any = scheduler
         else:
             count = check_whole("workers", workers, 1, MOST_WORKERS)
-            quiet = {"distributed.worker.memory.terminate": False}
+            level = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
+            quiet = {"distributed.worker.memory.terminate": False, level: "critical"}
+            stack.enter_context(_silent("distributed"))
             stack.enter_context(dask.config.set(quiet))
             # The scheduler's status page listens even when it is off, at 8787 unless told.
             page = "127.0.0.1:0"
@@ -72,6 +75,18 @@ def executor_of(
         except (OSError, ValueError) as error:
             raise InputError(f"scheduler {scheduler}: {error}") from None
         yield client
+
+
+@contextlib.contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """Silence a logger: workers that are stopped, as by Ctrl-C, would tell it in many lines."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 class WorkersGoneError(RuntimeError):

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
     from conftest import Run
 
+RANGES = (
+    "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, or on the command line --p 0.5:2:100"
+)
+
 
 @pytest.fixture(scope="module")
 def diagram() -> xr.Dataset:
@@ -124,11 +128,11 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     for words, wanted in (
         (
             ("bifurcation",),
-            "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, got nothing",
+            f"{RANGES}; got nothing",
         ),
         (
             ("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"),
-            "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, got p, omega",
+            f"{RANGES}; got p, omega",
         ),
         (
             ("bifurcation", "--p", "0:1:3", "--theta", "1"),

@@ -192,7 +192,7 @@ def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
     for layer in ("exponent", "attractors", "period", "winding", "undecided", "share rest"):
         assert len(made(plane, layer).axes) == 2
     with pytest.raises(
-        pendmap.InputError, match=r"layer must be one of this map, .*, got 'nothing'"
+        pendmap.InputError, match=r"layer must be one of this map: .*, got 'nothing'"
     ):
         made(plane, "nothing")
 
@@ -241,7 +241,7 @@ def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
     assert json.loads(named.stdout)["columns"] == "omega"
     assert pendmap_command("plot", "map.nc", "--layer", "period", "--plot", "a.svg").returncode == 0
     for words, wanted in (
-        (("map", "--p", "1"), "100), 'omega': (0.5, 3.0, 100)}, got nothing"),
+        (("map", "--p", "1"), "--p 0.5:2:100 --omega 0.5:3:100; got nothing"),
         (("map", "--p", "0:1"), "A:B:N"),
         (
             ("map", "--p", "0:1:3", "--vary", "p", "0:1:4"),

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import itertools
 import random
+import re
 import signal
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 
 import pendmap
 import tiled
-from conftest import HERE
+from conftest import COMMAND, HERE
+from interrupted import any_file, started
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +63,21 @@ def test_every_killed_analysis_goes_on(tmp_path: Path, name: str) -> None:
 @pytest.mark.thorough
 def test_a_map_that_is_killed_50_times_goes_on(tmp_path: Path) -> None:
     killed_often("map", tmp_path, 50)
+
+
+@pytest.mark.thorough
+def test_an_interrupted_run_with_workers_says_one_line(tmp_path: Path) -> None:
+    words = [str(COMMAND), "basins", "--grid", "2500", "--workers", "2", "--quiet"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with started([*words, "--out", "m.zarr"], cwd=tmp_path, **pipes) as process:
+        while process.poll() is None and not any_file(tmp_path, "m.zarr.part/**/zarr.json"):
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert said[0] == ""
+    kept = r"\d+ of \d+ tiles are kept, --resume goes on"
+    assert re.fullmatch(rf"pendmap: interrupted, m\.zarr\.part \({kept}\) written\n", said[1])
 
 
 @pytest.mark.parametrize("name", ["basins", "bifurcation"])

@@ -56,6 +56,19 @@ def test_a_store_may_be_in_an_object_store(bucket: str, name: str) -> None:
     tiled.assert_same(pendmap.load(store), tiled.CASES[name]())
 
 
+@pytest.mark.parametrize("store", ["map.nc", "map", 3, ""])
+def test_a_folder_must_be_named_as_a_store(
+    store: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for run in (tiled.CASES["basins"], tiled.CASES["bifurcation"]):
+        with pytest.raises(InputError, match=r"store must be a folder NAME\.zarr, or an address"):
+            run(store=store)
+    with pytest.raises(InputError, match=r"store must be a folder NAME\.zarr, or an address"):
+        pendmap.merge(store)  # type: ignore[arg-type]
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_path_may_be_an_address(tmp_path: Path) -> None:
     kept = tiled.CASES["basins"](store=f"file://{tmp_path}/map.zarr")
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]

@@ -68,7 +68,7 @@ def test_layers_over_two_parameters(layer: str) -> None:
 
 
 def test_an_unknown_layer_is_refused() -> None:
-    with pytest.raises(InputError, match="layer must be one of this sweep, entropy"):
+    with pytest.raises(InputError, match="layer must be one of this sweep: entropy"):
         basin_sweep.chart(shown(PLANE), layer="hue")
     with pytest.raises(InputError, match="no layer 'hue' in this figure; it has fraction"):
         basin_sweep.chart(shown(LINE), layer="hue")

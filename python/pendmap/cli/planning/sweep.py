@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 _NEIGHBOURS: Final = 3  # Models of a place
 _FEWEST: Final = 8  # Places at least
+_WRITTEN: Final = 4  # Places whose files are written
 _TOLD: Final = 12  # Places that tell a standard error
 _ERROR: Final = 0.1  # Relative standard error of the time that is small enough
 _SHARE: Final = 0.25  # Part of the whole time that samples may take
@@ -157,25 +158,29 @@ def estimate(request: Request, run: Run, save: Save, threads: int, each: int) ->
     _, imports = timed(sampled, next(iter(places)))
     first_peak, began = peak(), time.perf_counter()
     chosen: list[Mapping[str, int]] = []
-    found: list[Floats] = []
+    times: list[Floats] = []
+    written: list[Floats] = []
     with ThreadPoolExecutor(used) as pool:
         while some := [*itertools.islice(taken, used)]:
             for runs in pool.map(sampled, some):
                 dataset = runs[0][0]
-                found.append(_values(places, runs, save))
+                times.append(_three(places, [own[1:] for own in runs]))
+                if len(written) < _WRITTEN:
+                    both = [_files(places, own[0], save) for own in runs]
+                    written.append(_three(places, both))
             chosen += some
             spent = time.perf_counter() - began
             if len(chosen) == len(some):
                 imports -= spent
-            every = [places.extended(own[0], request.tiles) for own in found]
+            every = [places.extended(own, request.tiles) for own in times]
             error = np.std(every) / math.sqrt(len(every))
             whole = np.mean(every) / used
             sure = len(every) >= _TOLD and error < _ERROR * used * whole
             if len(every) >= _FEWEST and (sure or spent > _SHARE * whole):
                 break
-    _, size, writing = np.mean(found, axis=0)
+    size, writing = np.mean(written, axis=0).T
     ends = [0.0] * threads
-    for block in places.of_blocks(chosen, [own[0] for own in found]):
+    for block in places.of_blocks(chosen, times):
         heapq.heapreplace(ends, ends[0] + float(block) / each)
     few, more, _ = places.starts
     return Estimate(
@@ -185,7 +190,7 @@ def estimate(request: Request, run: Run, save: Save, threads: int, each: int) ->
         places.extended(size),
         max(imports, 0.0),
         first_peak,
-        len(found) * places.neighbours * (few + (more if more > few else 0)),
+        len(times) * places.neighbours * (few + (more if more > few else 0)),
         spent,
     )
 
@@ -206,14 +211,18 @@ def _sampled(
     return found
 
 
-def _values(places: Places, runs: list[tuple[xr.Dataset, float, float]], save: Save) -> Floats:
-    """Return times, sizes and times of writing at a place, shape (3, 3): see ``of_models``."""
-    columns = []
-    for dataset, first, every in runs:
-        alone = np.array([first, *timed(save, _first_model(dataset, places.along))])
-        whole, later = np.array([every, *timed(save, dataset)]), places.neighbours - 1
-        columns += [alone, (whole - alone) / later if later else alone]
-    return np.array([columns[0], columns[1], columns[-1]]).T
+def _files(places: Places, dataset: xr.Dataset, save: Save) -> tuple[Floats, Floats]:
+    """Return size and time of writing of the first model of a place, and of all."""
+    both = (_first_model(dataset, places.along), dataset)
+    alone, whole = (np.array(timed(save, one), dtype=float) for one in both)
+    return alone, whole
+
+
+def _three(places: Places, runs: Sequence[tuple[float | Floats, float | Floats]]) -> Floats:
+    """Return the values that ``of_models`` takes from those of the first model and of all."""
+    later = max(places.neighbours - 1, 1)
+    steps = [(every - (places.neighbours > 1) * first) / later for first, every in runs]
+    return np.array([runs[0][0], steps[0], steps[-1]], dtype=float)
 
 
 def _first_model(dataset: xr.Dataset, along: str) -> xr.Dataset:
