@@ -168,7 +168,7 @@ def test_places_of_a_sweep_are_neighbours(name: str) -> None:
     others = math.prod(n for dim, n in request.counts.items() if dim != places.along)
     assert len(every) == line * others
     for place in every[:20]:
-        ranges = places.at(place, places.neighbours, 100).arguments["ranges"]
+        ranges = places.at(place, 100).arguments["ranges"]
         for dim, span in request.arguments["ranges"].items():
             known = np.linspace(*span)
             gaps = np.abs(np.subtract.outer(np.linspace(*ranges[dim]), known)).min(axis=1)

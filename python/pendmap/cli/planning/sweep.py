@@ -81,11 +81,11 @@ class Places:
             if len(seen) == math.prod(sides.values()):
                 return
 
-    def at(self, place: Mapping[str, int], models: int, starts: int) -> Request:
+    def at(self, place: Mapping[str, int], starts: int) -> Request:
         """Return the request of neighbours at a place."""
         own, ranges = {**self.request.arguments}, {}
         for name, span in own["ranges"].items():
-            count = models if name == self.along else 1
+            count = self.neighbours if name == self.along else 1
             values = np.linspace(*span)[place[name] :][:count]
             ranges[name] = (float(values[0]), float(values[-1]), count)
         grid = fewer_starts(own["grid"], starts)
@@ -204,7 +204,7 @@ def _sampled(
     """
     found = []
     for starts in dict.fromkeys(places.starts[:2]):
-        own = places.at(place, places.neighbours, starts).arguments
+        own = places.at(place, starts).arguments
         watch = _Watch(places.neighbours)
         dataset, every = timed(run, {**own, "threads": 1, "progress": watch})
         found.append((dataset, watch.first if places.neighbours > 1 else every, every))
