@@ -23,6 +23,7 @@ from pendmap import (
     virtual_rig,
 )
 from pendmap.charts import comparison
+from pendmap.charts import identification as charts
 from pendmap.diagnosis import diagnose
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
@@ -93,20 +94,18 @@ def record() -> None:
         path = Path(folder) / "run_00.csv"
         columns = np.column_stack([time + rng.normal(0, 4e-4, time.size), theta])[kept]
         np.savetxt(path, columns, "%.6f", ",", header="t_s,theta_rad", comments="")
-        render.draw_record(read_experiment(path), HERE / "record.png", dpi=100)
+        render.draw(read_experiment(path), HERE / "record.png", dpi=100)
 
 
 def identification() -> None:
     """The decay by each model, and what each misses, on a virtual rig like the paper's."""
-    render.draw_identification(
+    sheet = charts.sheet(
         paper_figures.report(),
-        HERE / "identification.png",
         parts=("decay",),
-        size=(8.6, 7.6),
-        dpi=90,
         title="The decay by each model",
         subtitle="virtual rig like the paper's, encoder zero off by 0.05\N{DEGREE SIGN}",
     )
+    render.draw(sheet, HERE / "identification.png", size=(8.6, 7.6), dpi=90)
 
 
 def diagnosis() -> None:

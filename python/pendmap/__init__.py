@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from pendmap.records import Segment as Segment
     from pendmap.records import noise_floor as noise_floor
     from pendmap.records import read_experiment as read_experiment
+    from pendmap.render import plot as plot
 
     __version__: str
 
@@ -139,6 +140,7 @@ _OTHERS = {
         "noise_floor",
         "read_experiment",
     ],
+    "render": ["plot"],
 }
 _HOMES = {
     **{name: home for home, names in _OTHERS.items() for name in names},

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
-from unittest import mock
 
 from matplotlib import rc_context
 from matplotlib.text import Text
@@ -13,21 +12,23 @@ from pendmap import render
 from pendmap.render import style
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import xarray as xr
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
 
 def made(dataset: xr.Dataset, layer: str | None = None) -> Figure:
-    made: list[Callable[[float], Figure]] = []
-    with mock.patch.object(render, "written", lambda _, build, **__: made.append(build)):
-        render.draw(dataset, "a.png", layer=layer)
+    figure = render.figure_of(dataset, layer=layer, dpi=100.0)
     with rc_context(style.RC):
-        figure = made[0](100.0)
         figure.canvas.draw()
     return figure
+
+
+def plain(text: str) -> str:
+    """Return a text of a figure without mathtext."""
+    for symbol, math in style.SYMBOLS.items():
+        text = text.replace(math, symbol)
+    return text
 
 
 def titles(figure: Figure) -> list[str]:
@@ -36,12 +37,17 @@ def titles(figure: Figure) -> list[str]:
 
 
 def named(figure: Figure) -> list[str]:
-    return [text.get_text() for box in figure.legends for text in box.get_texts()]
+    return [plain(text.get_text()) for box in figure.legends for text in box.get_texts()]
+
+
+def regions(figure: Figure) -> list[str]:
+    """Return the texts in the regions of images."""
+    return [plain(text.get_text()) for axes in figure.axes for text in axes.texts]
 
 
 def written(figure: Figure) -> str:
     texts = (found.get_text() for found in figure.findobj(Text) if isinstance(found, Text))
-    return " ".join(" ".join(texts).split())
+    return plain(" ".join(" ".join(texts).split()))
 
 
 def shown(text: object) -> bool:

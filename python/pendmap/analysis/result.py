@@ -128,6 +128,8 @@ class Schema:
         Those of a dataset that it was made of are removed. The parameters of the model become
         coordinates without dimensions, except those ``replaced`` by others, which vary.
         """
+        import pendmap.files.accessor  # noqa: F401, PLC0415 (dataset.pendmap, with xarray)
+
         for name in [name for name in dataset.variables if not dataset[name].dims]:
             del dataset[name]
         known = model.attributes

@@ -63,7 +63,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     for one in shown:
         small = len(shown) > 1 and one == "labels" and not reliable(dataset)
         alarm = [(warning(dataset), ALARM), (transients(dataset), QUIET)]
-        marks = _layer(dataset, one, cells, (theta, velocity))
+        marks = _layer(dataset, one, cells, (theta, velocity), listed)
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
         if one == shown[0]:
@@ -131,7 +131,11 @@ def _marker(
 
 
 def _layer(
-    dataset: xr.Dataset, layer: str, cells: int, window: tuple[tuple[float, float], ...]
+    dataset: xr.Dataset,
+    layer: str,
+    cells: int,
+    window: tuple[tuple[float, float], ...],
+    listed: list[legend.Entry],
 ) -> list[Mark]:
     """Return one layer; cells without a value have the colour of their label, or are grey."""
     label = plane.pixels(dataset, dataset["label"], cells)
@@ -140,9 +144,14 @@ def _layer(
     shown = label.astype(np.int16) + 1
     if layer != "labels" and has_filled(dataset):
         shown[filled(dataset, cells)] = len(colours)
-    labels = Image(shown, *window, classes=classes)
     if layer == "labels":
-        return [labels]
+        texts = [("", "")] * len(classes)
+        for entry in listed:
+            if not entry.chaotic:
+                short = f"{legend.typeset(entry.name)}\n{legend.percent(entry.fraction)}"
+                texts[entry.id + 1] = (short, entry.text)
+        return [Image(shown, *window, classes=classes, labels=texts)]
+    labels = Image(shown, *window, classes=classes)
     own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
     absent, values = missing(dataset, layer, own) | (label < 0), own.astype(np.float32)
     if layer == "settle":

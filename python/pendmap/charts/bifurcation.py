@@ -88,23 +88,27 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     )
 
 
-def _dots(one: Family, at: npt.NDArray[np.float64], size: float, path: str) -> Points:
-    return Points(*at.T, colour=one.colour, size=size, path=path)
+def _dots(
+    one: Family, at: npt.NDArray[np.float64], size: float, path: str, name: str = ""
+) -> Points:
+    dense = "chaos" in one.name
+    return Points(*at.T, colour=one.colour, size=size, path=path, name=name, dense=dense)
 
 
 def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     """Return the stroboscopic points; points of orbits are larger than those of chaos."""
     column = 1 + _LAYERS.index(which)
     values = dataset[str(dataset.attrs["varied"])].values
-    # With few values a single point must be visible.
-    size = min(3.0, max(0.9, 200.0 / values.size))
+    # A single point must be visible.
+    size = min(3.0, max(1.3, 200.0 / values.size))
     loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
     grey: dict[str, Any] = {"colour": palette.UNNAMED}
     said = "sweep, undecided" if loose[0].size else ""
     drawn: list[Mark] = [Points(*loose, size=0.45, order=1.0, name=said, **grey)]
     for k, one in reversed([*enumerate(every)]):
         of = 0.45 if "chaos" in one.name else size
-        drawn.append(_dots(one, one.points[:, [0, column]], of, f"{k}/points"))
+        points = one.points[:, [0, column]]
+        drawn.append(_dots(one, points, of, f"{k}/points", _said(every, k)))
     low, high = plane.angles(dataset, dataset["point_theta"].values)
     for name, height in _SWEEPS if which == "theta" else ():
         for k, one in enumerate(every):
@@ -118,15 +122,19 @@ def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float])
     """Return a strip for each sweep, coloured by its attractor, with the names of all families."""
     strip = np.zeros((2, dataset.sizes[str(dataset.attrs["varied"])]), dtype=np.int64)
     classes = [("", "#ffffff")]
-    more = len(every) - MOST
-    for k, one in enumerate(every, 1):
-        strip[1, one.up] = strip[0, one.down] = k
-        last = f"{more} more" if k == MOST + 1 else ""
-        classes.append((typeset(one.name) if k <= MOST else last, one.colour))
+    for k, one in enumerate(every):
+        strip[1, one.up] = strip[0, one.down] = k + 1
+        classes.append((_said(every, k), one.colour))
     if (strip == 0).any():
         classes[0] = ("sweep on none", "#ffffff")
-    image = Image(strip, ends, (-1.0, 1.0), classes=classes)
+    texts = [("" if name == "sweep on none" else name, name) for name, _ in classes]
+    image = Image(strip, ends, (-1.0, 1.0), classes=classes, labels=texts)
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
+
+
+def _said(every: list[Family], k: int) -> str:
+    """Return the entry of a family in the legend; the rare ones share one."""
+    return typeset(every[k].name) if k < MOST else f"{len(every) - MOST} more" * (k == MOST)
 
 
 def families(dataset: xr.Dataset) -> list[Family]:
@@ -149,7 +157,8 @@ def families(dataset: xr.Dataset) -> list[Family]:
         called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
-        shade = palette.colour(called) if len(found) < MOST else palette.UNNAMED
+        named = len(found) < MOST
+        shade = palette.on_white(palette.colour(called)) if named else palette.UNNAMED
         on = (sweeps["up"] == k, sweeps["down"] == k)
         found.append(Family(called, shade, points[mine[owner]], exponents, *on))
     return found

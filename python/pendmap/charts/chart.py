@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from pendmap.charts.marks import Ends, Mark
+
+NARROWEST: Final = 2.6  # Width of a panel with its labels below which a row is broken, inches
 
 
 @dataclass(frozen=True)
@@ -95,16 +97,43 @@ class Chart:
         """Return the panels of a figure, row by row."""
         return [panel for row in self.rows for panel in row]
 
+    def whole(self, panel: Panel) -> Panel:
+        """Return a panel with its own labels where it shares those of a panel below it."""
+        below = [one.x for one in self.panels if one.x.name and one.x.ends == panel.x.ends]
+        return dataclasses.replace(panel, x=below[-1]) if below and not panel.x.name else panel
+
     def only(self, layer: str | None, size: Ends | None = None) -> Chart:
         """Return the chart with one of its panels alone; unchanged without a name."""
         if layer is None:
             return self
-        known = {panel.name: panel for panel in self.panels}
-        if layer not in known:
-            if len(known) == 1:
-                raise InputError(f"no layer {layer!r}: this figure has one part")
-            raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
-        return dataclasses.replace(self, rows=[[known[layer]]], heights=(), size=size)
+        panel = self.whole(_named(self.panels, layer))
+        return dataclasses.replace(self, rows=[[panel]], heights=(), notes=(), size=size)
+
+    def in_width(self, width: float) -> Chart:
+        """Return the chart with its rows broken where ``width``, inches, is too narrow for them.
+
+        Heights are in inches: those of the figure, smaller by at most 40 percent. A note is in the
+        title of its panel.
+        """
+        fit = max(1, int(width // NARROWEST))
+        parts = self.heights or [max(panel.share for panel in row) for row in self.rows]
+        if self.size is None:
+            high = [self.ratio * (width / min(fit, len(row)) - 0.75) for row in self.rows]
+            inches = [part * one for part, one in zip(parts, high, strict=True)]
+        else:
+            scale = self.size[1] / sum(parts) * min(1.0, max(width / self.size[0], 0.6))
+            inches = [scale * part for part in parts]
+        rows, heights = [], []
+        for row, high_ in zip(self.rows, inches, strict=True):
+            for k in range(0, len(row), fit):
+                rows.append([_narrow(panel) for panel in row[k : k + fit]])
+                heights.append(high_)
+        return dataclasses.replace(self, rows=rows, heights=heights, columns=0, size=None)
+
+
+def _narrow(panel: Panel) -> Panel:
+    title = "; ".join([panel.title, *(text for text, _ in panel.note[:1])])
+    return dataclasses.replace(panel, title=title, share=1.0, note=())
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +148,30 @@ class Sheet:
     columns: Sequence[Sequence[Chart]]
     _: dataclasses.KW_ONLY
     legend: bool = False
+
+    @property
+    def panels(self) -> list[Panel]:
+        """Return the panels of all charts."""
+        charts = (chart for column in self.columns for chart in column)
+        return [chart.whole(panel) for chart in charts for panel in chart.panels]
+
+    def only(self, layer: str | None) -> Sheet | Chart:
+        """Return a chart of one of the panels; the sheet without a name."""
+        if layer is None:
+            return self
+        return Chart(self.title, self.subtitle, [[_named(self.panels, layer)]])
+
+
+def _named(panels: Sequence[Panel], layer: str) -> Panel:
+    """Return the first panel of a name."""
+    known: dict[str, Panel] = {}
+    for panel in panels:
+        known.setdefault(panel.name, panel)
+    if layer in known:
+        return known[layer]
+    if len(known) == 1:
+        raise InputError(f"no layer {layer!r}: this figure has one part")
+    raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
 
 
 def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:

@@ -23,13 +23,15 @@ class Entry:
     """One line of a legend.
 
     ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells, whose ``kind`` is
-    the name; ``share`` is the share of the cells with its standard error, ``twin`` the name of the
-    mirror twin, ``points``, shape (m, 2), the stroboscopic points: angle in rad, velocity.
+    the name; ``fraction`` and ``share`` are the share of the cells, in text with its standard
+    error, ``twin`` the name of the mirror twin, ``points``, shape (m, 2), the stroboscopic points:
+    angle in rad, velocity.
     """
 
     id: int
     name: str
     kind: str
+    fraction: float
     share: str
     twin: str
     points: npt.NDArray[np.float64]
@@ -64,14 +66,16 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
         row = dataset.isel(attractor=k)
         twin = int(row["twin"])
         other = names.get(twin, "") if twin != i else ""
-        share = percent(float(row["fraction"]), float(row["stderr"]))
-        found.append(Entry(i, name, str(row["kind"].item()), share, other, points[owner == i]))
+        fraction, mine = float(row["fraction"]), points[owner == i]
+        share = percent(fraction, float(row["stderr"]))
+        found.append(Entry(i, name, str(row["kind"].item()), fraction, share, other, mine))
     if dataset.attrs.get("layers") == "finite_time" and not found:
         return found
     for i, name in ((0, "undecided"), (-1, "failed")):
         share_of = float(facts(dataset).get(name, 0.0))
         if share_of > 0:
-            found.append(Entry(i, name, name, percent(share_of), "", np.empty((0, 2))))
+            none = np.empty((0, 2))
+            found.append(Entry(i, name, name, share_of, percent(share_of), "", none))
     return found
 
 

@@ -53,7 +53,10 @@ class Line(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Points(Mark):
-    """Separate points; ``fill`` and ``edge`` default to ``colour``."""
+    """Separate points; ``fill`` and ``edge`` default to ``colour``.
+
+    A figure may show many ``dense`` points as their density.
+    """
 
     x: Floats
     y: Floats
@@ -65,6 +68,7 @@ class Points(Mark):
     edge_width: float = 0.0
     halo: str = ""
     clip: bool = True
+    dense: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +124,8 @@ class Image(Mark):
     """Cells between the ends of both axes, row 0 lowest.
 
     ``values`` are numbers, shape (rows, columns), nan where missing, coloured by ``colours``; or
-    they are indices into ``classes``, pairs of name and colour.
+    they are indices into ``classes``, pairs of name and colour. A region large enough for the text
+    of its class in ``labels`` contains it, in place of the entry of the legend named beside it.
     """
 
     values: npt.NDArray[Any]
@@ -129,6 +134,7 @@ class Image(Mark):
     _: dataclasses.KW_ONLY
     colours: Colours | None = None
     classes: Sequence[tuple[str, str]] = ()
+    labels: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True, eq=False)

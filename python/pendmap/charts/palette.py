@@ -42,6 +42,11 @@ FILLED = "#c4c4c4"
 UNNAMED = "#8a8a8a"
 """Attractors of unknown name and kind."""
 
+_LINEAR = 0.04045  # Value of sRGB up to which it is proportional to luminance
+
+CONTRAST = 2.0
+"""Least contrast (WCAG 2.2) of points with a white ground; yellow has 1.3, sky blue 2.3."""
+
 _DIVERGING = np.array(
     [
         (5, 48, 97),
@@ -163,6 +168,21 @@ def parts(code: str) -> tuple[int, int, int]:
     return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)
 
 
+def luminance(code: str) -> float:
+    """Return the relative luminance of ``"#rrggbb"``, 0 to 1 (WCAG 2.2)."""
+    srgb = np.array(parts(code)) / 255
+    linear = np.where(srgb <= _LINEAR, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+@functools.cache
+def on_white(code: str) -> str:
+    """Return a colour ``"#rrggbb"`` for points and lines on white: darkened if it is too light."""
+    shares = (k / 20 for k in range(20))
+    dark = (_toward(code, 0, share) for share in shares)
+    return next(one for one in dark if 1.05 / (luminance(one) + 0.05) >= CONTRAST)
+
+
 def describe(name: str, kind: str | None = None) -> str:
     """Return the colour's name in words, for a legend that cannot show it: ``"sky blue"``."""
     return in_words(colour(name, kind))
@@ -218,6 +238,11 @@ def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 def _mixed(code: str, round_: int) -> str:
     """Return a colour mixed for a repetition of its family's colours."""
     ground, part, _ = _LAPS[(round_ - 1) % len(_LAPS)]
+    return _toward(code, ground, part)
+
+
+def _toward(code: str, ground: int, part: float) -> str:
+    """Return a colour mixed with a grey, 0 to 255, of this share."""
     mixed = (round((1 - part) * value + part * ground) for value in parts(code))
     return "#{:02x}{:02x}{:02x}".format(*mixed)
 

@@ -13,6 +13,7 @@ from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import ALARM, QUIET, Line, Mark, Points, Span, Steps, Text
 from pendmap.formatting import listed, moment, typographic
+from pendmap.records import Run
 from pendmap.records.noise import noise_floor
 from pendmap.records.summary import noise_said, noise_unit
 from pendmap.signal.local_polynomial import local_fit
@@ -20,7 +21,7 @@ from pendmap.signal.robust import true_runs
 
 if TYPE_CHECKING:
     from pendmap.charts.marks import Floats
-    from pendmap.records import Experiment, Run
+    from pendmap.records import Experiment
 
 USED: Final = "#1d3557"
 UNUSED: Final = "#a9a9a9"
@@ -35,8 +36,10 @@ SHORT: Final = 2e-3  # Duration of a finding, over the record's, below which it 
 WIDTH: Final = 8.6  # Width of a figure, inches
 
 
-def sheet(records: Experiment, *, width: float = WIDTH) -> Chart:
+def sheet(records: Experiment | Run, *, width: float = WIDTH) -> Chart:
     """Return one record in detail, or a strip of each run."""
+    if isinstance(records, Run):
+        return _one(records, width)
     return _one(records.runs[0], width) if len(records.runs) == 1 else _many(records, width)
 
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pendmap import charts
 from pendmap.charts.basins import refuse_too_large
 from pendmap.charts.selection import shown
-from pendmap.errors import InputError
+from pendmap.errors import InputError, short_repr
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.chart import Chart
+    from pendmap.charts.chart import Chart, Sheet
 
 
 class Builder(Protocol):
@@ -24,6 +24,14 @@ class Builder(Protocol):
         """Return the chart."""
 
 
+RESULTS: Final = {
+    "Experiment": "record",
+    "Run": "record",
+    "IdentificationReport": "identification",
+    "Comparison": "comparison",
+    "Discrepancy": "diagnosis",
+}
+"""Results that are no datasets, by the names of their classes, and the modules of their charts."""
 BUILDERS: Final[dict[str, Builder]] = {}  # Builders of kinds without a module here
 
 
@@ -41,11 +49,10 @@ def _builder(kind: str) -> Builder | None:
 
 def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
     """Return a dataset prepared for drawing; raise an error without a chart or enough memory."""
-    kind = dataset.attrs.get("kind")
+    kind = getattr(dataset, "attrs", {}).get("kind")
     if not isinstance(kind, str) or _builder(kind) is None:
-        raise InputError(
-            f"cannot {action} a dataset of kind {kind!r}; kinds that can be: {', '.join(kinds())}"
-        )
+        what = f"a dataset of kind {kind!r}" if hasattr(dataset, "attrs") else short_repr(dataset)
+        raise InputError(f"cannot {action} {what}; kinds that can be: {', '.join(kinds())}")
     dataset = shown(dataset)
     refuse_too_large(dataset)
     return dataset
@@ -57,3 +64,12 @@ def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     if builder is None:
         raise InputError(f"no chart of kind {dataset.attrs['kind']!r}")
     return builder(dataset, layer=layer, cells=cells)
+
+
+def of_result(result: Any, *, layer: str | None = None, cells: int = 1200) -> Chart | Sheet:  # noqa: ANN401
+    """Return what a figure shows of a dataset, of records, or of what was found in records."""
+    name = RESULTS.get(type(result).__name__)
+    if name is None:
+        return build(ready(result, "draw"), layer=layer, cells=cells)
+    made: Chart | Sheet = importlib.import_module(f"pendmap.charts.{name}").sheet(result)
+    return made.only(layer)

@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import Line
+from pendmap.errors import InputError
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ class RunPanel:
 
 
 def of_runs(runs: Sequence[RunPanel], *, title: str, subtitle: str) -> Chart:
-    """Return one panel per run, measured angle against time."""
+    """Return one panel per run, measured angle against time; InputError without any."""
+    if not runs:
+        raise InputError("runs must hold one record or more, got []")
     columns = min(len(runs), 2 if len(runs) <= COLUMNS else 3)
     panels = []
     for run in runs:

@@ -64,7 +64,7 @@ def command(  # noqa: PLR0913 (an option each)
     with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = write_all(outputs.files(comparison, None, "draw_comparison"), keep=True)
+    written = write_all(outputs.files(comparison, None), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
     lines = doubts_first(comparison, doubts)

@@ -34,5 +34,5 @@ def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa
     outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    written = write_all(outputs.files(experiment, None, "draw_record"))
+    written = write_all(outputs.files(experiment, None))
     outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

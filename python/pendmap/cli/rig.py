@@ -117,7 +117,9 @@ def command(  # noqa: PLR0913 (an option each)
 
 def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
     """Draw the records with their public description, without hidden values."""
-    from pendmap import render, virtual_rig
+    from pendmap import virtual_rig
+    from pendmap.charts.runs import RunPanel, of_runs
+    from pendmap.render import draw
 
     held = virtual_rig.held_out(experiment)
     records = []
@@ -128,12 +130,12 @@ def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
             omega = "\N{GREEK CAPITAL LETTER OMEGA}"
             words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
         words += ["held out"] if k in held else []
-        records.append(render.RunPanel(", ".join(words), run.time, run.angle))
+        records.append(RunPanel(", ".join(words), run.time, run.angle))
     sensor = experiment.sensor
     counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
     subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
     title = f"Measured angle: {name}"
-    return render.draw_runs(records, path, title=title, subtitle=subtitle)
+    return draw(of_runs(records, title=title, subtitle=subtitle), path)
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:

@@ -177,14 +177,13 @@ class Outputs:
         self,
         result: Any,  # noqa: ANN401 (a dataset or a report)
         save: Write | None,
-        draw: str = "draw",
         record: str = "record",
     ) -> Iterator[tuple[Write, Path]]:
         """Yield writer and path of each file; import matplotlib and Rerun only when needed."""
         if self.out is not None and save is not None:
             yield save, self.out
         for path, module, write in (
-            (self.plot, "render", draw),
+            (self.plot, "render", "draw"),
             (self.report, "render", "write_report"),
             (self.rerun, "viewer", record),
         ):

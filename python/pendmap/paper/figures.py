@@ -94,8 +94,7 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
-    from pendmap import render  # noqa: PLC0415
-    from pendmap.charts import comparison, tongues  # noqa: PLC0415
+    from pendmap.charts import comparison, identification, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import motions, pendulum  # noqa: PLC0415
     from pendmap.paper import tumbling as chaos  # noqa: PLC0415
@@ -119,14 +118,13 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
         chart = comparison.steady if key == "8" else comparison.tumbling
         return save(chart(runs, title, subtitle), path)
-    found = report(seed)
-    return render.draw_identification(
-        found,
-        path,
-        parts=(_PARTS[key],),
-        title=title,
-        subtitle=f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by "
-        f"0.05°, seed {seed}",
+    subtitle = (
+        f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°, "
+        f"seed {seed}"
+    )
+    parts = (_PARTS[key],)
+    return save(
+        identification.sheet(report(seed), parts=parts, title=title, subtitle=subtitle), path
     )
 
 

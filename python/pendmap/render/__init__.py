@@ -1,57 +1,78 @@
 """Matplotlib figures for papers; the only package that imports matplotlib.
 
-``draw`` chooses the figure of a dataset by its kind; records, comparisons, diagnoses and
-identifications have functions of their own. No display is needed.
+:mod:`pendmap.plot` draws into Axes and figures of one's own, ``draw`` into files. No display is
+needed.
 """
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
 
 from pendmap.charts import registry
-from pendmap.charts.runs import RunPanel, of_runs
+from pendmap.charts.chart import Chart, Sheet
 from pendmap.errors import InputError
-from pendmap.render import drawing
-from pendmap.render.drawing import save
-from pendmap.render.style import SUFFIXES, written
+from pendmap.render import drawing, style
+from pendmap.render.style import SUFFIXES
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
 
-    import xarray as xr
+    from matplotlib.figure import Figure
 
-    from pendmap.charts.chart import Chart
-    from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
-    from pendmap.identification import IdentificationReport
-    from pendmap.records import Experiment
 
-__all__ = [
-    "SUFFIXES",
-    "RunPanel",
-    "draw",
-    "draw_comparison",
-    "draw_discrepancy",
-    "draw_identification",
-    "draw_record",
-    "draw_runs",
-    "write_report",
-]
+__all__ = ["SUFFIXES", "draw", "figure_of", "write_report"]
+
+_INCH = 25.4  # mm
+MOST_NARROW, MOST_WIDE = 40.0, 500.0  # Least and greatest width of a figure, mm
+
+
+def figure_of(  # noqa: PLR0913 (all of these a user may choose)
+    result: Any,  # noqa: ANN401 (a dataset, records, or what was found in records)
+    *,
+    layer: str | None = None,
+    size: tuple[float, float] | None = None,
+    width: float | None = None,
+    title: bool = True,
+    dpi: float = 200.0,
+    colormap: str | None = None,
+) -> Figure:
+    """Return the figure of a result, or of a chart; arguments are those of :func:`draw`."""
+    if width is not None and not (size is None and MOST_NARROW <= width <= MOST_WIDE):
+        raise InputError(
+            f"width must be {MOST_NARROW:g} to {MOST_WIDE:g} mm, and no size given, got {width!r}"
+        )
+    if isinstance(result, Chart | Sheet):
+        made = result
+    else:
+        wide = width / _INCH if width else max(size or (0.0,))
+        cells = max(drawing.CELLS, math.ceil(wide * dpi))
+        made = registry.of_result(result, layer=layer, cells=cells)
+    if colormap is not None:
+        made = drawing.in_colours(made, colormap)
+    narrow = style.IN_COLUMN if width is not None and width < style.COLUMN else {}
+    with mpl.rc_context(style.RC | narrow):
+        return drawing.draw(
+            made, size=size, dpi=dpi, width=width / _INCH if width else None, title=title
+        )
 
 
 def draw(  # noqa: PLR0913 (all of these a user may choose)
-    dataset: xr.Dataset,
+    result: Any,  # noqa: ANN401 (as figure_of)
     path: str | os.PathLike[str],
     *,
     layer: str | None = None,
     size: tuple[float, float] | None = None,
+    width: float | None = None,
+    title: bool = True,
     dpi: float | None = None,
     colormap: str | None = None,
 ) -> Path:
-    """Draw a dataset into a file.
+    """Draw a result into a file.
 
     Basin map: labels, attractors with their shares, and settle time; with unreliable labels the
     settle time and net turns come first; with meaningless labels the net turns and the finite-time
@@ -61,16 +82,18 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     boundaries. Melnikov's criterion: the threshold against the frequency. Trajectory: time history,
     energy, phase plane, Poincare section. Exponent: growth along the start, the running mean, its
     distribution. Lifetime: the survival curve with its tail, and the mean lifetime against the
-    start of the tail.
+    start of the tail. Record: the angle with samples used and not used for fitting, findings, the
+    sampling intervals, the noise; of several runs a strip each. Identification: figures 4 to 7 of
+    Horton, Wiercigroch & Xu (2008) and their table 1. Comparison: record and model, the residual
+    with the noise, errors of periods and peaks. Diagnosis: residuals before and after, forecast
+    errors, the missing torque, the candidates, the first effect run by run.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        Result of ``pendmap.basins``, ``pendmap.orbit``, ``pendmap.parameter_map``,
-        ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
-        ``pendmap.melnikov`` or ``pendmap.simulate``; ``attrs["kind"]`` names the kind. A
-        selection (a range, every k-th value, reversed, transposed) is drawn with its own cells,
-        coordinates and shares.
+    result : xarray.Dataset or other result
+        Result of an analysis, of ``pendmap.load``, ``read_experiment``, ``identify``, ``compare``
+        or ``diagnose``. A selection of a dataset (a range, every k-th value, reversed, transposed)
+        is drawn with its own cells, coordinates and shares.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
@@ -80,9 +103,14 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
         of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map over two parameters
         ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
-        ``certainty``, or ``share KIND``.
+        ``certainty``, or ``share KIND``. An unknown one is answered with those of the result.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
+    width : float, optional
+        Width in mm, in place of ``size``: 86 is one column of most journals, 178 two. The figure is
+        as high as its parts need; below 120 mm its fonts have 8 points.
+    title : bool
+        False: no title and subtitle, for a figure with a caption.
     dpi : float, optional
         Pixels per inch, 200 by default.
     colormap : str, optional
@@ -96,7 +124,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Raises
     ------
     InputError
-        For an unknown kind of dataset, suffix, layer or colour map, and for an impossible size or
+        For an unknown kind of result, suffix, layer or colour map, and for an impossible size or
         resolution.
     MemoryError
         If the dataset is too large.
@@ -105,120 +133,14 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 
     Examples
     --------
-    >>> figures.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
+    >>> render.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
     """
-    dataset = registry.ready(dataset, "draw")
 
-    def chart(dpi: float) -> Chart:
-        cells = max(drawing.CELLS, math.ceil(max(size or (0.0,)) * dpi))
-        made = registry.build(dataset, layer=layer, cells=cells)
-        return made if colormap is None else drawing.in_colours(made, colormap)
+    def make(dpi: float) -> Figure:
+        look: dict[str, Any] = {"size": size, "width": width, "title": title, "colormap": colormap}
+        return figure_of(result, layer=layer, dpi=dpi, **look)
 
-    return written(
-        path, lambda dpi: drawing.draw(chart(dpi), size=size, dpi=dpi), size=size, dpi=dpi
-    )
-
-
-def draw_record(
-    records: Experiment,
-    path: str | os.PathLike[str],
-    *,
-    size: tuple[float, float] | None = None,
-    dpi: float | None = None,
-) -> Path:
-    """Draw the records of an experiment into a file.
-
-    One record: the angle with samples used and not used for fitting, the findings at their times
-    and in words, the sampling intervals, the noise against speed. Several runs: a strip for each.
-
-    Parameters
-    ----------
-    records : Experiment
-        Result of ``pendmap.read_experiment``.
-    path : str or path
-        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
-    size : (float, float), optional
-        Width and height in inches; by default as large as the parts need.
-    dpi : float, optional
-        Pixels per inch, 200 by default.
-
-    Returns
-    -------
-    Path
-        The written file.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix and an impossible size or resolution.
-    OSError
-        If the file cannot be written.
-    """
-    from pendmap.charts import record  # noqa: PLC0415 (what reads records takes a while)
-
-    chart = record.sheet(records, **({"width": size[0]} if size else {}))
-    return save(chart, path, size=size, dpi=dpi)
-
-
-def draw_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
-    """Draw a model and the records that it is compared with into a file.
-
-    For each run: record and model, the residual with the noise, errors of periods and peaks.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Result of :func:`pendmap.comparison.compare`.
-    path : str or path
-        As for :func:`pendmap.render.draw`.
-
-    Returns
-    -------
-    Path
-        The written file.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix.
-    OSError
-        If the file cannot be written.
-    """
-    from pendmap.charts import comparison as charts  # noqa: PLC0415 (scipy takes a while)
-
-    return save(charts.sheet(comparison), path)
-
-
-def draw_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
-    """Draw a diagnosis into a file.
-
-    The residuals of the runs with the worst baseline fit, before and after, over the noise; the
-    residual by run, and the forecast error against the horizon; the missing torque of each model
-    over angle and velocity, with 95 % intervals; the scores of the candidates; the first effect's
-    size run by run.
-
-    Parameters
-    ----------
-    found : Discrepancy
-        Result of ``pendmap.diagnosis.diagnose``.
-    path : str or path
-        As for :func:`pendmap.render.draw`.
-
-    Returns
-    -------
-    Path
-        The written file.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix.
-    OSError
-        If the file cannot be written.
-    """
-    from pendmap.charts import diagnosis  # noqa: PLC0415 (scipy takes a while)
-
-    return save(diagnosis.sheet(found), path)
+    return style.written(path, make, size=size, dpi=dpi)
 
 
 def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
@@ -254,86 +176,3 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
             f"{target.suffix!r}"
         )
     return report.write(found, target)
-
-
-def draw_runs(
-    runs: Sequence[RunPanel], path: str | os.PathLike[str], *, title: str, subtitle: str
-) -> Path:
-    """Draw the records of an experiment into a file: a panel per run, measured angle against time.
-
-    Parameters
-    ----------
-    runs : sequence of RunPanel
-        One or more.
-    path : str or path
-        As for :func:`pendmap.render.draw`.
-    title, subtitle : str
-        Text above all panels.
-
-    Returns
-    -------
-    Path
-        The written file.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix, or without any run.
-    OSError
-        If the file cannot be written.
-    """
-    if not runs:
-        raise InputError("runs must hold one record or more, got []")
-    return save(of_runs(runs, title=title, subtitle=subtitle), path)
-
-
-def draw_identification(  # noqa: PLR0913 (all of these a user may choose)
-    report: IdentificationReport,
-    path: str | os.PathLike[str],
-    *,
-    size: tuple[float, float] | None = None,
-    dpi: float | None = None,
-    parts: Sequence[str] | None = None,
-    title: str | None = None,
-    subtitle: str | None = None,
-) -> Path:
-    """Draw an identification into a file: figures 4 to 7 of the paper and its table 1.
-
-    Parameters
-    ----------
-    report : IdentificationReport
-        Result of ``pendmap.identification.identify_experiment``.
-    path : str or path
-        The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
-    size : (float, float), optional
-        Width and height in inches; by default as large as the parts need.
-    dpi : float, optional
-        Pixels per inch, 200 by default.
-    parts : sequence of str, optional
-        Parts to draw, by default all: ``record`` (figure 4: angle, velocity, its sign, odd and even
-        half cycles), ``decrement`` (5: from triples of peaks, with the zero error and without),
-        ``decay`` (6: every model with the record), ``errors`` (7: of periods and peaks) and
-        ``table`` (table 1).
-    title, subtitle : str, optional
-        Text above all parts; by default the record's name and the measured quantities.
-
-    Returns
-    -------
-    Path
-        The written file.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix or part, and for an impossible size or resolution.
-    OSError
-        If the file cannot be written.
-
-    References
-    ----------
-    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 3.
-    """
-    from pendmap.charts import identification as charts  # noqa: PLC0415 (likewise)
-
-    sheet = charts.sheet(report, parts=parts, title=title, subtitle=subtitle)
-    return save(sheet, path, size=size, dpi=dpi)

@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pendmap.charts.chart import Sheet
+from pendmap.charts.chart import Chart, Sheet
 from pendmap.charts.marks import ALARM, QUIET, Image
 from pendmap.errors import InputError
-from pendmap.render import marks, style, ticks
+from pendmap.render import marks, regions, style, ticks
 
 if TYPE_CHECKING:
     import os
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase, SubFigure
 
-    from pendmap.charts.chart import Chart, Panel
+    from pendmap.charts.chart import Panel
     from pendmap.charts.marks import Colours, Ends, Mark
 
     Drawn = tuple[Axes, Panel]
@@ -61,14 +61,63 @@ def save(
     return style.written(path, lambda dpi: draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
 
 
-def draw(chart: Chart | Sheet, *, size: Ends | None = None, dpi: float = 200.0) -> Figure:
-    """Return the figure of a chart or sheet; raise InputError if ``size``, inches, is too small."""
+def draw(
+    chart: Chart | Sheet,
+    *,
+    size: Ends | None = None,
+    dpi: float = 200.0,
+    width: float | None = None,
+    title: bool = True,
+) -> Figure:
+    """Return the figure of a chart or sheet; raise InputError if ``size``, inches, is too small.
+
+    A figure of a ``width``, inches, is as high as its panels need, row for row.
+    """
+    if not title:
+        chart = replace(chart, title="", subtitle="")
     if isinstance(chart, Sheet):
+        if width is not None:
+            column = [_in_width(one, width) for column in chart.columns for one in column]
+            chart = replace(chart, columns=[column])
         return _sheet(chart, size, dpi)
+    if width is not None:
+        chart = _in_width(chart, width)
+        return _made(chart, _size(chart), dpi)[0]
+    chart = _labelled(chart, size or _size(chart))
     figure, needed = _made(chart, size or _size(chart), dpi)
     if size is not None and _lacks(size, needed):
         _refuse(size, _least(chart, dpi))
     return figure
+
+
+def _in_width(chart: Chart, width: float) -> Chart:
+    """Return a chart of a width in inches, as high as its panels and its legend need."""
+    narrow = chart.in_width(width)
+    below = BELOW * len(narrow.rows) if chart.size is None else 0.0
+    high = sum(narrow.heights) + below + _head(chart) + LINE * len(chart.notes)
+    narrow = _labelled(narrow, (width, high))
+    return replace(narrow, size=(width, high + _rows(_all_marks(narrow), width)))
+
+
+def _labelled(chart: Chart, size: Ends) -> Chart:
+    """Return a chart of this size in inches with texts in its large regions."""
+    rows = {id(panel): row for row in chart.rows for panel in row}
+    heights = chart.heights or [max(panel.share for panel in row) for row in chart.rows]
+    highest = dict(zip(map(id, chart.rows), heights, strict=True))
+    down = size[1] - _head(chart) - BELOW * len(heights)
+
+    def room(panel: Panel) -> Ends:
+        row = rows[id(panel)]
+        wide = (size[0] - _aside(row)) * panel.share / sum(one.share for one in row)
+        high = down * highest[id(row)] / sum(heights)
+        return max(wide, LEAST), max(high * panel.share / max(one.share for one in row), LEAST)
+
+    return regions.labelled(chart, room)
+
+
+def _head(chart: Chart | Sheet) -> float:
+    """Return the height of title and subtitle in inches."""
+    return HEAD if chart.title else 0.05
 
 
 def _refuse(size: Ends, least: Ends) -> None:
@@ -80,10 +129,10 @@ def _refuse(size: Ends, least: Ends) -> None:
         )
 
 
-def in_colours(chart: Chart, colormap: str) -> Chart:
+def in_colours(chart: Chart | Sheet, colormap: str) -> Chart:
     """Return a chart with another colour map in its images of numbers."""
     style.colour_map(colormap)
-    if not any(_scales(panel) for panel in chart.panels):
+    if isinstance(chart, Sheet) or not any(_scales(panel) for panel in chart.panels):
         raise InputError(
             f"colormap {colormap!r}: this figure has none; its colours identify attractors"
         )
@@ -134,7 +183,7 @@ def _size(chart: Chart) -> Ends:
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
     width = max(across) + 0.15
     down = sum(heights) * wide * chart.ratio + BELOW * len(rows)
-    return width, down + HEAD + _rows(_all_marks(chart), width) + LINE * len(chart.notes)
+    return width, down + _head(chart) + _rows(_all_marks(chart), width) + LINE * len(chart.notes)
 
 
 def _aside(row: Sequence[Panel]) -> float:
@@ -144,7 +193,7 @@ def _aside(row: Sequence[Panel]) -> float:
 def _rows(named: list[Mark], width: float) -> float:
     """Return the height of a legend of these marks in inches."""
     texts = marks.legend(named)[1]
-    return ROW * -(-len(texts) // _columns(texts, width)) + 0.1 if texts else 0.0
+    return ROW * -(-len(texts) // columns(texts, width)) + 0.1 if texts else 0.0
 
 
 def _all_marks(chart: Chart) -> list[Mark]:
@@ -158,7 +207,7 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     figure = headed(size, dpi, chart.title, chart.subtitle, foot=foot)
     for k, line in enumerate(chart.notes):
         at = (0.06 + LINE * (len(chart.notes) - k)) / size[1]
-        figure.text(LEFT / size[0], at, line, fontsize=8.5, va="top")
+        figure.text(LEFT / size[0], at, style.typeset(line), fontsize=8.5, va="top")
     drawn = fill(figure, chart)
     above = LINE * len(chart.notes) / size[1]
     where: dict[str, Any] = {"bbox_to_anchor": (0.0, above, 1.0, 1.0)} if above else {}
@@ -186,15 +235,18 @@ def write_head(figure: Figure, title: str, subtitle: str) -> float:
     A subtitle too long for one line becomes two, broken at a semicolon; if these would need a much
     smaller font, it becomes one line per part. A long title becomes smaller.
     """
+    if not title:
+        return 0.05
     width, height = (float(side) for side in figure.get_size_inches())
+    title, subtitle = style.typeset(title), style.typeset(subtitle)
     room = width - 2 * LEFT
-    whole = style.inches(subtitle, style.RC["font.size"])
+    whole = style.inches(subtitle, style.points("font.size"))
     lines = [subtitle] if whole <= room else style.halves(subtitle)
     if _SMALLEST * style.longest(lines) > room:
         lines = subtitle.split(";   ")
     shrunk = room / max(style.longest(lines), 1e-3)
     # Small fonts are set wider than in proportion.
-    font = style.RC["font.size"] * (1.0 if shrunk >= 1 else 0.9 * shrunk)
+    font = style.points("font.size") * (1.0 if shrunk >= 1 else 0.9 * shrunk)
     bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
     left = LEFT / width
     figure.text(left, 1 - 0.22 / height, title, fontsize=bold, weight="bold", va="center")
@@ -235,10 +287,10 @@ def fill(
             axes = figure.add_subplot(place)
             if panel.title:
                 mark = f"({next(letters)}) " if several else ""
-                axes.set_title(f"{mark}{panel.title}")
+                axes.set_title(style.typeset(f"{mark}{panel.title}"))
             drawn[-1].append((axes, panel))
     for axes, panel in itertools.chain(*drawn):
-        _panel(axes, panel)
+        panel_into(axes, panel)
     return drawn
 
 
@@ -253,7 +305,7 @@ def _legend(
         figure.legend(
             handles,
             texts,
-            ncols=_columns(texts, width),
+            ncols=columns(texts, width),
             labelspacing=0.45,
             handlelength=1.7,
             handleheight=1.0,
@@ -270,8 +322,9 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     wide = [max(_size(chart)[0] for chart in column) for column in sheet.columns]
     high = [sum(_size(chart)[1] for chart in column) for column in sheet.columns]
     foot = _rows(named, sum(wide))
-    given = size or (sum(wide), max(high) + HEAD + foot)
-    _refuse(given, (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + HEAD + foot))
+    head = _head(sheet)
+    given = size or (sum(wide), max(high) + head + foot)
+    _refuse(given, (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + head + foot))
     figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)
     engine: Any = figure.get_layout_engine()
     _, low, _, tall = engine.get()["rect"]
@@ -282,7 +335,7 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     columns = figure.subfigures(1, len(wide), squeeze=False, width_ratios=wide)[0]
     for part, column in zip(columns, sheet.columns, strict=True):
         shares = [_size(chart)[1] for chart in column]
-        room = (given[1] - HEAD - foot) / sum(shares)
+        room = (given[1] - head - foot) / sum(shares)
         blocks = part.subfigures(len(column), 1, squeeze=False, height_ratios=shares)[:, 0]
         for block, chart in zip(blocks, column, strict=True):
             drawn = _block(block, chart, room * _size(chart)[1], letters, own=not sheet.legend)
@@ -302,12 +355,13 @@ def _block(
     parts: Any = figure.subfigures(2, 1, height_ratios=(above, max(high - above, 0.1)))
     head, body = parts
     words: dict[str, Any] = {"fontsize": 10.5, "weight": "bold", "va": "center"}
-    head.text(LEFT / wide, 1 - 0.17 / above, chart.title, **words)
+    head.text(LEFT / wide, 1 - 0.17 / above, style.typeset(chart.title), **words)
     _legend(head, named, wide, loc="upper left", bbox_to_anchor=(0.0, 1 - heading / above))
     return fill(body, chart, letters)
 
 
-def _panel(axes: Axes, panel: Panel) -> None:
+def panel_into(axes: Axes, panel: Panel) -> None:
+    """Draw the marks of a panel into axes, and set their limits, ticks and names."""
     for mark in panel.marks:
         marks.draw(axes, mark)
     words = axes.texts if panel.bare else []
@@ -329,11 +383,11 @@ def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:
         for axes, panel in panels:
             ticks.turn(axes)
             needed = max((marks.across(mark) for mark in panel.marks), default=0.0)
-            if panel.bare and needed > _inches(axes)[0]:
+            if panel.bare and needed > inches_of(axes)[0]:
                 for text in axes.texts:
                     font = float(text.get_fontsize())
-                    text.set_fontsize(font * _inches(axes)[0] / needed)
-            title, room = axes.get_title(loc="left"), _inches(axes)[0]
+                    text.set_fontsize(font * inches_of(axes)[0] / needed)
+            title, room = axes.get_title(loc="left"), inches_of(axes)[0]
             if title and style.width_of(title) > room + 0.15:
                 axes.set_title(style.folded(title, room))
             if panel.note:
@@ -344,7 +398,7 @@ def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:
 
 def _note(axes: Axes, panel: Panel) -> None:
     """Write paragraphs below a small panel, or beside one that is alone in its row."""
-    wide, high = _inches(axes)
+    wide, high = inches_of(axes)
     beside = wide > high * 2
     free = wide * (1 - panel.share) / panel.share
     used, room = 0.0, high if beside else high * (1 - panel.share) / panel.share
@@ -355,7 +409,7 @@ def _note(axes: Axes, panel: Panel) -> None:
         if k and used + LINE * len(lines) > room:
             return
         words = axes.annotate(
-            "\n".join(lines),
+            style.typeset("\n".join(lines)),
             (1.0, 1.0) if beside else (0.0, 0.0),
             (18.0, -72 * used) if beside else (0.0, -72 * (0.5 + used)),
             xycoords="axes fraction",
@@ -374,7 +428,7 @@ def _needed(figure: Figure, chart: Chart, drawn: list[list[Drawn]]) -> Ends:
     width, height = figure.get_size_inches()
     across, down = [], 0.0
     for row in drawn:
-        lacks = [np.subtract(_room(axes, panel), _inches(axes)) for axes, panel in row]
+        lacks = [np.subtract(_room(axes, panel), inches_of(axes)) for axes, panel in row]
         unit = max(lack[0] / panel.share for lack, (_, panel) in zip(lacks, row, strict=True))
         across.append(unit * sum(panel.share for _, panel in row))
         down += max(lack[1] for lack in lacks)
@@ -387,13 +441,14 @@ def _needed(figure: Figure, chart: Chart, drawn: list[list[Drawn]]) -> Ends:
 def _room(axes: Axes, panel: Panel) -> Ends:
     """Return the width and height that a panel needs, in inches."""
     words = [*panel.y.name.split("\n"), *(look.name for look in _scales(panel))]
-    high = max([LEAST, *(style.inches(text, style.RC["font.size"]) for text in words)])
+    high = max([LEAST, *(style.inches(text, style.points("font.size")) for text in words)])
     title = axes.get_title(loc="left").replace("\n", " ")
     wide = max(LEAST, style.width_of(style.folded(title, 0.0)) - 0.15)
     return (max(wide, 1.2), max(high, 0.9)) if panel.note else (wide, high)
 
 
-def _inches(axes: Axes) -> Ends:
+def inches_of(axes: Axes) -> Ends:
+    """Return width and height of axes in inches."""
     box, dpi = axes.get_window_extent(), _dpi(axes.figure)
     return float(box.width) / dpi, float(box.height) / dpi
 
@@ -406,10 +461,10 @@ def _dpi(part: FigureBase) -> float:
 
 def _entry(text: str) -> float:
     """Return the width of a legend entry with its handle, in inches."""
-    return style.inches(text, style.RC["legend.fontsize"]) + 0.55
+    return style.inches(text, style.points("legend.fontsize")) + 0.55
 
 
-def _columns(texts: Sequence[str], room: float) -> int:
+def columns(texts: Sequence[str], room: float) -> int:
     """Return the number of columns of a legend in ``room`` inches, with nearly full rows."""
     if not texts:
         return 1

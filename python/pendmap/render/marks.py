@@ -16,13 +16,15 @@ from pendmap.formatting import typographic
 from pendmap.render import style
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
 
     from pendmap.charts.marks import Mark
 
 TABLE, APART = 8.0, 0.14  # Font size of a table; least distance between its columns, inches
+_CELLS: Final = 1200  # Greatest number of columns of a density, and three times that of rows
+_PALEST: Final = 0.2  # Opacity of a single point in a density
 MANY: Final = 2000  # Number of points from which they are rasterised in vector files
 
 
@@ -71,7 +73,28 @@ def _points(axes: Axes, mark: charts.Points) -> None:
     if not np.size(mark.x):
         return  # it appears in the legend alone
     many = np.size(mark.x) > MANY
+    if many and mark.dense:
+        _density(axes, mark)
+        return
     axes.plot(mark.x, mark.y, clip_on=mark.clip, rasterized=many, **_spots(mark))
+
+
+def _density(axes: Axes, mark: charts.Points) -> None:
+    """Draw the number of points in each pixel, on a logarithmic scale from pale to full colour."""
+    known = np.isfinite(mark.x) & np.isfinite(mark.y)
+    x, y = mark.x[known], mark.y[known]
+    distinct = np.unique(x)
+    step = float(np.median(np.diff(distinct))) if distinct.size > 1 else 1.0
+    across = min(round((distinct[-1] - distinct[0]) / step) + 1, _CELLS)
+    rows = int(np.clip(x.size / distinct.size, 50, _CELLS // 3))
+    ends = (distinct[0] - step / 2, distinct[-1] + step / 2), (float(y.min()), float(y.max()))
+    counts = np.histogram2d(x, y, (across, rows), ends)[0].T
+    shares = np.log1p(counts) / np.log1p(np.quantile(counts[counts > 0], 0.98))
+    shades = np.empty((*counts.shape, 4))
+    shades[..., :3] = to_rgb(mark.colour)
+    shades[..., 3] = np.where(counts > 0, np.clip(shares, _PALEST, 1.0), 0.0)
+    where: dict[str, Any] = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+    axes.imshow(shades, extent=(*ends[0], *ends[1]), **(where | _common(mark)))
 
 
 def _band(axes: Axes, mark: charts.Band) -> None:
@@ -113,7 +136,7 @@ def _text(axes: Axes, mark: charts.Text) -> None:
         look["bbox"] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2}
     across, up = mark.align
     look |= {"color": mark.colour, "ha": across, "va": up, "fontsize": mark.size}
-    axes.text(mark.x, mark.y, mark.text, **(look | _common(mark)))
+    axes.text(mark.x, mark.y, style.typeset(mark.text), **(look | _common(mark)))
 
 
 def _table(axes: Axes, mark: charts.Table) -> None:
@@ -121,9 +144,9 @@ def _table(axes: Axes, mark: charts.Table) -> None:
     look: dict[str, Any] = {"va": "bottom", "fontsize": TABLE, "linespacing": 1.15}
     for down, row in enumerate([mark.head, *mark.rows]):
         look["color"] = charts.INK if down else charts.QUIET
-        axes.text(0.0, down + 1.4, row[0], ha="left", **look)
+        axes.text(0.0, down + 1.4, style.typeset(row[0]), ha="left", **look)
         for edge, text in zip(edges[1:], row[1:], strict=True):
-            axes.text(edge / edges[-1], down + 1.4, text, ha="right", **look)
+            axes.text(edge / edges[-1], down + 1.4, style.typeset(text), ha="right", **look)
 
 
 def _columns(mark: charts.Table) -> list[float]:
@@ -157,7 +180,7 @@ def _image(axes: Axes, mark: charts.Image) -> None:
         bar.set_ticks(list(look.ticks), labels=texts)
     bar.ax.minorticks_off()
     bar.outline.set_linewidth(0.7)
-    bar.set_label(look.name, labelpad=4)
+    bar.set_label(style.typeset(look.name), labelpad=4)
 
 
 def _norm(look: charts.Colours) -> Normalize:
@@ -184,7 +207,7 @@ _DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
 }
 
 
-def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
+def legend(marks: Sequence[Mark]) -> tuple[list[Any], list[str]]:
     """Return handles and texts of the named marks; marks of equal name share one entry."""
     named: dict[str, list[Any]] = {}
     for mark in marks:
@@ -195,7 +218,8 @@ def legend(marks: list[Mark]) -> tuple[list[Any], list[str]]:
         elif mark.name:
             named.setdefault(mark.name, []).append(_handle(mark))
     kept = {name: handles[:3] for name, handles in named.items() if name}
-    return [tuple(each) if len(each) > 1 else each[0] for each in kept.values()], list(kept)
+    texts = [style.typeset(name) for name in kept]
+    return [tuple(each) if len(each) > 1 else each[0] for each in kept.values()], texts
 
 
 def _handle(mark: Mark) -> Any:  # noqa: ANN401 (an artist)

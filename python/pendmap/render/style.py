@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import functools
+import re
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-from pendmap.charts.marks import INK
 from pendmap.errors import InputError
 from pendmap.files import whole_file
 
@@ -24,31 +24,15 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
 
-RC: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "axes.titlepad": 6.0,
-    "axes.unicode_minus": True,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "pendmap",
-    "pdf.fonttype": 42,
-    "path.simplify": True,
-    "agg.path.chunksize": 20000,
+STYLE: Final = Path(__file__).parents[1] / "figures.mplstyle"
+RC: Final[dict[Any, Any]] = dict(mpl.rc_params_from_file(STYLE, use_default_template=False))
+COLUMN: Final = 120.0  # Width of a figure below which its fonts are those of a journal's column, mm
+IN_COLUMN: Final[dict[Any, Any]] = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
 }
 
 MOST, PIXELS = 100.0, 20000  # Largest side of a figure, inches and pixels
@@ -56,20 +40,67 @@ MOST, PIXELS = 100.0, 20000  # Largest side of a figure, inches and pixels
 DPI = (20, 1200)  # Least and greatest pixels per inch
 
 
+SYMBOLS: Final = {
+    "E / (m g l)": "$E/(mgl)$",
+    "d²θ/dt²": "$d^2θ/dt^2$",
+    "dθ/dτ": "$dθ/dτ$",
+    "dθ/dt": "$dθ/dt$",
+    "θr": "$θ_r$",
+    "w0": "$ω_0$",
+    "c/m": "$c/m$",
+    "Tr": "$T_r$",
+    "α²": "$α^2$",
+    **{letter: f"${letter}$" for letter in "θτγωΩφζ"},
+    **{letter: f"${letter}$" for letter in "ptelEYfQ"},
+}
+"""Symbols in the texts of charts, and their form in mathtext."""
+_FOUND: Final = re.compile(
+    r"\$-?10\^\{-?\d+\}\$|"
+    + "|".join(map(re.escape, dict.fromkeys(SYMBOLS.values())))
+    + r"|\$|(?<![\w$])(?:E / \(m g l\)|d²θ/dt²|dθ/dτ|dθ/dt|θr|w0|c/m|Tr|α²|[θτγωΩφζ])(?![\w$])"
+    r"|(?<![^\s(,;|])[ptelEYfQ](?= (?:[=<>(−-]|and )|$)"
+)
+"""Mathtext made here, a dollar sign of a name, or a symbol; a Latin letter only as a quantity."""
+
+
 @functools.lru_cache(maxsize=4096)
+def typeset(text: str) -> str:
+    """Return a text of a chart with its symbols in italics, by mathtext.
+
+    >>> typeset("θr = 0.02,  p (g)")
+    '$θ_r$ = 0.02,  $p$ (g)'
+    """
+
+    def one(found: re.Match[str]) -> str:
+        return r"\$" if found[0] == "$" else SYMBOLS.get(found[0], found[0])
+
+    return _FOUND.sub(one, text.replace(r"\$", "$"))
+
+
+def points(name: str) -> float:
+    """Return the font size of a setting such as ``"axes.titlesize"``, in points."""
+    settings: Any = mpl.rcParams
+    return float(FontProperties(size=settings[name]).get_size_in_points())
+
+
 def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
     """Return the width of a line of text in inches, by default in the font size of ticks."""
     if not text.strip():
         return 0.0
-    weight = "bold" if bold else "normal"
-    font = FontProperties(family=RC["font.sans-serif"], weight=weight)
-    path = TextPath((0, 0), text, size=size or RC["xtick.labelsize"], prop=font)
+    family = tuple(mpl.rcParams["font.family"])
+    return _width(typeset(text), size or points("xtick.labelsize"), family, bold=bold)
+
+
+@functools.lru_cache(maxsize=4096)
+def _width(text: str, size: float, family: tuple[str, ...], *, bold: bool) -> float:
+    font = FontProperties(family=list(family), weight="bold" if bold else "normal")
+    path = TextPath((0, 0), text, size=size, prop=font)
     return float(path.get_extents().width) / 72
 
 
 def width_of(title: str) -> float:
     """Return the width of the longest line of a panel's title, in inches."""
-    return max(inches(line, RC["axes.titlesize"]) for line in title.split("\n"))
+    return max(inches(line, points("axes.titlesize")) for line in title.split("\n"))
 
 
 def folded(title: str, room: float) -> str:
@@ -93,7 +124,7 @@ def halves(text: str) -> list[str]:
 
 def longest(lines: Sequence[str]) -> float:
     """Return the width of the longest line, in inches."""
-    return max(inches(line, RC["font.size"]) for line in lines)
+    return max(inches(line, points("font.size")) for line in lines)
 
 
 def colour_map(name: str) -> Colormap:

@@ -85,7 +85,7 @@ def scale(axes: Axes, which: str, side: charts.Axis) -> None:
         axis.set_major_locator(ticks)
         axis.set_major_formatter(FuncFormatter(lambda at, _: ticks.labels.get(float(at), "")))
     axis.set_minor_locator(NullLocator())
-    axis.set_label_text(name)
+    axis.set_label_text(style.typeset(name))
     if which == "y":
         axis.labelpad = 2
 

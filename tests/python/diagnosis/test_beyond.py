@@ -70,7 +70,7 @@ def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
     assert "Verdict: named" in text
     for name in unknown:
         assert f"Not computed: {name}: " in text
-    render.draw_discrepancy(found, tmp_path / "a.png")
+    render.draw(found, tmp_path / "a.png")
     render.write_report(found, tmp_path / "a.html")
     viewer.record_discrepancy(found, tmp_path / "a.rrd")
     report = (tmp_path / "a.html").read_text(encoding="utf-8")

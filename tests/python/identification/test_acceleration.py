@@ -132,7 +132,7 @@ def test_figure_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
     assert any("bias = " in line for line in as_text(report))
     model = identified_model(report)
     assert not {"bias", "tilt"} & set(model.notes["covariance"]["names"])
-    render.draw_identification(report, tmp_path / "sheet.png")
+    render.draw(report, tmp_path / "sheet.png")
     # The other methods read the reconstructed angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)

@@ -231,7 +231,7 @@ def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
     text = as_text(experiment)
     assert "rad/s (0.2" in text
     assert "+0.0" in next(line for line in text.splitlines() if "  bias " in line)
-    render.draw_record(experiment, tmp_path / "record.png")
+    render.draw(experiment, tmp_path / "record.png")
 
 
 def test_an_angle_is_preferred_to_a_gyroscope(tmp_path: Path) -> None:
@@ -261,7 +261,7 @@ def test_figure_model_and_comparison_of_a_gyroscope(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates(release=1.0, seconds=40)))
     report = identify_experiment(there)
     assert report.best.method == "trajectory"
-    render.draw_identification(report, tmp_path / "sheet.png")
+    render.draw(report, tmp_path / "sheet.png")
     assert "bias" not in identified_model(report).notes["covariance"]["names"]
     # The other methods read the integrated angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):

@@ -92,7 +92,7 @@ def test_a_figure_is_written(pendmap_command: Run, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     assert run.stdout == ""
     for suffix in (".svg", ".pdf"):
-        render.draw_record(pendmap.read_experiment(path), tmp_path / f"a{suffix}")
+        render.draw(pendmap.read_experiment(path), tmp_path / f"a{suffix}")
     for suffix in (".png", ".svg", ".pdf"):
         assert (tmp_path / f"a{suffix}").stat().st_size > 5000
 

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 import motions
 import pendmap
 import synthetic
-from drawn import made, named, titles, written
+from drawn import made, named, plain, regions, titles, written
 from pendmap.charts import palette
 
 if TYPE_CHECKING:
@@ -28,29 +28,25 @@ def test_labels_come_first_and_settle_time_second() -> None:
     assert titles(figure) == ["basins of attraction", "settle time"]
     assert "periods to settle" in written(figure)
     assert "\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 1,  \N{GREEK SMALL LETTER OMEGA} = 2" in (
-        figure.texts[1].get_text()
+        plain(figure.texts[1].get_text())
     )
     settle = figure.axes[1].images[-1]
     assert isinstance(settle.norm, LogNorm)
-    assert figure.axes[0].get_xlabel() == "\N{GREEK SMALL LETTER THETA} (rad)"
+    assert plain(figure.axes[0].get_xlabel()) == "\N{GREEK SMALL LETTER THETA} (rad)"
     ticks = [tick.get_text() for tick in figure.axes[0].get_xticklabels()]
     assert ticks == ["\N{MINUS SIGN}π", "\N{MINUS SIGN}π/2", "0", "π/2", "π"]
 
 
 def test_without_drive_there_is_no_frequency() -> None:
     figure = made(synthetic.painted(synthetic.USUAL[:2], p=0.0, torque=0.5, phase=0.3))
-    assert (
-        figure.texts[1]
-        .get_text()
-        .startswith("\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 0,  torque = 0.5;")
-    )
+    said = plain(figure.texts[1].get_text())
+    assert said.startswith("\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 0,  torque = 0.5;")
     assert "periods of 2\N{GREEK SMALL LETTER PI} to settle" in written(figure)
 
 
 def test_legend_names_share_error_and_twin() -> None:
     dataset = synthetic.painted(synthetic.USUAL[:3], (30, 40))
-    texts = named(made(dataset))
-    assert len(texts) == 3
+    texts = [entry.text for entry in legend.entries(dataset)]
     share, stderr = (100 * float(dataset[v].values[1]) for v in ("fraction", "stderr"))
     assert texts[1] == (
         f"rotation 1:+1, {share:.1f} \N{PLUS-MINUS SIGN} {stderr:.1f} %,"
@@ -60,9 +56,24 @@ def test_legend_names_share_error_and_twin() -> None:
     assert "twin" not in texts[0]
 
 
+def test_large_regions_have_their_names_small_ones_are_in_the_legend() -> None:
+    dataset = synthetic.painted(synthetic.USUAL[:3], (30, 40))
+    shares = [f"{100 * float(share):.3g} %" for share in dataset["fraction"].values]
+    called = ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1")
+    figure = made(dataset)
+    assert regions(figure) == [f"{name}\n{one}" for name, one in zip(called, shares, strict=True)]
+    assert named(figure) == []
+    for text in figure.axes[0].texts:
+        box, panel = text.get_window_extent(), figure.axes[0].get_window_extent()
+        assert panel.x0 < box.x0 < box.x1 < panel.x1
+    many = made(synthetic.painted(synthetic.USUAL[:10], (30, 40)))
+    assert len(regions(many)) + len(named(many)) == 10
+
+
 def test_undecided_and_failed_are_in_the_legend_only_if_present() -> None:
-    both = named(made(synthetic.painted(shape=(10, 10), undecided=7, failed=3)))
-    assert both[-2:] == ["undecided, 7 %", "failed, 3 %"]
+    figure = made(synthetic.painted(shape=(10, 10), undecided=7, failed=3))
+    both = [*named(figure), *(text.replace("\n", ", ") for text in regions(figure))]
+    assert {"undecided, 7 %", "failed, 3 %"} < set(both)
     assert not [t for t in named(made(synthetic.painted())) if t.startswith(("undec", "fail"))]
 
 

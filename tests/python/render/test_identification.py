@@ -125,12 +125,10 @@ def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
 
 def test_files_are_complete(tmp_path: Path) -> None:
     for suffix in render.SUFFIXES:
-        path = render.draw_identification(
-            report("begins under 12 degrees"), tmp_path / f"a{suffix}", parts=("errors",)
-        )
+        path = render.draw(report("begins under 12 degrees"), tmp_path / f"a{suffix}")
         assert path.stat().st_size > 5000
     with pytest.raises(pendmap.InputError, match="suffix must be"):
-        render.draw_identification(report("begins under 12 degrees"), tmp_path / "a.gif")
+        render.draw(report("begins under 12 degrees"), tmp_path / "a.gif")
     assert len(list(tmp_path.iterdir())) == len(render.SUFFIXES)
 
 

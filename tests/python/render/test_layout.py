@@ -63,7 +63,8 @@ def test_no_text_is_cut_or_covered(name: str, *, least: bool) -> None:
         assert whole.y0 <= box.y0, text.get_text()
         assert box.y1 <= whole.y1, text.get_text()
         boxes += [(text.get_text(), box)]
-        assert not any(meet(box, panel) for panel in panels), text.get_text()
+        if not any(text in axes.texts for axes in figure.axes):  # a text in a region
+            assert not any(meet(box, panel) for panel in panels), text.get_text()
     for (one, a), (other, b) in itertools.combinations(boxes, 2):
         assert not meet(a, b), (one, other)
 

@@ -1,0 +1,35 @@
+"""``dataset.pendmap``: figures of a result by an accessor of xarray."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+import pendmap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@xr.register_dataset_accessor("pendmap")  # type: ignore[no-untyped-call]
+class Accessor:
+    """Accessor of a dataset that is a result of pendmap.
+
+    >>> import pendmap
+    >>> run = pendmap.simulate(pendmap.Pendulum(), 1.0, 0.0, 20.0)
+    >>> run.pendmap.plot(layer="phase").get_xlabel()
+    '$θ$ (rad)'
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, ax: Axes | None = None, **look: Any) -> Axes:  # noqa: ANN401 (as plot.draw)
+        """Draw one part of the result into Axes; arguments are those of ``pendmap.plot.draw``."""
+        return pendmap.plot.draw(self._dataset, ax, **look)
+
+    def figure(self, **look: Any) -> Figure:  # noqa: ANN401 (as plot.figure)
+        """Return the figure of the result; arguments are those of ``pendmap.plot.figure``."""
+        return pendmap.plot.figure(self._dataset, **look)
