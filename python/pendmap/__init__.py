@@ -140,13 +140,12 @@ _OTHERS = {
         "noise_floor",
         "read_experiment",
     ],
-    "render": ["plot"],
 }
 _HOMES = {
     **{name: home for home, names in _OTHERS.items() for name in names},
     **{name: f"analysis.{kind}" for kind, (_, names, _) in ANALYSES.items() for name in names},
 }
-__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
+__all__ = sorted([*_HOMES, "__version__", "plot"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
@@ -155,6 +154,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
         from importlib.metadata import version
 
         return version("pendmap")
+    if name == "plot":
+        import pendmap.render.plot
+
+        return pendmap.render.plot
     if name in _HOMES:
         import importlib
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
 )
 @click.option("--size", help="Width x height in inches, like 8x4.")
+@option("--width", click.FloatRange(40, 500), "Width in mm: 86 is a journal's column, 178 are two.")
+@click.option(
+    "--no-title", is_flag=True, help="No title and subtitle, for a figure with a caption."
+)
 @option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.")
 @click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
 @click.option("--quiet", is_flag=True, help="Do not list the files written.")
@@ -40,12 +44,16 @@ def command(  # noqa: PLR0913 (the options above)
     out: Path | None,
     layer: str | None,
     size: str | None,
+    width: float | None,
+    no_title: bool,
     dpi: int | None,
     colormap: str | None,
     quiet: bool,
 ) -> None:
     """Draw a result again, in another size, colours or layer, without computing."""
-    inches = _size(size)
+    if size and width:
+        raise click.UsageError("only one of --size and --width must be given, got both")
+    look: dict[str, Any] = {"size": _size(size), "width": width, "title": not no_title}
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
     target = out or default_file(file.with_suffix(".png"))
@@ -54,7 +62,7 @@ def command(  # noqa: PLR0913 (the options above)
     from pendmap.files.dataset import load
 
     draw = functools.partial(
-        render.draw, load(file), layer=layer, size=inches, dpi=dpi, colormap=colormap
+        render.draw, load(file), layer=layer, dpi=dpi, colormap=colormap, **look
     )
     with named(str(file)):
         try:

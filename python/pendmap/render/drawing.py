@@ -41,6 +41,7 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 """Panel width in inches: several side by side, a single one, several stacked."""
 BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a row of a legend."""
+LEAST_SHEET: Final = 5.9  # Least width of a sheet whose charts are in one column, inches
 LEAST: Final = 0.5  # Least side of a panel, inches
 HEADING: Final = 0.32  # Height of the heading of a chart on a sheet, inches
 SMALLEST: Final = (0.88, 0.72)
@@ -76,6 +77,11 @@ def draw(
     if not title:
         chart = replace(chart, title="", subtitle="")
     if isinstance(chart, Sheet):
+        if width is not None and width < LEAST_SHEET:
+            raise InputError(
+                f"width of a sheet of several charts must be at least {25.4 * LEAST_SHEET:.0f} mm,"
+                f" got {25.4 * width:.0f}: a layer can be drawn alone"
+            )
         if width is not None:
             column = [_in_width(one, width) for column in chart.columns for one in column]
             chart = replace(chart, columns=[column])

@@ -15,7 +15,7 @@ import motions
 import pendmap
 import synthetic
 from drawn import made, named, plain, regions, titles, written
-from pendmap.charts import palette
+from pendmap.charts import legend, palette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

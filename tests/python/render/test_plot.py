@@ -1,0 +1,195 @@
+"""Results in Axes and figures of one's own."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+
+import motions
+import pendmap
+import synthetic
+from decays import decay, record
+from drawn import plain
+from pendmap import InputError, Pendulum, plot
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import Image, Points
+from pendmap.comparison import compare
+from pendmap.identification import identify_experiment
+from pendmap.records import Experiment, Run
+from pendmap.render import regions, style
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+MAP = synthetic.painted(synthetic.USUAL[:3])
+MOTION = motions.swing(periods=8, steps=20)
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+def experiment() -> Experiment:
+    time, angle = record(decay(release=1.0, until=40.0), seconds=20)
+    run = Run("swing", "swing.csv", "free", time, angle, np.ones(time.size, bool))
+    return Experiment(Path("lab"), (run,))
+
+
+def results() -> dict[str, Callable[[], Any]]:
+    """A result of each function of the module, by its name."""
+    model = Pendulum(p=0.6)
+    return {
+        "basins": lambda: MAP,
+        "sweep": lambda: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=pendmap.Grid.square(12)),
+        "parameter_map": lambda: pendmap.parameter_map(
+            Pendulum(), {"p": (0.5, 1.0, 4), "omega": (1.8, 2.2, 4)}
+        ),
+        "bifurcation": lambda: pendmap.bifurcation(Pendulum(), {"p": (0.5, 1.0, 8)}),
+        "orbit": lambda: pendmap.orbit(model, 1, 1),
+        "lyapunov": lambda: pendmap.lyapunov(model),
+        "lifetime": lambda: pendmap.lifetime(Pendulum(p=1.7), starts=200),
+        "tongues": lambda: pendmap.tongues(Pendulum(), np.linspace(0.5, 3.0, 30)),
+        "melnikov": lambda: pendmap.melnikov(Pendulum()),
+        "trajectory": lambda: MOTION,
+        "section": lambda: MOTION,
+        "record": experiment,
+        "identification": lambda: identify_experiment(experiment()),
+        "comparison": lambda: compare(identify_experiment(experiment()).model, experiment()),
+    }
+
+
+@pytest.mark.parametrize("name", results())
+def test_a_result_is_drawn_into_the_axes_given(name: str) -> None:
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained")
+    given = results()[name]()
+    assert getattr(plot, name)(given, right) is right
+    figure.canvas.draw()
+    assert right.has_data()
+    assert not left.has_data()
+    assert right.get_ylabel()
+    assert right.get_xlabel() or right.get_xticklabels()[0].get_text()
+    assert {axes for axes in figure.axes if axes.has_data()} <= {right, *figure.axes[2:]}
+
+
+def test_every_result_has_a_function() -> None:
+    kinds = {"draw", "figure", "map", "save", "diagnosis"}
+    assert {*plot.__all__} == {*results(), *kinds}
+    assert plot.map is plot.parameter_map
+
+
+def test_a_panel_has_the_limits_ticks_and_names_of_the_figure() -> None:
+    axes = plot.trajectory(MOTION, layer="phase")
+    assert axes.get_xlim() == pytest.approx((-np.pi, np.pi))
+    assert axes.get_xlabel() == "$θ$ (rad)"
+    assert axes.get_ylabel() == "$dθ/dτ$"
+    curve = axes.lines[0].get_xydata()
+    assert np.isin(np.round(MOTION["velocity"].values[:5], 12), np.round(curve[:, 1], 12)).all()
+
+
+def test_title_and_legend_are_optional() -> None:
+    few = synthetic.painted(synthetic.USUAL[:10], (30, 40))
+    assert plain(plot.basins(few).get_title()) == "basins of attraction"
+    assert plot.basins(few, title=False).get_title() == ""
+    assert plot.basins(few, title="mine").get_title() == "mine"
+    assert plot.basins(few, legend=False).get_legend() is None
+    assert plot.basins(few, legend=True).get_legend() is not None
+    _, axes = plt.subplots(figsize=(2.0, 1.0))
+    assert plot.basins(few, axes).get_legend() is None  # it would be higher than half the panel
+
+
+def test_the_accessor_is_the_function() -> None:
+    run = pendmap.simulate(Pendulum(), 1.0, 0.0, 20.0)
+    _, axes = plt.subplots()
+    assert run.pendmap.plot(axes, layer="phase") is axes
+    assert run.pendmap.plot(ax=axes, layer="phase") is axes
+    assert len(run.pendmap.figure().axes) == 4
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: plot.basins(MOTION), "plot.basins draws results of kind basins, got trajectory"),
+        (lambda: plot.tongues(3), "draws results of kind tongues, got 3"),
+        (lambda: plot.draw(3), "cannot draw 3; kinds that can be: "),
+        (lambda: plot.basins(MAP, layer="no"), "'no' in this map; it has labels, settle, turns"),
+        (lambda: plot.record(experiment(), layer="no"), "no layer 'no' in this figure; it has"),
+        (lambda: plot.identification(identify_experiment(experiment()), layer="no"), "it has"),
+        (lambda: plot.basins(MAP, layer="settle", colormap="no"), "no colour map 'no'"),
+        (lambda: plot.figure(MAP, width=10), "width must be 40 to 500 mm"),
+        (lambda: plot.figure(MAP, width=86, size=(3, 3)), "and no size given"),
+        (
+            lambda: plot.figure(identify_experiment(experiment()), width=86),
+            "width of a sheet of several charts must be at least 150 mm, got 86",
+        ),
+    ],
+)
+def test_bad_input_is_refused(call: Callable[[], object], said: str) -> None:
+    with pytest.raises(InputError, match=said.replace("(", r"\(")):
+        call()
+
+
+@pytest.mark.parametrize("width", [86, 178])
+@pytest.mark.parametrize("given", [MAP, MOTION, synthetic.painted(**synthetic.UNRELIABLE)])
+def test_a_figure_has_the_width_of_a_column(given: Any, width: float, tmp_path: Path) -> None:  # noqa: ANN401
+    file = plot.save(given, tmp_path / "a.png", width=width, title=False, dpi=254)
+    wide, high = struct.unpack(">II", file.read_bytes()[16:24])
+    assert wide == 10 * width
+    assert high < 30 * width
+    figure = plot.figure(given, width=width, title=False)
+    assert not figure.texts
+    figure.canvas.draw()
+    panels = [one for one in figure.axes if one.get_label() != "<colorbar>"]
+    assert len({round(one.get_position().x0, 2) for one in panels}) == (1 if width == 86 else 2)
+    for axes in panels:
+        assert axes.xaxis.label.get_fontsize() == (8.0 if width == 86 else 9.0)
+        assert axes.get_window_extent().width / figure.dpi > 1.2
+
+
+def test_the_style_is_that_of_the_files() -> None:
+    with plt.style.context("pendmap.figures"):
+        assert mpl.rcParams["font.size"] == style.RC["font.size"] == 9.0
+        assert plot.basins(MAP).xaxis.label.get_fontsize() == 9.0
+
+
+def disc(radius: float, *marks: Points) -> tuple[Chart, Image]:
+    """A round region of 4 x 4 inches, with marks on it."""
+    y, x = np.mgrid[-2:2:400j, -2:2:400j]
+    image = Image(
+        (x**2 + y**2 < radius**2).astype(int),
+        (-2.0, 2.0),
+        (-2.0, 2.0),
+        classes=[("", "#ffffff"), ("", "#0072b2")],
+        labels=[("", ""), ("rest", "rest, 5 %")],
+    )
+    named = Points(np.empty(0), np.empty(0), name="rest, 5 %")
+    axis = Axis("", (-2.0, 2.0))
+    return Chart("", "", [[Panel("a", "", axis, axis, [image, named, *marks])]]), image
+
+
+def test_a_name_stands_in_the_middle_of_a_region_with_room() -> None:
+    chart, _ = disc(1.0)
+    made = regions.labelled(chart, lambda _: (4.0, 4.0)).panels[0].marks
+    assert (made[-1].text, made[-1].colour) == ("rest", "#ffffff")
+    assert abs(made[-1].x) < 0.05
+    assert abs(made[-1].y) < 0.05
+    assert made[1].name == ""  # no longer in the legend
+
+
+def test_a_small_region_has_its_name_in_the_legend() -> None:
+    chart, _ = disc(0.1)
+    assert regions.labelled(chart, lambda _: (4.0, 4.0)) is chart
+
+
+def test_a_name_keeps_clear_of_markers() -> None:
+    spot = Points(np.zeros(1), np.zeros(1), size=12.0)
+    made = regions.labelled(disc(1.0, spot)[0], lambda _: (4.0, 4.0)).panels[0].marks[-1]
+    wide = style.inches("rest", style.points("font.size")) / 2
+    assert abs(made.x) > wide + 0.05 or abs(made.y) > 0.1
