@@ -10,13 +10,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from pendmap.charts.chart import Chart, Sheet
-from pendmap.charts.marks import ALARM, QUIET, Image
+from pendmap.charts.marks import ALARM, Image
 from pendmap.errors import InputError
 from pendmap.render import marks, regions, style, ticks
+from pendmap.render.head import LEFT, LINE, head_of, headed
 
 if TYPE_CHECKING:
     import os
@@ -24,17 +23,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase, SubFigure
+    from matplotlib.figure import Figure, FigureBase, SubFigure
 
     from pendmap.charts.chart import Panel
     from pendmap.charts.marks import Colours, Ends, Mark
 
     Drawn = tuple[Axes, Panel]
 
-LEFT: Final = 0.1
-HEAD: Final = 0.72
-LINE: Final = style.RC["font.size"] * 1.5 / 72
-"""Inches: left margin of the title; title with subtitle; one line of text."""
 CELLS: Final = 1200
 """Most rows and columns of a drawn map, unless the figure has more pixels."""
 WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
@@ -47,8 +42,6 @@ HEADING: Final = 0.32  # Height of the heading of a chart on a sheet, inches
 SMALLEST: Final = (0.88, 0.72)
 """Least width and height of a readable sheet, as shares of its default size."""
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
-_SMALLEST: Final = 0.9
-"""Least font size of a two-line subtitle, over the normal one; below it a third line is used."""
 
 
 def save(
@@ -79,8 +72,8 @@ def draw(
     if isinstance(chart, Sheet):
         if width is not None and width < LEAST_SHEET:
             raise InputError(
-                f"width of a sheet of several charts must be at least {25.4 * LEAST_SHEET:.0f} mm,"
-                f" got {25.4 * width:.0f}: a layer can be drawn alone"
+                f"width of a sheet of several charts must be {round(25.4 * LEAST_SHEET)} mm or "
+                f"more, got {round(25.4 * width)}: a layer can be drawn alone"
             )
         if width is not None:
             column = [_in_width(one, width) for column in chart.columns for one in column]
@@ -100,7 +93,7 @@ def _in_width(chart: Chart, width: float) -> Chart:
     """Return a chart of a width in inches, as high as its panels and its legend need."""
     narrow = chart.in_width(width)
     below = BELOW * len(narrow.rows) if chart.size is None else 0.0
-    high = sum(narrow.heights) + below + _head(chart) + LINE * len(chart.notes)
+    high = sum(narrow.heights) + below + head_of(chart) + LINE * len(chart.notes)
     narrow = _labelled(narrow, (width, high))
     return replace(narrow, size=(width, high + _rows(_all_marks(narrow), width)))
 
@@ -110,7 +103,7 @@ def _labelled(chart: Chart, size: Ends) -> Chart:
     rows = {id(panel): row for row in chart.rows for panel in row}
     heights = chart.heights or [max(panel.share for panel in row) for row in chart.rows]
     highest = dict(zip(map(id, chart.rows), heights, strict=True))
-    down = size[1] - _head(chart) - BELOW * len(heights)
+    down = size[1] - head_of(chart) - BELOW * len(heights)
 
     def room(panel: Panel) -> Ends:
         row = rows[id(panel)]
@@ -119,11 +112,6 @@ def _labelled(chart: Chart, size: Ends) -> Chart:
         return max(wide, LEAST), max(high * panel.share / max(one.share for one in row), LEAST)
 
     return regions.labelled(chart, room)
-
-
-def _head(chart: Chart | Sheet) -> float:
-    """Return the height of title and subtitle in inches."""
-    return HEAD if chart.title else 0.05
 
 
 def _refuse(size: Ends, least: Ends) -> None:
@@ -189,7 +177,7 @@ def _size(chart: Chart) -> Ends:
     heights = chart.heights or [max(panel.share for panel in row) for row in rows]
     width = max(across) + 0.15
     down = sum(heights) * wide * chart.ratio + BELOW * len(rows)
-    return width, down + _head(chart) + _rows(_all_marks(chart), width) + LINE * len(chart.notes)
+    return width, down + head_of(chart) + _rows(_all_marks(chart), width) + LINE * len(chart.notes)
 
 
 def _aside(row: Sequence[Panel]) -> float:
@@ -220,46 +208,6 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
     _legend(figure, _all_marks(chart), size[0], loc="outside lower left", borderpad=0.1, **where)
     fits = settle(figure, [*itertools.chain(*drawn)])
     return figure, _needed(figure, chart, drawn) if fits else (1.15 * size[0], 1.15 * size[1])
-
-
-def headed(  # noqa: PLR0913 (size, words, and room around)
-    size: Ends, dpi: float, title: str, subtitle: str, *, foot: float = 0.0, below: float = 0.0
-) -> Figure:
-    """Return an empty figure with its head, and free inches below the head and at the foot."""
-    figure = Figure(figsize=size, dpi=dpi, layout="constrained")
-    FigureCanvasAgg(figure)
-    top, height = write_head(figure, title, subtitle) + below, size[1]
-    rect = (0.0, foot / height, 1.0, max(1 - (top + foot) / height, 1e-3))
-    engine: Any = figure.get_layout_engine()
-    engine.set(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=rect)
-    return figure
-
-
-def write_head(figure: Figure, title: str, subtitle: str) -> float:
-    """Write title and subtitle; return their height in inches.
-
-    A subtitle too long for one line becomes two, broken at a semicolon; if these would need a much
-    smaller font, it becomes one line per part. A long title becomes smaller.
-    """
-    if not title:
-        return 0.05
-    width, height = (float(side) for side in figure.get_size_inches())
-    title, subtitle = style.typeset(title), style.typeset(subtitle)
-    room = width - 2 * LEFT
-    whole = style.inches(subtitle, style.points("font.size"))
-    lines = [subtitle] if whole <= room else style.halves(subtitle)
-    if _SMALLEST * style.longest(lines) > room:
-        lines = subtitle.split(";   ")
-    shrunk = room / max(style.longest(lines), 1e-3)
-    # Small fonts are set wider than in proportion.
-    font = style.points("font.size") * (1.0 if shrunk >= 1 else 0.9 * shrunk)
-    bold = 12 * min(1.0, room / max(style.inches(title, 12, bold=True), 1e-3))
-    left = LEFT / width
-    figure.text(left, 1 - 0.22 / height, title, fontsize=bold, weight="bold", va="center")
-    for k, line in enumerate(lines):
-        down = 0.45 + LINE * k
-        figure.text(left, 1 - down / height, line, color=QUIET, va="center", fontsize=font)
-    return float(HEAD + LINE * (len(lines) - 1) - (0.0 if subtitle else LINE))
 
 
 def fill(
@@ -328,7 +276,7 @@ def _sheet(sheet: Sheet, size: Ends | None, dpi: float) -> Figure:
     wide = [max(_size(chart)[0] for chart in column) for column in sheet.columns]
     high = [sum(_size(chart)[1] for chart in column) for column in sheet.columns]
     foot = _rows(named, sum(wide))
-    head = _head(sheet)
+    head = head_of(sheet)
     given = size or (sum(wide), max(high) + head + foot)
     _refuse(given, (SMALLEST[0] * sum(wide), SMALLEST[1] * max(high) + head + foot))
     figure = headed(given, dpi, sheet.title, sheet.subtitle, below=foot)

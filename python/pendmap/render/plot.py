@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from pendmap.charts import registry
 from pendmap.errors import InputError, short_repr
-from pendmap.render import axes, drawing
-from pendmap.render import draw as save
-from pendmap.render import figure_of as figure
+from pendmap.render import axes, drawing, figure_of
+from pendmap.render import draw as _save
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,27 +31,8 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport
     from pendmap.records import Experiment, Run
 
-__all__ = [
-    "basins",
-    "bifurcation",
-    "comparison",
-    "diagnosis",
-    "draw",
-    "figure",
-    "identification",
-    "lifetime",
-    "lyapunov",
-    "map",
-    "melnikov",
-    "orbit",
-    "parameter_map",
-    "record",
-    "save",
-    "section",
-    "sweep",
-    "tongues",
-    "trajectory",
-]
+figure = figure_of
+save = _save
 
 _FIRST = {
     "Experiment": "history",
