@@ -6,10 +6,11 @@ import contextlib
 import glob
 import signal
 import subprocess
+import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
 
@@ -30,6 +31,18 @@ def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str
             yield process
         finally:
             process.kill()
+
+
+PATIENCE = 120.0
+"""Seconds after which a process is taken to hang."""
+
+
+def until(process: subprocess.Popen[str], come: Callable[[], bool], step: float = 0.1) -> None:
+    """Wait until a process has come so far, or has ended; fail if it takes too long."""
+    end = time.monotonic() + PATIENCE
+    while process.poll() is None and not come():
+        assert time.monotonic() < end, f"{process.args} has not come so far"
+        time.sleep(step)
 
 
 def any_file(folder: Path, pattern: str) -> bool:

@@ -15,7 +15,7 @@ import pytest
 
 import pendmap
 from conftest import COMMAND
-from interrupted import any_file, started
+from interrupted import any_file, started, until
 from pendmap.cli.types import AXIS, NUMBER
 
 if TYPE_CHECKING:
@@ -271,8 +271,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path: Path) -> None:
 def test_ctrl_c_waits_for_the_file_being_written(tmp_path: Path, option: str, file: str) -> None:
     words = [str(COMMAND), "basins", "--p", "0.6", "--grid", "1500", option, file]
     with started(words, cwd=tmp_path, stderr=subprocess.PIPE) as process:
-        while process.poll() is None and not any_file(tmp_path, ".pendmap-*.part/map.*"):
-            time.sleep(0.001)
+        until(process, lambda: any_file(tmp_path, ".pendmap-*.part/map.*"), step=0.001)
         process.send_signal(signal.SIGINT)
         _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130

@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,7 +15,7 @@ import pytest
 import pendmap
 import tiled
 from conftest import COMMAND, HERE
-from interrupted import any_file, started
+from interrupted import any_file, started, until
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,8 +69,7 @@ def test_an_interrupted_run_with_workers_says_one_line(tmp_path: Path) -> None:
     words = [str(COMMAND), "basins", "--grid", "2500", "--workers", "2", "--quiet"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with started([*words, "--out", "m.zarr"], cwd=tmp_path, **pipes) as process:
-        while process.poll() is None and not any_file(tmp_path, "m.zarr.part/**/zarr.json"):
-            time.sleep(0.1)
+        until(process, lambda: any_file(tmp_path, "m.zarr.part/**/zarr.json"))
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=120)
     assert process.returncode == 130

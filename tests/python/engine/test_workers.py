@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import json
 import multiprocessing
 import os
 import signal
@@ -19,6 +20,7 @@ from joblib.externals.loky import get_reusable_executor
 
 import pendmap
 import tiled
+from interrupted import started, until
 from pendmap.engine import executor_of
 
 if TYPE_CHECKING:
@@ -53,25 +55,20 @@ def local_cluster() -> Iterator[Executor]:
 
 
 @contextlib.contextmanager
-def separate_processes() -> Iterator[Executor]:
+def separate_processes(folder: Path) -> Iterator[Executor]:
     """A cluster of a ``dask scheduler`` and two ``dask worker``, as on several machines."""
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1"]
+    file = folder / "scheduler.json"
+    local = ["--host", "127.0.0.1", "--port", "0", "--dashboard-address", ANY_PORT]
     with contextlib.ExitStack() as stack:
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
-
-        def started(*words: str) -> subprocess.Popen[str]:
-            process = stack.enter_context(subprocess.Popen(words, **quiet))  # type: ignore[call-overload]
-            stack.callback(process.terminate)
-            return process  # type: ignore[no-any-return]
-
-        local = ["--host", "127.0.0.1", "--port", "0", "--dashboard-address", ANY_PORT]
-        scheduler = started(*dask, *local)
-        address = next(
-            line.split()[-1] for line in scheduler.stderr or () if "Scheduler at:" in line
-        )
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        own = stack.enter_context(started([*dask, *local, "--scheduler-file", str(file)], **quiet))
+        until(own, lambda: file.exists() and file.read_text().endswith("}"))
         for _ in range(2):
-            started(*worker, "--no-dashboard", address)
+            to = ["--no-dashboard", "--no-nanny", "--scheduler-file", str(file)]
+            stack.enter_context(started([*worker, *to], **quiet))
+        address = json.loads(file.read_text())["address"]
         with distributed.Client(address, set_as_default=False) as client:
             yield client
 
@@ -118,7 +115,7 @@ def test_workers_start_where_the_port_of_dask_is_taken() -> None:
 
 @pytest.mark.thorough
 def test_separate_processes_compute_the_same_bits(tmp_path: Path) -> None:
-    with separate_processes() as client:
+    with separate_processes(tmp_path) as client:
         for name in tiled.CASES:
             kept = tiled.CASES[name](executor=client, store=tmp_path / f"{name}.zarr")
             tiled.assert_same(kept, plain(name))

@@ -15,7 +15,7 @@ import pytest
 
 import pendmap
 from conftest import COMMAND
-from interrupted import started
+from interrupted import started, until
 from pendmap import Pendulum, viewer
 from pendmap.files import facts
 from pendmap.viewer import window
@@ -117,11 +117,14 @@ def test_ctrl_c_ends_it_with_what_was_computed(tmp_path: Path) -> None:
     with receiver(tmp_path) as (address, file, process):
         words = [str(COMMAND), "simulate", *MODEL, "--until", "3e6", "--samples", "8"]
         words += ["--live", address, "--out", "a.nc"]
-        with started(words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as run:
-            while file.stat().st_size < 1_000_000 and run.poll() is None:
-                time.sleep(0.1)
+        with (
+            (tmp_path / "said.txt").open("w") as said,  # a pipe that nobody reads would fill
+            started(words, cwd=tmp_path, stderr=said, stdout=subprocess.PIPE) as run,
+        ):
+            until(run, lambda: file.stat().st_size > 1_000_000)
             run.send_signal(signal.SIGINT)
-            out, err = run.communicate(timeout=60)
+            out = run.communicate(timeout=60)[0]
+        err = (tmp_path / "said.txt").read_text()
         assert run.returncode == 130, err
         assert "interrupted, a.nc written" in err
         assert "INTERRUPTED before tau = 3e+06" in out
