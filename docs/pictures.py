@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -29,6 +31,9 @@ from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
 from pendmap.render import style
 from pendmap.render.drawing import save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HERE = Path(__file__).resolve().parent
 SIZE = (6.4, 6.0)
@@ -125,6 +130,15 @@ def planes() -> None:
     render.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
 
 
+def in_axes() -> None:
+    """The figure of the first snippet of figures.md."""
+    page = (HERE / "figures.md").read_text(encoding="utf-8")
+    code = re.findall(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)[0]
+    names: dict[str, Figure] = {}
+    exec(code.replace('fig.savefig("four.pdf")', ""), names)  # noqa: S102 (our own page)
+    names["fig"].savefig(HERE / "four.png", dpi=110)
+
+
 def forced() -> None:
     """A rig's runs that tumble beside the ensemble of the model that its decay gives."""
     model = paper_figures.report().methods["combined_repaired"].rig
@@ -137,6 +151,7 @@ def forced() -> None:
 
 
 if __name__ == "__main__":
+    in_axes()
     planes()
     forced()
     render.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
