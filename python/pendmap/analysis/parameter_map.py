@@ -139,10 +139,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         The model; parameters that vary replace its own.
     ranges : mapping of str to (float, float, int) or array_like
         Two parameters, columns, then rows, each with an array of ascending values, evenly spaced or
-        not, or a tuple of first value, last value (both included) and how many. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
-        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
-        ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
-        ``EFFECT.PARAMETER`` of an effect that the model has, or that has no other parameter.
+        not, or a tuple of first value, last value (both included) and how many. Any of ``p``,
+        ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without dimensions, with a rig also
+        ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI, ``frequency_hz`` (``p`` is kept) and
+        ``stroke_mm`` (``Omega`` is kept); or ``EFFECT.PARAMETER`` of an effect that the model has,
+        or that has no other parameter.
     starts : int
         Initial conditions of each cell.
     box : Grid, optional
@@ -237,7 +238,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
-    request = {"ranges": varied.requested([columns, rows], ranges), **search.request, "curves": curves}
+    request = {
+        "ranges": varied.requested([columns, rows], ranges),
+        **search.request,
+        "curves": curves,
+    }
     return kept.complete("parameter_map", pendulum, request, job, compute, progress)
 
 

@@ -46,6 +46,11 @@ def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
         raise InputError(
             f"cannot {action} a dataset of kind {kind!r}; kinds that can be: {', '.join(kinds())}"
         )
+    if kind == "trajectory" and "start" in dataset.dims:
+        raise InputError(
+            f"cannot {action} {dataset.sizes['start']} trajectories at once: dataset must be one, "
+            "like dataset.isel(start=0)"
+        )
     dataset = shown(dataset)
     refuse_too_large(dataset)
     return dataset

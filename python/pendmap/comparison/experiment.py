@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,8 +21,8 @@ from pendmap.errors import (
     check_whole,
 )
 from pendmap.formatting import Readable, counted, percent
-from pendmap.model import Rig
-from pendmap.records.experiment import Experiment
+from pendmap.model import Rig, load_model
+from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from pendmap.comparison.forced import Statistic
     from pendmap.comparison.steady import Steady
     from pendmap.formatting import Table
-    from pendmap.records import Run
+    from pendmap.records import Experiment, Run
+    from pendmap.records.read import Records
     from pendmap.signal import Floats
 
 
@@ -80,11 +82,12 @@ class Comparison(Readable):
         return [table for table in tables if table[1]], list(_lines(self))
 
 
-def compare(
-    model: Rig,
-    experiment: Experiment,
+def compare(  # noqa: PLR0913 (each is asked for by name)
+    model: Rig | str | os.PathLike[str],
+    records: Records | Sequence[Records],
     *,
     ensemble: Ensemble | None = None,
+    rate_hz: float | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Comparison:
@@ -102,26 +105,47 @@ def compare(
 
     Parameters
     ----------
-    model : Rig
-        Model in SI units, from :func:`pendmap.load_model`.
-    experiment : Experiment
-        Records, from :func:`pendmap.read_experiment`.
+    model : Rig or path
+        Model in SI units, or its model file.
+    records : path, Experiment, Run, or a sequence of these
+        As for :func:`pendmap.identify`; forced runs too.
     ensemble : Ensemble, optional
         Number and spread of the initial states for a forced run.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     threads : int, optional
         Number of threads; by default one per processor.
     progress : callable, optional
         Called repeatedly with the number of members done and in all, for each forced run.
 
+    Returns
+    -------
+    Comparison
+        Comparisons with each run.
+
     Raises
     ------
     InputError
         If no run can be compared: one needs samples with motion, a forced one also a known drive.
+    OSError
+        If a file cannot be read.
     KeyboardInterrupt
         After Ctrl-C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
+    >>> decay = pendmap.simulate(rig, theta=1.0, velocity=0.0, t_eval=np.arange(0, 20, 0.02))
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
+    >>> every = np.ones(angle.size, bool)
+    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
+    >>> round(pendmap.compare(rig, run).runs[0].rms, 4)
+    0.001
     """
-    check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
-    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    rig = _rig(model)
+    experiment = experiment_of(records, rate_hz=rate_hz)
     if ensemble is not None:
         check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
     if threads is not None:
@@ -137,13 +161,13 @@ def compare(
     driven = [run.name for run in experiment.runs if run.kind != "free"]
     for run in experiment.runs:
         try:
-            _check_comparable(model, run)
+            _check_comparable(rig, run)
             if run.kind == "free":
-                free.append(compare_free(model, run))
+                free.append(compare_free(rig, run))
             else:
                 forced.append(
                     compare_forced(
-                        model,
+                        rig,
                         run,
                         ensemble or Ensemble(),
                         threads=threads,
@@ -155,7 +179,14 @@ def compare(
     if not free and not forced:
         said = "; ".join(": ".join(each) for each in out)
         raise InputError(f"{experiment.path}: no run can be compared: {said}")
-    return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
+    return Comparison(rig, experiment, tuple(free), tuple(forced), tuple(out))
+
+
+def _rig(model: object) -> Rig:
+    """Return a model in SI, read if it is a path."""
+    found: Any = load_model(model) if isinstance(model, str | os.PathLike) else model
+    check_type("model", found, Rig, "pendmap.load_model('model.toml') in SI")
+    return found  # type: ignore[no-any-return]
 
 
 def _check_comparable(model: Rig, run: Run) -> None:

@@ -26,26 +26,29 @@ from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.model.rig import own_name
+from pendmap.records import experiment_of
 from pendmap.records.summary import unit_wrong
 from pendmap.residuals.by_run import parameters_by_run
 from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from pendmap.diagnosis.functions import TorqueFunction
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
+    from pendmap.records.read import Records
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
-    experiment: Experiment,
+    records: Records | Sequence[Records],
     *,
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
     effects: Collection[Formula | TorqueFunction] = (),
     thresholds: Thresholds | None = None,
+    rate_hz: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects the model lacks.
@@ -56,8 +59,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    experiment : Experiment
-        From :func:`pendmap.read_experiment`.
+    records : path, Experiment, Run, or a sequence of these
+        As for :func:`pendmap.identify`; forced runs too.
     model : Rig, optional
         The baseline; by default viscous damping and Coulomb friction.
     max_effects : int
@@ -69,6 +72,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         first order.
     thresholds : Thresholds, optional
         Thresholds of all decisions.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     progress : callable, optional
         Called with the number of steps done and the number of all steps.
 
@@ -83,6 +88,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         If no run has samples, no start is found, an effect cannot be a candidate, or no model
         follows the records.
     """
+    experiment = experiment_of(records, rate_hz=rate_hz)
     functions, others = separate_functions(effects)
     own = checked_own(others)
     report = progress or (lambda _done, _total: None)

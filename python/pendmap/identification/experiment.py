@@ -18,7 +18,8 @@ from pendmap.errors import (
 )
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
+from pendmap.identification.methods.registry import BEST, check_names, identify_peaks
+from pendmap.identification.methods.registry import identify as identify_record
 from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
     OFFSET,
@@ -33,14 +34,15 @@ from pendmap.identification.report import DRAG, IdentificationReport
 from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.model.effects import definition
-from pendmap.records import Experiment
+from pendmap.records import experiment_of
 from pendmap.records.summary import unit_wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from pendmap.model import Effect
-    from pendmap.records import Run
+    from pendmap.records import Experiment, Run
+    from pendmap.records.read import Records
 
 
 MISSES: Final = 1.2  # Residual over noise above which quadratic drag is tried
@@ -58,40 +60,69 @@ def decay_of(experiment: Experiment) -> Run:
     return free[max(lengths, key=lengths.__getitem__)]
 
 
-def identify_experiment(
-    experiment: Experiment,
+def identify(  # noqa: PLR0913 (each is asked for by name)
+    records: Records | Sequence[Records],
     *,
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
     effects: Sequence[Effect | str] = (),
+    rate_hz: float | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> IdentificationReport:
-    """Identify damping from an experiment by several methods.
+    """Identify natural frequency, viscous damping and Coulomb friction by several methods.
 
+    ``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')`` in SI, with further terms by ``effects``.
     The trajectory method fits all free runs that are not held out jointly, each with its own
     initial state; the other methods use the longest of these runs.
 
     Parameters
     ----------
-    experiment : Experiment
-        Records, from :func:`pendmap.read_experiment`.
+    records : path, Experiment, Run, or a sequence of these
+        Free decays of one rig: files and folders as for :func:`pendmap.read_experiment`, or what
+        it returns.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Starting values and effects of the trajectory method; by default estimated from the record.
     effects : sequence of Effect or str
         Further effects, or their names, whose sizes the trajectory method fits.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     progress : callable, optional
         Called with the numbers of steps done and in all: one for each method, the peaks and the
         table.
+
+    Returns
+    -------
+    IdentificationReport
+        Results by method, the fit of the whole records, and table 1.
 
     Raises
     ------
     InputError
         If a method or an effect is unknown, an effect acts on the drive, there is no free decay,
         or the best fit does not follow the records.
+    OSError
+        If a file cannot be read.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
+    >>> decay = pendmap.simulate(rig, theta=2.0, velocity=0.0, t_eval=np.arange(0, 30, 0.02))
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
+    >>> every = np.ones(angle.size, bool)
+    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
+    >>> report = pendmap.identify(run)
+    >>> report.to_dataframe()["value"].round(2).to_dict()
+    {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08, 'offset': 0.0, 'zeta': 0.0, 'theta_r': 0.0}
     """
-    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    experiment = experiment_of(records, rate_hz=rate_hz)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     check_callable("progress", progress)
@@ -120,7 +151,7 @@ def identify_experiment(
     report(before - 1, steps)
     peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
     report(before, steps)
-    found |= identify(
+    found |= identify_record(
         run.time,
         run.theta,
         sigma=sigma,
@@ -187,7 +218,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     Parameters
     ----------
     report : IdentificationReport
-        Result of :func:`pendmap.identification.identify_experiment`.
+        Result of :func:`pendmap.identify`.
     command : str
         Command line for the provenance.
 

@@ -10,10 +10,11 @@ from pendmap.errors import InputError, core_errors, short_repr
 from pendmap.units import TIME, VELOCITY
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.signal import Floats
     from pendmap.units import Units
+
+    Floats = NDArray[np.float64]
 
 ACCELERATION = 2  # Power of ``w0`` of an acceleration
 
@@ -122,7 +123,9 @@ class Dynamics:
             shape = np.broadcast_shapes(*(array.shape for array in arrays))
         except ValueError:
             shapes = ", ".join(str(array.shape) for array in arrays)
-            raise InputError(f"t, theta and v must have shapes that broadcast, got {shapes}") from None
+            raise InputError(
+                f"t, theta and v must have shapes that broadcast, got {shapes}"
+            ) from None
         scaled = units.bare(arrays[0], TIME), arrays[1], units.bare(arrays[2], VELOCITY)
         flat = [np.ascontiguousarray(np.broadcast_to(array, shape)).ravel() for array in scaled]
         with core_errors():
