@@ -66,7 +66,7 @@ def together(found: list[xr.Dataset], pendulum: Pendulum | Rig) -> xr.Dataset:
     missed = int((dataset["reached_error"] > tol).sum())
     lines = [
         f"{counted(len(found), 'start')} up to {last}; friction holds {held} of them at the end.",
-        f"A 16 times smaller error of each step changes states by {worst:.1e} at most in 5 periods.",
+        f"A 16 times smaller error of each step changes states by up to {worst:.1e} in 5 periods.",
     ]
     if missed:
         lines.append(f"THE TOLERANCE {tol:g} WAS NOT REACHED by {missed} of them.")
