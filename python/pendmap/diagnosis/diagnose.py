@@ -189,25 +189,21 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """
     fit = found.best.fitted.fit
     model = fit.model
-    covariance = found.best.fitted.widening * fit.covariance
+    names, covariance = found.joint_covariance
     named = {effect.name: effect.effect for effect in found.effects}
     # An effect that is a parameter of the rig is written as an effect.
-    own = {
-        rig: f"{name}.{next(iter(effect.parameters))}"
-        for name, effect in named.items()
-        if (rig := own_name(name)) is not None
-    }
+    own = [rig for name in named if (rig := own_name(name)) is not None]
     kept = tuple(e for e in model.effects if e.name not in named)
     runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
     sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
     notes: dict[str, Any] = {
         "covariance": {
-            "names": [own.get(name, name) for name in fit.names],
+            "names": list(names),
             "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
             "between_runs": {
-                own.get(name, name): between
-                for name in fit.names
+                written: between
+                for name, written in zip(fit.names, names, strict=True)
                 if "[" not in name and (between := found.runs.between(name)) > 0
             },
         },

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from pendmap.errors import InputError
-from pendmap.formatting import Readable, counted, estimate_text, interval, percent
+from pendmap.formatting import counted, estimate_text, interval, percent
+from pendmap.identification.readings import as_fit_run
+from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from pendmap.formatting import Estimate
     from pendmap.identification.methods.base import Identification
     from pendmap.identification.methods.trajectory import JointFit
     from pendmap.identification.peaks import Peaks
+    from pendmap.identification.results import Covariance
     from pendmap.identification.table1 import Table1
     from pendmap.model import Rig
     from pendmap.records import Experiment, Run
@@ -36,7 +40,7 @@ COLUMNS: Final = {
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class IdentificationReport(Readable):
+class IdentificationReport(FitResult):
     """Results of several methods for an experiment.
 
     Parameters
@@ -58,6 +62,8 @@ class IdentificationReport(Readable):
         given.
     """
 
+    KIND: ClassVar[str] = "identification"
+
     experiment: Experiment
     run: Run
     peaks: Peaks
@@ -75,6 +81,24 @@ class IdentificationReport(Readable):
         """Return the tables and lines that ``pendmap identify`` prints."""
         tables = [methods_table(self), table1_table(self)]
         return tables, list(as_text(self))
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Parameters of the best method."""
+        return self.best.parameters
+
+    @property
+    def joint_covariance(self) -> Covariance | None:
+        """Covariance of the best method."""
+        return self.best.covariance
+
+    def followed(self) -> Followed:
+        """Return the fit of the trajectory method."""
+        if self.joint is None:
+            raise InputError(f"{self.run.name}: the trajectory method must have fitted it")
+        pairs = zip(self.joint.runs, self.joint.readings, strict=True)
+        fitted = [as_fit_run(run, reading) for run, reading in pairs]
+        return Followed(self.joint.fit, fitted, self.joint.runs)
 
     @property
     def sound(self) -> Identification | None:
