@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,7 +20,7 @@ from pendmap.errors import (
     check_whole,
 )
 from pendmap.formatting import Readable, counted, percent
-from pendmap.model import Rig, load_model
+from pendmap.model import Rig
 from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
@@ -83,7 +82,7 @@ class Comparison(Readable):
 
 
 def compare(  # noqa: PLR0913 (each is asked for by name)
-    model: Rig | str | os.PathLike[str],
+    model: Rig,
     records: Records | Sequence[Records],
     *,
     ensemble: Ensemble | None = None,
@@ -105,8 +104,8 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    model : Rig or path
-        Model in SI units, or its model file.
+    model : Rig
+        Model in SI units, from :func:`pendmap.load_model`.
     records : path, Experiment, Run, or a sequence of these
         As for :func:`pendmap.identify`; forced runs too.
     ensemble : Ensemble, optional
@@ -144,7 +143,7 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     >>> round(pendmap.compare(rig, run).runs[0].rms, 4)
     0.001
     """
-    rig = _rig(model)
+    check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
     experiment = experiment_of(records, rate_hz=rate_hz)
     if ensemble is not None:
         check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
@@ -161,13 +160,13 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     driven = [run.name for run in experiment.runs if run.kind != "free"]
     for run in experiment.runs:
         try:
-            _check_comparable(rig, run)
+            _check_comparable(model, run)
             if run.kind == "free":
-                free.append(compare_free(rig, run))
+                free.append(compare_free(model, run))
             else:
                 forced.append(
                     compare_forced(
-                        rig,
+                        model,
                         run,
                         ensemble or Ensemble(),
                         threads=threads,
@@ -179,14 +178,7 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     if not free and not forced:
         said = "; ".join(": ".join(each) for each in out)
         raise InputError(f"{experiment.path}: no run can be compared: {said}")
-    return Comparison(rig, experiment, tuple(free), tuple(forced), tuple(out))
-
-
-def _rig(model: object) -> Rig:
-    """Return a model in SI, read if it is a path."""
-    found: Any = load_model(model) if isinstance(model, str | os.PathLike) else model
-    check_type("model", found, Rig, "pendmap.load_model('model.toml') in SI")
-    return found  # type: ignore[no-any-return]
+    return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
 
 
 def _check_comparable(model: Rig, run: Run) -> None:

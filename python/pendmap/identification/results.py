@@ -16,7 +16,7 @@ import xarray as xr
 from pendmap.errors import InputError, short_repr
 from pendmap.files.dataset import FORMAT_VERSION, load, made_by, save
 from pendmap.files.tree import Packed, unpacked
-from pendmap.formatting import Readable, estimate_text, html_table, interval
+from pendmap.formatting import Readable, estimate_text, html_table, interval, moment
 from pendmap.identification.motion import Motion, run_forward
 from pendmap.model.labels import unit_of
 
@@ -239,7 +239,7 @@ class FitResult(Parameters):
         windows = [(given.time[a], (x, v)) for k, a, _, x, v in fit.windows if k == place]
         firsts = np.array([first for first, _ in windows])
         if not np.isfinite(times).all() or (times.size and times.min() < firsts[0]):
-            least = f"{begin + firsts[0]:.6g}"
+            least = moment(begin + float(firsts[0]))
             raise InputError(f"t must be finite times from {least} s on, got {short_repr(t)}")
         found, owner = np.empty(times.shape), np.searchsorted(firsts, times, side="right") - 1
         given = dataclasses.replace(given, sigma=EXACT, trusted=None, rod_sensor=None, count=None)
