@@ -182,7 +182,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> round(float(result.theta[-1]), 3)
     0.446
     >>> pendmap.simulate(pendulum, [0.5, 1.0], 0.0, t_eval=[0.0, 20.0]).theta.values.round(3)
-    array([[0.5  , 0.087],
+    array([[0.5  , 0.297],
            [1.   , 0.446]])
     """
     bare, units = without_dimensions(pendulum)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
     from pendmap.identification.results import Covariance
-    from pendmap.model import Formula
+    from pendmap.model import Formula, Rig
     from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
     from pendmap.residuals.torque import Torque
@@ -153,6 +153,34 @@ class Discrepancy(FitResult):
         pairs = zip(names, fitted.fit.names, strict=True)
         signs = [-1.0 if sizes.get(name, 0.0) * fitted.fit[own] < 0 else 1.0 for name, own in pairs]
         return names, fitted.widening * fitted.fit.covariance * np.outer(signs, signs)
+
+    @property
+    def model(self) -> Rig:
+        """The best model, and in its notes the covariance of all fitted parameters, widened.
+
+        Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` has in
+        ``between_runs`` the standard deviation of each parameter that differs between runs by more
+        than its error.
+        """
+        fit, (names, covariance) = self.best.fitted.fit, self.joint_covariance
+        named = {effect.name: effect.effect for effect in self.effects}
+        # An effect that is a parameter of the rig is written as an effect.
+        own = [rig for name in named if (rig := own_name(name)) is not None]
+        effects = (*(e for e in fit.model.effects if e.name not in named), *named.values())
+        still = fit.model.p == 0 and not any(e.drives for e in effects)
+        between = {
+            written: size
+            for name, written in zip(fit.names, names, strict=True)
+            if "[" not in name and (size := self.runs.between(name)) > 0
+        }
+        matrix = np.where(np.isfinite(covariance), covariance, 0.0).tolist()
+        return dataclasses.replace(
+            fit.model,
+            **dict.fromkeys(own, 0.0),
+            effects=effects,
+            Omega=0.0 if still else (fit.model.Omega or 1.0),
+            notes={"covariance": {"names": list(names), "matrix": matrix, "between_runs": between}},
+        )
 
     @property
     def ranking(self) -> pd.DataFrame:

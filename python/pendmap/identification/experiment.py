@@ -22,12 +22,10 @@ from pendmap.identification.methods.registry import BEST, check_names, identify_
 from pendmap.identification.methods.registry import identify as identify_record
 from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
-    OFFSET,
     JointFit,
     fit_together,
     identification_of,
 )
-from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
@@ -119,8 +117,17 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     >>> every = np.ones(angle.size, bool)
     >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
     >>> report = pendmap.identify(run)
-    >>> report.to_dataframe()["value"].round(2).to_dict()
-    {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08, 'offset': 0.0, 'zeta': 0.0, 'theta_r': 0.0}
+    >>> report.to_dataframe().loc[["w0", "c_over_m", "Tr"], "value"].round(2).to_dict()
+    {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08}
+    >>> report.predict([0.0, 0.2]).round(2)
+    array([2.  , 1.26])
+    >>> float(report.correlation.loc["c_over_m", "Tr"].round(2))
+    -0.98
+    >>> round(float(report.residual["a"].std()), 4)
+    0.001
+    >>> again = pendmap.identification.IdentificationReport.load(report.save("identify.nc"))
+    >>> again.model == report.model
+    True
     """
     experiment = experiment_of(records, rate_hz=rate_hz)
     if start is not None:
@@ -210,9 +217,8 @@ def _best(
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     """Return the model of the best method with the notes of its file.
 
-    ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all jointly fitted
-    parameters, both widened if the residual exceeds the noise; ``[provenance]`` has the method, the
-    records with their SHA-256, the version, the command, and for a fit of the whole record its
+    ``[covariance]`` is that of :attr:`IdentificationReport.model`; ``[provenance]`` has the method,
+    the records with their SHA-256, the version, the command, and for a fit of the whole record its
     residual ``rms`` and the ``noise``, both in rad.
 
     Parameters
@@ -228,29 +234,16 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         If no method gives a model.
     """
     best = report.best
-    notes: dict[str, Any] = {}
-    if best.covariance is not None:
-        names, matrix = best.covariance
-        # Bias and tilt of a sensor do not belong to the pendulum.
-        own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
-        if "offset" in own:
-            own["offset"] = f"{OFFSET}.d"
-        kept = [names.index(name) for name in own]
-        bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
-        notes["covariance"] = {
-            "names": [*own.values()],
-            "matrix": matrix[np.ix_(kept, kept)].tolist(),
-            "ci95": {own[name]: list(ci95) for name, ci95 in bounds.items() if ci95 is not None},
-        }
     sha256 = report.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise
-    notes["provenance"] = provenance(files, command, rms=rms, noise=noise)
+    notes = {"provenance": provenance(files, command, rms=rms, noise=noise)}
     notes["provenance"]["method"] = best.method
     with named(f"{report.run.name}: the result is no valid model"):
-        return dataclasses.replace(report.model, notes=notes)
+        model = report.model
+        return dataclasses.replace(model, notes={**model.notes, **notes})
 
 
 def provenance(

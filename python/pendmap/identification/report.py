@@ -6,8 +6,12 @@ import dataclasses
 from collections import Counter
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
+import numpy as np
+
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
+from pendmap.identification.methods.trajectory import OFFSET
+from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
@@ -135,11 +139,27 @@ class IdentificationReport(FitResult):
 
     @property
     def model(self) -> Rig:
-        """Model of the best method, with its effects."""
-        best = self.best
-        if best.model is not None:
-            return best.model
-        return dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+        """Model of the best method, with its effects, and in its notes their covariance.
+
+        ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all jointly
+        fitted parameters, both widened if the residual exceeds the noise.
+        """
+        best, notes = self.best, dict[str, Any]()
+        if best.covariance is not None:
+            names, matrix = best.covariance
+            # Bias and tilt of a sensor do not belong to the pendulum.
+            own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+            if "offset" in own:
+                own["offset"] = f"{OFFSET}.d"
+            kept = [names.index(name) for name in own]
+            bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
+            notes["covariance"] = {
+                "names": [*own.values()],
+                "matrix": matrix[np.ix_(kept, kept)].tolist(),
+                "ci95": {own[n]: list(ci95) for n, ci95 in bounds.items() if ci95 is not None},
+            }
+        found = best.model or dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+        return dataclasses.replace(found, notes=notes)
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
