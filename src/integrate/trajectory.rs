@@ -134,8 +134,7 @@ fn from(
     let count = (request.until / interval) as usize;
     let events = EVENTS.saturating_mul((request.until / pendulum.period()) as usize);
     memory::reckon("samples", count.saturating_add(events), EACH)?;
-    let mut time =
-        if chosen.is_empty() { times(request.until, interval) } else { chosen.to_vec() };
+    let mut time = if chosen.is_empty() { times(request.until, interval) } else { chosen.to_vec() };
     seen(time[0], request.start);
     let mut known = 1;
     let mut show = |new: &mut dyn Iterator<Item = State>| {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,18 @@ def test_parameters_are_those_of_the_model_file(found: Discrepancy) -> None:
     ranking = found.ranking
     assert ranking.score.is_monotonic_decreasing
     assert "quadratic_drag" in ranking.index[:6]
+
+
+def test_an_effect_that_is_named_with_the_other_sign_has_its_correlations(
+    found: Discrepancy,
+) -> None:
+    (effect,) = found.effects
+    turned = dataclasses.replace(effect, parameters={"q": -effect.parameters["q"]})
+    other = dataclasses.replace(found, effects=(turned,)).correlation
+    sign = -1 if effect.parameters["q"] * found.best.fitted.fit["quadratic_drag.q"] > 0 else 1
+    assert other.loc["w0", "c_over_m"] == found.correlation.loc["w0", "c_over_m"]
+    own = found.correlation.loc["w0", "quadratic_drag.q"]
+    assert other.loc["w0", "quadratic_drag.q"] == sign * own
 
 
 def test_residuals_and_predictions_are_those_of_the_best_model(found: Discrepancy) -> None:
