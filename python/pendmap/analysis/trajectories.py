@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import summarised, variable
+from pendmap.analysis.result import variable
 from pendmap.errors import MOST_PERIODS, InputError, check_number, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
+    from pendmap.units import Units
 
 _MOST_STEPS = 2_000_000  # Largest number of steps a period
 
@@ -38,39 +40,56 @@ def alike(theta: ArrayLike, velocity: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
     return theta, velocity
 
 
-def together(found: list[xr.Dataset], pendulum: Pendulum | Rig) -> xr.Dataset:
-    """Return the results of several starts as one, over ``start``."""
-    events = np.arange(max(each.sizes["event"] for each in found), dtype=np.int32)
-    alike = [each.reindex(event=events, fill_value={"event_kind": ""}) for each in found]
-    dataset = xr.concat(
-        alike,
-        "start",
-        data_vars="all",
-        coords="minimal",
-        compat="override",
-        combine_attrs="override",
-    )
-    dataset["event_kind"] = dataset["event_kind"].astype("U14")
-    units = pendulum.units
-    for name, unit, text in (
-        ("theta0", "rad", "angle at the start"),
-        ("velocity0", units.of_velocity, "velocity at the start"),
-    ):
-        values = np.array([each.attrs[name] for each in found])
-        dataset.coords[name] = variable("start", values, unit, text)
-        del dataset.attrs[name]
-    dataset.coords.update(result.indices(dataset))
-    dataset.attrs["steps_per_period"] = max(each.attrs["steps_per_period"] for each in found)
+class Rows(NamedTuple):
+    """Arrays of several trajectories, a row each; missing events are nan, their kind is empty."""
+
+    theta: Floats
+    velocity: Floats
+    event_time: Floats
+    event_theta: Floats
+    event_kind: NDArray[np.str_]
+
+
+def rows_of(raws: Sequence[_core.Trajectory]) -> Rows:
+    """Return the samples and events of trajectories with common times."""
+    shape = len(raws), max(len(raw.event_kind) for raw in raws)
+    times, angles = np.full((2, *shape), np.nan)
+    kinds = np.full(shape, "", dtype="U14")
+    for k, raw in enumerate(raws):
+        count = len(raw.event_kind)
+        times[k, :count], angles[k, :count] = raw.event_time, raw.event_theta
+        kinds[k, :count] = raw.event_kind
+    theta, velocity = (np.stack([getattr(raw, n) for raw in raws]) for n in ("theta", "velocity"))
+    return Rows(theta, velocity, times, angles, kinds)
+
+
+def several_facts(
+    dataset: xr.Dataset,
+    each: Sequence[Mapping[str, float]],
+    angles: Floats,
+    speeds: Floats,
+    units: Units,
+) -> None:
+    """Set the facts of each trajectory over ``start``, nan where one has none."""
+    for name in dict.fromkeys(name for facts in each for name in facts):
+        known = dataset[name]
+        values = np.array([facts.get(name, np.nan) for facts in each])
+        dataset[name] = ("start", values.astype(known.dtype), known.attrs)
+    first = variable("start", angles, "rad", "angle at the start")
+    second = variable("start", speeds, units.of_velocity, "velocity at the start")
+    dataset.coords.update({"theta0": first, "velocity0": second})
+
+
+def several_lines(dataset: xr.Dataset, units: Units) -> list[str]:
+    """Return the summary of several trajectories."""
     last, held = units.at(format(dataset.attrs["until"], "g")), int(dataset["stuck"].sum())
-    lines = [
-        f"{counted(len(found), 'start')} up to {last}; friction holds {held} of them at the end."
-    ]
-    tol = dataset.attrs["tol"]
-    missed = int((dataset["reached_error"] > tol).sum())
+    many = counted(dataset.sizes["start"], "start")
+    lines = [f"{many} up to {last}; friction holds {held} of them at the end."]
+    missed = int((dataset["reached_error"] > dataset.attrs["tol"]).sum())
     if missed:
-        lines.append(f"THE TOLERANCE {tol:g} WAS NOT REACHED by {missed} of them.")
-    summarised(dataset, lines, pendulum, "angles and velocities here are")
-    return dataset
+        tol = format(dataset.attrs["tol"], "g")
+        lines.append(f"THE TOLERANCE {tol} WAS NOT REACHED by {missed} of them.")
+    return lines
 
 
 def advance(  # noqa: PLR0913

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,7 @@ from pendmap.analysis import result
 from pendmap.analysis.grid import ascending, starts
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised, variable
-from pendmap.analysis.trajectories import alike, together
+from pendmap.analysis.trajectories import alike, rows_of, several_facts, several_lines
 from pendmap.errors import (
     MOST_SAMPLES,
     InputError,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
 
     Live = Callable[[Floats, Floats, Floats], object]
 
@@ -191,17 +191,10 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     several = np.ndim(theta) > 0 or np.ndim(velocity) > 0
     angles, speeds = starts(*alike(theta, velocity)) if several else _one(theta, velocity)
     lyapunov = check_flag("lyapunov", lyapunov)
-    if abs(bare.p) > _STRONGEST:
-        raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {bare.p:g}: the number "
-            "of steps grows with its root"
-        )
+    _refuse_strong(bare)
     until, wanted = _times(until, t_eval)
-    given = [("samples", samples is not None), ("lyapunov", lyapunov), ("live", live is not None)]
-    for name, there in given if t_eval is not None else given[2:] if several else ():
-        if there:
-            why = "with t_eval" if t_eval is not None else "with several starts"
-            raise InputError(f"{name} must be left out {why}")
+    given = {"samples": samples is not None, "lyapunov": lyapunov, "live": live is not None}
+    _refuse(given, timed=wanted is not None, several=several)
     periods, end = until / pendulum.period, units.bare(until, TIME)
     if samples is None:
         each = _MOST_SAMPLES // angles.size
@@ -217,21 +210,125 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
         )
-    plan = _Plan(until, numerics, samples, lyapunov, live, wanted)
-    pairs = zip(angles.tolist(), speeds.tolist(), strict=True)
-    found = [_trajectory(pendulum, angle, speed, plan) for angle, speed in pairs]
-    return together(found, pendulum) if several else found[0]
+    times, every, once = _sampled(wanted, bare, units)
+
+    def shown(times: Floats, angles: Floats, speeds: Floats) -> None:
+        if live is not None:
+            live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
+
+    choices = (numerics.tol, samples, lyapunov, live and shown, times.tolist())
+    end = end if wanted is None else float(times[-1])
+    with core_errors():
+        raws = [
+            _core.simulate(bare, start, end, *choices)
+            for start in zip(angles.tolist(), units.bare(speeds, VELOCITY).tolist(), strict=True)
+        ]
+    raw = raws[0]
+    if wanted is None:
+        every, once = np.arange(raw.time.size), np.arange(0, raw.time.size, samples)
+        if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
+            once = once[:-1]  # the end, between two samples
+    time = units.given(raw.time, TIME)
+    clock = time[every] if wanted is None else wanted
+    dataset = _dataset(raws, every, once, clock, pendulum, several=several)
+    facts_of = [
+        {
+            **_exponent(own, time, units),
+            "turns": math.trunc((float(own.theta[-1]) - angle) / math.tau),
+            "stuck": int(own.stuck),
+            "reached_error": own.reached_error,
+            "end_error": own.end_error,
+        }
+        for own, angle in zip(raws, angles, strict=True)
+    ]
+    values = {
+        **numerics.provenance(),
+        **{name: value for own in reversed(facts_of) for name, value in own.items()},
+        "theta0": None if several else angles.item(),
+        "velocity0": None if several else speeds.item(),
+        "until": float(time[-1]) if raw.interrupted else until,
+        "steps_per_period": max(own.steps_per_period for own in raws),
+        "lyapunov": int(lyapunov),
+    }
+    if raw.interrupted:
+        values |= {"interrupted": 1, "until_asked": until}
+    SCHEMA.complete(dataset, pendulum, values, raw)
+    if several:
+        several_facts(dataset, facts_of, angles, speeds, units)
+    lines = several_lines(dataset, units) if several else _summary(dataset, units)
+    what = "angles and velocities here are" if several else "angle and velocity here are"
+    summarised(dataset, lines, pendulum, what)
+    return dataset
 
 
-class _Plan(NamedTuple):
-    """What trajectories have in common."""
+def _dataset(  # noqa: PLR0913 (samples and where they belong)
+    raws: list[_core.Trajectory],
+    every: Indices,
+    once: Indices,
+    clock: Floats,
+    pendulum: Pendulum | Rig,
+    *,
+    several: bool,
+) -> xr.Dataset:
+    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events."""
+    of, units = rows_of(raws) if several else raws[0], pendulum.units
+    theta, speed = of.theta[..., every], units.given(of.velocity, VELOCITY)
+    start = ("start",) if several else ()
+    wrapped = -np.remainder(math.pi - of.theta[..., once], math.tau) + math.pi
+    kinds, rate = np.array(of.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
+    event_time = units.given(of.event_time, TIME)
+    fell = energy(theta, speed[..., every], pendulum.attributes)
+    at, period, event = (*start, "time"), (*start, "period"), (*start, "event")
+    return xr.Dataset(
+        {
+            "theta": variable(at, theta, "rad", "angle, not wrapped"),
+            "velocity": variable(at, speed[..., every], units.of_velocity, units.derivative),
+            "energy": variable(at, fell, "1", "energy", FORMULA),
+            "section_theta": variable(period, wrapped, "rad", "angle, once a period"),
+            "section_velocity": variable(period, speed[..., once], *rate),
+            "section_time": variable(
+                "period", units.given(raws[0].time[once], TIME), units.of_time, units.clock
+            ),
+            "event_time": variable(event, event_time, units.of_time, "time of the event"),
+            "event_kind": variable(event, kinds, long_name="turn, stick or release"),
+            "event_theta": variable(event, of.event_theta, "rad", "angle of the event"),
+        },
+        coords={
+            "time": variable("time", clock, units.of_time, units.clock),
+            "period": variable("period", np.arange(once.size), "1", "number of the period"),
+        },
+    )
 
-    until: float
-    numerics: Numerics
-    samples: int
-    lyapunov: bool
-    live: Live | None
-    wanted: Floats | None  # times of the samples; None for equal ones
+
+def _refuse_strong(pendulum: Pendulum) -> None:
+    """Raise InputError for a drive whose trajectories take too long."""
+    if abs(pendulum.p) > _STRONGEST:
+        raise InputError(
+            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            "of steps grows with its root"
+        )
+
+
+def _refuse(given: dict[str, bool], *, timed: bool, several: bool) -> None:
+    """Raise InputError for a choice that chosen times, or several starts, do not allow."""
+    for name, there in given.items():
+        if there and (timed or (several and name == "live")):
+            why = "with t_eval" if timed else "with several starts"
+            raise InputError(f"{name} must be left out {why}")
+
+
+def _sampled(
+    wanted: Floats | None, pendulum: Pendulum, units: Units
+) -> tuple[Floats, Indices, Indices]:
+    """Return times for the core, and the places of samples and section; empty for equal samples."""
+    none = np.zeros(0, dtype=np.intp)
+    if wanted is None:
+        return np.zeros(0), none, none
+    asked, period = units.bare(wanted, TIME), pendulum.period
+    count = math.floor(asked[-1] / period * (1 + 1e-14)) + 1
+    once = np.minimum(period * np.arange(count), asked[-1])
+    times = np.union1d(once, asked)
+    return times, np.searchsorted(times, asked), np.searchsorted(times, once)
 
 
 def _one(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
@@ -255,77 +352,6 @@ def _times(until: float | None, t_eval: ArrayLike | None) -> tuple[float, Floats
     if until is not None and wanted[-1] > check_number("until", until):
         raise InputError(f"t_eval must end by until = {until:g}, got {wanted[-1]:g}")
     return float(wanted[-1]), wanted
-
-
-def _trajectory(pendulum: Pendulum | Rig, theta: float, velocity: float, plan: _Plan) -> xr.Dataset:
-    """Return the result for one start."""
-    bare, units = without_dimensions(pendulum)
-    until, numerics, samples, lyapunov, live, wanted = plan
-    start, end = (theta, units.bare(velocity, VELOCITY)), units.bare(until, TIME)
-    times: Floats = np.zeros(0)
-    once, asked = times, times
-    if wanted is not None:  # the section has times of its own
-        asked = units.bare(wanted, TIME)
-        end = float(asked[-1])
-        count = math.floor(end / bare.period * (1 + 1e-14)) + 1
-        once = np.asarray(np.minimum(bare.period * np.arange(count), end), np.float64)
-        times = np.union1d(once, asked)
-
-    def shown(times: Floats, angles: Floats, speeds: Floats) -> None:
-        if live is not None:
-            live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
-
-    with core_errors():
-        raw = _core.simulate(
-            bare, start, end, numerics.tol, samples, lyapunov, live and shown, times.tolist()
-        )
-    if wanted is None:
-        every, at = np.arange(raw.time.size), np.arange(0, raw.time.size, samples)
-        if raw.time[at[-1]] < (1 - 1e-9) * at[-1] / samples * bare.period:
-            at = at[:-1]  # the end, between two samples
-    else:
-        every, at = np.searchsorted(times, asked), np.searchsorted(times, once)
-    time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
-    event_time = units.given(raw.event_time, TIME)
-    angle = raw.theta[every]
-    wrapped = -np.remainder(math.pi - raw.theta[at], math.tau) + math.pi
-    kinds, rate = np.array(raw.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
-    dataset = xr.Dataset(
-        {
-            "theta": variable("time", angle, "rad", "angle, not wrapped"),
-            "velocity": variable("time", speed[every], units.of_velocity, units.derivative),
-            "energy": variable(
-                "time", energy(angle, speed[every], pendulum.attributes), "1", "energy", FORMULA
-            ),
-            "section_theta": variable("period", wrapped, "rad", "angle, once a period"),
-            "section_velocity": variable("period", speed[at], *rate),
-            "section_time": variable("period", time[at], units.of_time, units.clock),
-            "event_time": variable("event", event_time, units.of_time, "time of the event"),
-            "event_kind": variable("event", kinds, long_name="turn, stick or release"),
-            "event_theta": variable("event", raw.event_theta, "rad", "angle of the event"),
-        },
-        coords={
-            "time": variable(
-                "time", time[every] if wanted is None else wanted, units.of_time, units.clock
-            ),
-            "period": variable("period", np.arange(wrapped.size), "1", "number of the period"),
-        },
-    )
-    values = {
-        **numerics.provenance(),
-        **_exponent(raw, time, units),
-        "theta0": theta,
-        "velocity0": velocity,
-        "until": float(time[-1]) if raw.interrupted else until,
-        "turns": math.trunc((float(raw.theta[-1]) - theta) / math.tau),
-        "stuck": int(raw.stuck),
-        "lyapunov": int(lyapunov),
-    }
-    if raw.interrupted:
-        values |= {"interrupted": 1, "until_asked": until}
-    SCHEMA.complete(dataset, pendulum, values, raw)
-    summarised(dataset, _summary(dataset, units), pendulum, "angle and velocity here are")
-    return dataset
 
 
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
