@@ -30,12 +30,16 @@ if TYPE_CHECKING:
     from pendmap.analysis.parameter_map import parameter_map as parameter_map
     from pendmap.analysis.stored import merge as merge
     from pendmap.analysis.tongues import tongues as tongues
-    from pendmap.analysis.trajectory import advance as advance
+    from pendmap.analysis.trajectories import advance as advance
     from pendmap.analysis.trajectory import simulate as simulate
+    from pendmap.analysis.varied import pendulum_of as pendulum_of
+    from pendmap.comparison.experiment import compare as compare
+    from pendmap.diagnosis.diagnose import diagnose as diagnose
     from pendmap.errors import FitDiverged as FitDiverged
     from pendmap.errors import InputError as InputError
     from pendmap.files.dataset import load as load
     from pendmap.files.dataset import save as save
+    from pendmap.identification.experiment import identify as identify
     from pendmap.model import PRESETS as PRESETS
     from pendmap.model import Effect as Effect
     from pendmap.model import Formula as Formula
@@ -55,6 +59,7 @@ if TYPE_CHECKING:
     from pendmap.records import noise_floor as noise_floor
     from pendmap.records import read_experiment as read_experiment
     from pendmap.render import plot as plot
+    from pendmap.viewer import view as view
 
     __version__: str
 
@@ -117,9 +122,13 @@ _OTHERS = {
     ],
     "analysis.grid": ["Axis", "Grid"],
     "analysis.stored": ["merge"],
-    "analysis.trajectory": ["advance"],
+    "analysis.trajectories": ["advance"],
+    "analysis.varied": ["pendulum_of"],
+    "comparison.experiment": ["compare"],
+    "diagnosis.diagnose": ["diagnose"],
     "errors": ["FitDiverged", "InputError"],
     "files.dataset": ["load", "save"],
+    "identification.experiment": ["identify"],
     "model": [
         "PRESETS",
         "Effect",
@@ -140,6 +149,7 @@ _OTHERS = {
         "noise_floor",
         "read_experiment",
     ],
+    "viewer": ["view"],
 }
 _HOMES = {
     **{name: home for home, names in _OTHERS.items() for name in names},

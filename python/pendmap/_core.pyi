@@ -49,6 +49,7 @@ __all__ = [
     "parameter_map",
     "parameter_names",
     "period",
+    "rates",
     "reckon",
     "replay",
     "roles",
@@ -360,6 +361,9 @@ def choose_steps(
     model: Pendulum, theta: _Floats, velocity: _Floats, tol: float
 ) -> tuple[int, float]: ...
 def acceleration(model: Pendulum, tau: _Floats, theta: _Floats, velocity: _Floats) -> _Floats: ...
+def rates(
+    model: Pendulum, tau: _Floats, theta: _Floats, velocity: _Floats
+) -> tuple[_Floats, _Floats, _Floats]: ...
 def simulate(
     model: Pendulum,
     start: tuple[float, float],
@@ -368,6 +372,7 @@ def simulate(
     samples: int,
     lyapunov: bool,
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
+    times: Sequence[float] = (),
 ) -> Trajectory: ...
 def thinned(count: int, others: int) -> NDArray[np.int64]: ...
 def orbits(

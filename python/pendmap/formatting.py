@@ -109,7 +109,7 @@ class Readable(abc.ABC):
     def _repr_html_(self) -> str:
         tables, lines = self.text_parts()
         below = "<br>".join(html.escape(line) for line in lines)
-        return "".join(_html(*table) for table in tables if table[1]) + f"<p>{below}</p>"
+        return "".join(html_table(*table) for table in tables if table[1]) + f"<p>{below}</p>"
 
 
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -120,7 +120,9 @@ def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(line.rstrip() for line in padded) + "\n"
 
 
-def _html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in HTML."""
+
     def line(cells: Sequence[str], tag: str) -> str:
         return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 

@@ -84,18 +84,21 @@ pub fn simulate(
     request: &Request,
     cancel: &AtomicBool,
 ) -> Result<Trajectory, Error> {
-    let run = simulate_watched(pendulum, request, cancel, &mut |_, _| ())?;
+    let run = simulate_watched(pendulum, request, &[], cancel, &mut |_, _| ())?;
     if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
 }
 
 /// Computes a trajectory and shows each sample, with its time, to `seen` as soon as it is known. If
 /// `cancel` is set after the first sample, the trajectory ends with the last one.
 ///
+/// `times`, if there are any, are those of the samples: they rise from 0 to the request's last time.
+///
 /// # Errors
 /// Those of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
 pub fn simulate_watched(
     pendulum: &Pendulum,
     request: &Request,
+    times: &[f64],
     cancel: &AtomicBool,
     seen: &mut dyn FnMut(f64, State),
 ) -> Result<Trajectory, Error> {
@@ -107,7 +110,7 @@ pub fn simulate_watched(
     let start = [request.start[0] - turns, request.start[1]];
     let nearer = Request { start, ..*request };
     let mut shown = |time: f64, [theta, velocity]: State| seen(time, [theta + turns, velocity]);
-    let mut trajectory = from(pendulum, &nearer, cancel, &mut shown)?;
+    let mut trajectory = from(pendulum, &nearer, times, cancel, &mut shown)?;
     if far {
         for theta in &mut trajectory.theta {
             *theta += turns;
@@ -122,6 +125,7 @@ pub fn simulate_watched(
 fn from(
     pendulum: &Pendulum,
     request: &Request,
+    chosen: &[f64],
     cancel: &AtomicBool,
     seen: &mut dyn FnMut(f64, State),
 ) -> Result<Trajectory, Error> {
@@ -130,7 +134,7 @@ fn from(
     let count = (request.until / interval) as usize;
     let events = EVENTS.saturating_mul((request.until / pendulum.period()) as usize);
     memory::reckon("samples", count.saturating_add(events), EACH)?;
-    let mut time = times(request.until, interval);
+    let mut time = if chosen.is_empty() { times(request.until, interval) } else { chosen.to_vec() };
     seen(time[0], request.start);
     let mut known = 1;
     let mut show = |new: &mut dyn Iterator<Item = State>| {

@@ -102,7 +102,7 @@ mod _core {
         fit::{Fit, FitPoint, FittedRun, WindowRows, fit_rows, fit_runs, replay},
         library::{effects, formula, roles},
         maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
-        motion::{Trajectory, acceleration, advance, choose_steps, simulate},
+        motion::{Trajectory, acceleration, advance, choose_steps, rates, simulate},
         orbits::{Orbit, OrbitSearch, orbits, orbits_near},
         parameter_maps::{
             Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,

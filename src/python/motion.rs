@@ -2,15 +2,17 @@
 
 use std::mem::take;
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pendmap::error::Error;
+use pendmap::integrate::tangent::Tangent;
 use pendmap::integrate::trajectory::{self, Request};
 use pendmap::integrate::{State, Strobe, accuracy};
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::advance::advance as advance_all;
-use pendmap::model::Pendulum;
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pendmap::model::{Equation, Pendulum};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -37,6 +39,41 @@ pub fn acceleration<'py>(
     let states = tau.iter().zip(theta).zip(velocity);
     let all: Vec<f64> = states.map(|((t, x), v)| equation.acceleration_at(*t, *x, *v)).collect();
     Ok(all.into_pyarray(py))
+}
+
+/// [`acceleration`] with time in the laboratory going on, as in a trajectory, and its derivatives by
+/// angle and velocity.
+#[pyfunction]
+pub fn rates<'py>(
+    py: Python<'py>,
+    model: Model,
+    tau: PyReadonlyArray1<'py, f64>,
+    theta: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
+    type Number = Tangent<f64, 2>;
+    let pendulum = model.pendulum()?;
+    let mut equation = Equation::lift(&pendulum, |_, value| Number::constant(value));
+    equation.ages = true;
+    if equation.keeps()[0] || equation.sways() {
+        return Err(PyValueError::new_err(
+            "effects must act by time, angle and velocity alone, one depends on the last turn or on a \
+             mode of the rig",
+        ));
+    }
+    let (tau, theta, velocity) = (tau.as_slice()?, theta.as_slice()?, velocity.as_slice()?);
+    let mut columns = [(); 3].map(|()| Vec::with_capacity(tau.len()));
+    for ((t, x), v) in tau.iter().zip(theta).zip(velocity) {
+        let forcing = equation.forcing(Number::constant(*t));
+        let (angle, speed) = (Number::seeded(*x, 0), Number::seeded(*v, 1));
+        let sense = Number::constant(1_f64.copysign(*v));
+        let at = equation.point(&forcing, angle, speed, sense);
+        let Number { value, slope: [by_theta, by_velocity] } = equation.acceleration(&forcing, &at);
+        for (column, number) in columns.iter_mut().zip([value, by_theta, by_velocity]) {
+            column.push(number);
+        }
+    }
+    Ok(columns.map(|column: Vec<f64>| column.into_pyarray(py)))
 }
 
 /// The stroboscopic map with `steps` a period.
@@ -126,10 +163,11 @@ impl Trajectory {
     }
 }
 
-/// One trajectory. With `live` its samples are passed on as they are computed, `live(times, angles,
-/// velocities)`, and an interrupt ends it with the last one.
+/// One trajectory, sampled at `times` where they are given, from 0 to `until`. With `live` its samples
+/// are passed on as they are computed, `live(times, angles, velocities)`, and an interrupt ends it with
+/// the last one.
 #[pyfunction]
-#[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None))]
+#[pyo3(signature = (model, start, until, tol, samples, lyapunov, live=None, times=Vec::new()))]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 pub fn simulate(
     py: Python<'_>,
@@ -140,12 +178,21 @@ pub fn simulate(
     samples: usize,
     lyapunov: bool,
     live: Option<Py<PyAny>>,
+    times: Vec<f64>,
 ) -> PyResult<Trajectory> {
     let pendulum = model.pendulum()?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
     let Some(live) = live else {
-        let run =
-            watched(py, None, |control| trajectory::simulate(&pendulum, &request, control.flag()))?;
+        let run = watched(py, None, |control| {
+            let run = trajectory::simulate_watched(
+                &pendulum,
+                &request,
+                &times,
+                control.flag(),
+                &mut |_, _| (),
+            )?;
+            if control.flag().load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
+        })?;
         return Ok(Trajectory::new(py, run));
     };
     let seen = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
@@ -167,7 +214,9 @@ pub fn simulate(
     let (result, stop) = stopped(
         py,
         |py, _| hand_over(py),
-        |control| trajectory::simulate_watched(&pendulum, &request, control.flag(), &mut see),
+        |control| {
+            trajectory::simulate_watched(&pendulum, &request, &times, control.flag(), &mut see)
+        },
     )?;
     if let Some(error) = stop.filter(|e| !e.is_instance_of::<PyKeyboardInterrupt>(py)) {
         return Err(error);

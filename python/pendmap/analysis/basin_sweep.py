@@ -124,7 +124,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     analysis : str
         What is done for each model: ``basins``.
     grid : Grid or int, optional
-        As for :func:`pendmap.basins`; by default 100 cells on each side.
+        As for :func:`pendmap.basins`, a whole number too; by default 100 cells on each side.
     tol, max_periods, layer_periods, seed, threads
         As for :func:`pendmap.basins`; blocks are computed at once on the threads.
     check : bool
@@ -177,7 +177,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         )
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
-    axes = varied.varied(pendulum, ranges, len(ranges), listed=True)
+    axes = varied.varied(pendulum, ranges, len(ranges))
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     kept = Kept(store, resume, part, executor, mix, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
@@ -221,10 +221,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         return dataset, ["label"]
 
     request = {
-        "ranges": {
-            axis.name: own if isinstance(own, tuple) else axis.values.tolist()
-            for axis, own in zip(axes, ranges.values(), strict=True)
-        },
+        "ranges": varied.requested(axes, ranges),
         "analysis": analysis,
         "grid": grid,
         "tol": numerics.tol,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
@@ -60,7 +60,7 @@ SCHEMA = Schema(
 
 def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
-    ranges: Mapping[str, tuple[float, float, int]],
+    ranges: Mapping[str, ArrayLike],
     *,
     start: tuple[float, float] | None = None,
     starts: int = cell_search.STARTS,
@@ -91,9 +91,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ----------
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
-    ranges : mapping of str to (float, float, int)
-        One parameter with first value, last value (both included) and how many; names as for
-        :func:`pendmap.parameter_map`.
+    ranges : mapping of str to (float, float, int) or array_like
+        One parameter; as for :func:`pendmap.parameter_map`.
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
@@ -161,7 +160,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
-    request = {"ranges": ranges, "start": start, **search.request}
+    request = {"ranges": varied.requested([axis], ranges), "start": start, **search.request}
     return kept.complete("bifurcation", pendulum, request, job, compute, progress)
 
 

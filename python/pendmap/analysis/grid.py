@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import numbers
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -46,6 +47,18 @@ class Axis:
             )
         object.__setattr__(self, "count", check_whole("count", self.count, 1, MOST_CELLS))
 
+    @classmethod
+    def around(cls, name: str, values: ArrayLike) -> Axis:
+        """Return the axis whose cells have these centres: ascending, evenly spaced, 2 or more."""
+        centres = ascending(name, values)
+        if centres.size < 2 or not evenly(centres):  # noqa: PLR2004 (one has no width)
+            raise InputError(
+                f"{name} must be 2 or more evenly spaced values, the centres of cells of one size, "
+                f"or (low, high, count), got {short_repr(values)}: basins_of takes any starts"
+            )
+        half = 0.5 * float(centres[-1] - centres[0]) / (centres.size - 1)
+        return cls(float(centres[0]) - half, float(centres[-1]) + half, centres.size)
+
     @property
     def centres(self) -> Floats:
         """Centres of the cells, shape (count,)."""
@@ -69,15 +82,22 @@ class Grid:
 
     Parameters
     ----------
-    theta : Axis
-        Angle, rad; or ``(low, high, count)``.
-    velocity : Axis
+    theta : Axis, (low, high, count) or array_like, shape (N,)
+        Angle, rad. ``low`` and ``high`` are the outer ends of the cells; an array, or a list that
+        has not three numbers, holds their centres, ascending and evenly spaced.
+    velocity : Axis, (low, high, count) or array_like, shape (M,)
         Velocity ``d theta / d tau``, in rad/s for a :class:`pendmap.Rig`; likewise.
 
     Raises
     ------
     InputError
-        If one is no axis.
+        If one is no axis, or values are not evenly spaced.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> Grid(theta=np.linspace(-1, 1, 5), velocity=(0, 2, 4)).theta
+    Axis(low=-1.25, high=1.25, count=5)
     """
 
     theta: Axis = Axis(-math.pi, math.pi, 1000)
@@ -88,8 +108,10 @@ class Grid:
             axis = getattr(self, name)
             if isinstance(axis, tuple | list) and len(axis) == 3:  # noqa: PLR2004
                 object.__setattr__(self, name, Axis(*axis))
+            elif isinstance(axis, np.ndarray | Sequence) and not isinstance(axis, str):
+                object.__setattr__(self, name, Axis.around(name, axis))
             else:
-                check_type(name, axis, Axis, "Axis(-3, 3, 100)")
+                check_type(name, axis, Axis, "Axis(-3, 3, 100) or np.linspace(-3, 3, 100)")
 
     @classmethod
     def square(cls, count: int, w0: float = 1.0) -> Grid:
@@ -161,6 +183,12 @@ def frequencies(values: ArrayLike) -> Floats:
             f"omega must be numbers above 0 in ascending order, got {short_repr(values)}"
         )
     return array
+
+
+def evenly(values: Floats) -> bool:
+    """Return whether ascending values are evenly spaced."""
+    steps = np.diff(values)
+    return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
 
 
 def ascending(name: str, given: ArrayLike) -> Floats:

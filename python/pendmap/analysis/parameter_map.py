@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
@@ -97,7 +97,7 @@ SCHEMA = Schema(
 
 def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
-    ranges: Mapping[str, tuple[float, float, int]],
+    ranges: Mapping[str, ArrayLike],
     *,
     starts: int = cell_search.STARTS,
     box: Grid | None = None,
@@ -137,12 +137,13 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     ----------
     pendulum : Pendulum or Rig
         The model; parameters that vary replace its own.
-    ranges : mapping of str to (float, float, int)
-        Two parameters with first value, last value (both included) and how many: columns, then
-        rows. Any of ``p``, ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without
-        dimensions, with a rig also ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI,
-        ``frequency_hz`` (``p`` is kept) and ``stroke_mm`` (``Omega`` is kept); or
-        ``EFFECT.PARAMETER`` of an effect that the model has, or that has no other parameter.
+    ranges : mapping of str to (float, float, int) or array_like
+        Two parameters, columns, then rows, each with an array of ascending values, evenly spaced or
+        not, or a tuple of first value, last value (both included) and how many. Any of ``p``,
+        ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without dimensions, with a rig also
+        ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI, ``frequency_hz`` (``p`` is kept) and
+        ``stroke_mm`` (``Omega`` is kept); or ``EFFECT.PARAMETER`` of an effect that the model has,
+        or that has no other parameter.
     starts : int
         Initial conditions of each cell.
     box : Grid, optional
@@ -237,7 +238,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
-    request = {"ranges": ranges, **search.request, "curves": curves}
+    request = {
+        "ranges": varied.requested([columns, rows], ranges),
+        **search.request,
+        "curves": curves,
+    }
     return kept.complete("parameter_map", pendulum, request, job, compute, progress)
 
 

@@ -1,4 +1,4 @@
-"""Single trajectories, and many starts advanced together."""
+"""Trajectories: one start, or several with common times."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result
-from pendmap.analysis.grid import starts
-from pendmap.analysis.numerics import Numerics, optional_whole
+from pendmap.analysis.grid import ascending, starts
+from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised, variable
+from pendmap.analysis.trajectories import alike, rows_of, several_facts, several_lines
 from pendmap.errors import (
-    MOST_PERIODS,
     MOST_SAMPLES,
     InputError,
     check_callable,
@@ -22,6 +22,7 @@ from pendmap.errors import (
     check_number,
     check_whole,
     core_errors,
+    short_repr,
 )
 from pendmap.files import facts
 from pendmap.formatting import counted, with_error
@@ -31,11 +32,10 @@ from pendmap.units import RATE, TIME, VELOCITY, Units
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
 
     Live = Callable[[Floats, Floats, Floats], object]
 
@@ -108,25 +108,30 @@ SCHEMA = Schema(
 
 def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
-    theta: float,
-    velocity: float,
-    until: float,
+    theta: ArrayLike,
+    velocity: ArrayLike,
+    until: float | None = None,
     *,
+    t_eval: ArrayLike | None = None,
     tol: float = 1e-9,
     samples: int | None = None,
     lyapunov: bool = False,
     live: Live | None = None,
 ) -> xr.Dataset:
-    """Integrate one trajectory: time history, stroboscopic (Poincare) section and energy.
+    """Integrate trajectories: time history, stroboscopic (Poincare) section and energy.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; as for :func:`pendmap.basins`.
-    theta, velocity : float
-        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
-    until : float
-        Last time, in units of ``1 / w0``; above 0.
+    theta, velocity : float or array_like, shape (N,)
+        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``. With an array there are N
+        trajectories, sampled at common times; a number beside it is that of all.
+    until : float, optional
+        Last time, in units of ``1 / w0``; above 0. By default the last of ``t_eval``.
+    t_eval : array_like, shape (M,), optional
+        Times of the samples, ascending, from 0 up to ``until``; the trajectory ends with the last.
+        States are those of the integrator's dense output, as exact as its steps.
     tol : float
         The error of each step is tightened until a 16 times smaller one changes the state after 5
         periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
@@ -147,6 +152,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         result, of the samples that are new since the last call: about every 50 ms while it
         integrates, and at the end. Their values are those of the result. With it Ctrl-C ends the
         trajectory with the last sample instead of raising; the attribute ``interrupted`` is 1 then.
+        For one trajectory without ``t_eval``.
 
     Returns
     -------
@@ -155,7 +161,9 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         theta``, 0 at rest) over ``time``; ``section_theta`` (wrapped to (-pi, pi]) and
         ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
         stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding.
-        ``stuck`` is 1 if friction holds the pendulum at the end.
+        ``stuck`` is 1 if friction holds the pendulum at the end. With an array of starts all of
+        these are over ``start`` too; a trajectory with fewer events than another has nan and no
+        kind in their place. ``result.isel(start=0)`` is one trajectory.
 
     Raises
     ------
@@ -173,82 +181,177 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> result = pendmap.simulate(pendulum, theta=1.0, velocity=0.0, until=20.0)
     >>> round(float(result.theta[-1]), 3)
     0.446
+    >>> pendmap.simulate(pendulum, [0.5, 1.0], 0.0, t_eval=[0.0, 20.0]).theta.values.round(3)
+    array([[0.5  , 0.297],
+           [1.   , 0.446]])
     """
     bare, units = without_dimensions(pendulum)
     check_callable("live", live, "three arrays, times, angles and velocities")
     numerics = Numerics(tol)
-    theta, velocity = check_number("theta", theta), check_number("velocity", velocity)
-    until = check_number("until", until)
+    several = np.ndim(theta) > 0 or np.ndim(velocity) > 0
+    angles, speeds = starts(*alike(theta, velocity)) if several else _one(theta, velocity)
     lyapunov = check_flag("lyapunov", lyapunov)
-    if abs(bare.p) > _STRONGEST:
-        raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {bare.p:g}: the number "
-            "of steps grows with its root"
-        )
-    if until <= 0:
-        raise InputError(f"until must be a time above 0, got {until:g}")
-    periods = until / pendulum.period
-    start, end = (theta, units.bare(velocity, VELOCITY)), units.bare(until, TIME)
+    _refuse_strong(bare)
+    until, wanted = _times(until, t_eval)
+    given = {"samples": samples is not None, "lyapunov": lyapunov, "live": live is not None}
+    _refuse(given, timed=wanted is not None, several=several)
+    periods, end = until / pendulum.period, units.bare(until, TIME)
     if samples is None:
-        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // max(periods, 1))))
+        each = _MOST_SAMPLES // angles.size
+        samples = int(min(_SAMPLES, max(1, each // max(periods, 1))))
         if not lyapunov:  # the batches of an exponent depend on the number of samples
-            samples = max(samples, _smooth(bare, start[1], end))
+            fastest = float(units.bare(np.abs(speeds).max(), VELOCITY))
+            samples = max(samples, _smooth(bare, fastest, end) // angles.size)
     samples = check_whole("samples", samples, 1, MOST_SAMPLES)
-    if periods * samples > 100 * _MOST_SAMPLES:
-        most = 100 * _MOST_SAMPLES // samples * pendulum.period
+    number = periods * samples if wanted is None else wanted.size
+    if number * angles.size > 100 * _MOST_SAMPLES:
+        most = 100 * _MOST_SAMPLES // samples // angles.size * pendulum.period
         raise InputError(
             f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
             "fit into memory"
         )
+    times, every, once = _sampled(wanted, bare, units)
 
     def shown(times: Floats, angles: Floats, speeds: Floats) -> None:
         if live is not None:
             live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
 
+    choices = (numerics.tol, samples, lyapunov, live and shown, times.tolist())
+    end = end if wanted is None else float(times[-1])
     with core_errors():
-        raw = _core.simulate(bare, start, end, numerics.tol, samples, lyapunov, live and shown)
-    time, speed = units.given(raw.time, TIME), units.given(raw.velocity, VELOCITY)
-    event_time = units.given(raw.event_time, TIME)
-    once = np.arange(0, time.size, samples)
-    if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
-        once = once[:-1]  # the end, between two samples
-    angle = raw.theta[once]
-    wrapped = -np.remainder(math.pi - angle, math.tau) + math.pi
-    kinds, rate = np.array(raw.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
-    dataset = xr.Dataset(
+        raws = [
+            _core.simulate(bare, start, end, *choices)
+            for start in zip(angles.tolist(), units.bare(speeds, VELOCITY).tolist(), strict=True)
+        ]
+    raw = raws[0]
+    if wanted is None:
+        every, once = np.arange(raw.time.size), np.arange(0, raw.time.size, samples)
+        if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
+            once = once[:-1]  # the end, between two samples
+    time = units.given(raw.time, TIME)
+    clock = time[every] if wanted is None else wanted
+    dataset = _dataset(raws, every, once, clock, pendulum, several=several)
+    facts_of = [
         {
-            "theta": variable("time", raw.theta, "rad", "angle, not wrapped"),
-            "velocity": variable("time", speed, units.of_velocity, units.derivative),
-            "energy": variable(
-                "time", energy(raw.theta, speed, pendulum.attributes), "1", "energy", FORMULA
-            ),
-            "section_theta": variable("period", wrapped, "rad", "angle, once a period"),
-            "section_velocity": variable("period", speed[once], *rate),
-            "section_time": variable("period", time[once], units.of_time, units.clock),
-            "event_time": variable("event", event_time, units.of_time, "time of the event"),
-            "event_kind": variable("event", kinds, long_name="turn, stick or release"),
-            "event_theta": variable("event", raw.event_theta, "rad", "angle of the event"),
-        },
-        coords={
-            "time": variable("time", time, units.of_time, units.clock),
-            "period": variable("period", np.arange(wrapped.size), "1", "number of the period"),
-        },
-    )
+            **_exponent(own, time, units),
+            "turns": math.trunc((float(own.theta[-1]) - angle) / math.tau),
+            "stuck": int(own.stuck),
+            "reached_error": own.reached_error,
+            "end_error": own.end_error,
+        }
+        for own, angle in zip(raws, angles, strict=True)
+    ]
     values = {
         **numerics.provenance(),
-        **_exponent(raw, time, units),
-        "theta0": theta,
-        "velocity0": velocity,
+        **{name: value for own in reversed(facts_of) for name, value in own.items()},
+        "theta0": None if several else angles.item(),
+        "velocity0": None if several else speeds.item(),
         "until": float(time[-1]) if raw.interrupted else until,
-        "turns": math.trunc((float(raw.theta[-1]) - theta) / math.tau),
-        "stuck": int(raw.stuck),
+        "steps_per_period": max(own.steps_per_period for own in raws),
         "lyapunov": int(lyapunov),
     }
     if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
     SCHEMA.complete(dataset, pendulum, values, raw)
-    summarised(dataset, _summary(dataset, units), pendulum, "angle and velocity here are")
+    if several:
+        several_facts(dataset, facts_of, angles, speeds, units)
+    lines = several_lines(dataset, units) if several else _summary(dataset, units)
+    what = "angles and velocities here are" if several else "angle and velocity here are"
+    summarised(dataset, lines, pendulum, what)
     return dataset
+
+
+def _dataset(  # noqa: PLR0913 (samples and where they belong)
+    raws: list[_core.Trajectory],
+    every: Indices,
+    once: Indices,
+    clock: Floats,
+    pendulum: Pendulum | Rig,
+    *,
+    several: bool,
+) -> xr.Dataset:
+    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events."""
+    of, units = rows_of(raws) if several else raws[0], pendulum.units
+    theta, speed = of.theta[..., every], units.given(of.velocity, VELOCITY)
+    start = ("start",) if several else ()
+    wrapped = -np.remainder(math.pi - of.theta[..., once], math.tau) + math.pi
+    kinds, rate = np.array(of.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
+    event_time = units.given(of.event_time, TIME)
+    fell = energy(theta, speed[..., every], pendulum.attributes)
+    at, period, event = (*start, "time"), (*start, "period"), (*start, "event")
+    return xr.Dataset(
+        {
+            "theta": variable(at, theta, "rad", "angle, not wrapped"),
+            "velocity": variable(at, speed[..., every], units.of_velocity, units.derivative),
+            "energy": variable(at, fell, "1", "energy", FORMULA),
+            "section_theta": variable(period, wrapped, "rad", "angle, once a period"),
+            "section_velocity": variable(period, speed[..., once], *rate),
+            "section_time": variable(
+                "period", units.given(raws[0].time[once], TIME), units.of_time, units.clock
+            ),
+            "event_time": variable(event, event_time, units.of_time, "time of the event"),
+            "event_kind": variable(event, kinds, long_name="turn, stick or release"),
+            "event_theta": variable(event, of.event_theta, "rad", "angle of the event"),
+        },
+        coords={
+            "time": variable("time", clock, units.of_time, units.clock),
+            "period": variable("period", np.arange(once.size), "1", "number of the period"),
+        },
+    )
+
+
+def _refuse_strong(pendulum: Pendulum) -> None:
+    """Raise InputError for a drive whose trajectories take too long."""
+    if abs(pendulum.p) > _STRONGEST:
+        raise InputError(
+            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
+            "of steps grows with its root"
+        )
+
+
+def _refuse(given: dict[str, bool], *, timed: bool, several: bool) -> None:
+    """Raise InputError for a choice that chosen times, or several starts, do not allow."""
+    for name, there in given.items():
+        if there and (timed or (several and name == "live")):
+            why = "with t_eval" if timed else "with several starts"
+            raise InputError(f"{name} must be left out {why}")
+
+
+def _sampled(
+    wanted: Floats | None, pendulum: Pendulum, units: Units
+) -> tuple[Floats, Indices, Indices]:
+    """Return times for the core, and the places of samples and section; empty for equal samples."""
+    none = np.zeros(0, dtype=np.intp)
+    if wanted is None:
+        return np.zeros(0), none, none
+    asked, period = units.bare(wanted, TIME), pendulum.period
+    count = math.floor(asked[-1] / period * (1 + 1e-14)) + 1
+    once = np.minimum(period * np.arange(count), asked[-1])
+    times = np.union1d(once, asked)
+    return times, np.searchsorted(times, asked), np.searchsorted(times, once)
+
+
+def _one(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
+    """Return one start as two arrays of length 1."""
+    pair = check_number("theta", theta), check_number("velocity", velocity)
+    return np.array(pair[:1]), np.array(pair[1:])
+
+
+def _times(until: float | None, t_eval: ArrayLike | None) -> tuple[float, Floats | None]:
+    """Return the last time, and the times of the samples if they are given."""
+    if t_eval is None:
+        if until is None:
+            raise InputError("until must be a time above 0 where t_eval is left out, got None")
+        until = check_number("until", until)
+        if until <= 0:
+            raise InputError(f"until must be a time above 0, got {until:g}")
+        return until, None
+    wanted = ascending("t_eval", t_eval)
+    if wanted[0] < 0 or wanted[-1] <= 0:
+        raise InputError(f"t_eval must be times from 0, the last above 0, got {short_repr(t_eval)}")
+    if until is not None and wanted[-1] > check_number("until", until):
+        raise InputError(f"t_eval must end by until = {until:g}, got {wanted[-1]:g}")
+    return float(wanted[-1]), wanted
 
 
 def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
@@ -324,69 +427,6 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
             "the exponents of the attractors."
         )
     return lines
-
-
-def advance(  # noqa: PLR0913
-    pendulum: Pendulum | Rig,
-    theta: ArrayLike,
-    velocity: ArrayLike,
-    periods: int,
-    *,
-    tol: float = 1e-6,
-    steps_per_period: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Advance many starts by the same number of periods.
-
-    Parameters
-    ----------
-    pendulum : Pendulum or Rig
-        The model; with a rig velocities are in rad/s.
-    theta, velocity : array_like, shape (N,)
-        Angles in rad and velocities at ``tau = 0``.
-    periods : int
-        Forcing periods (of ``2 pi`` where p = 0); 0 or more.
-    steps_per_period : int, optional
-        Steps a period; by default chosen by ``tol``.
-    tol, threads, progress
-        As for :func:`pendmap.basins`.
-
-    Returns
-    -------
-    theta, velocity : ndarray, shape (N,)
-        Angles wrapped to [-pi, pi] and velocities.
-    turns : ndarray of int, shape (N,)
-        Net full turns.
-
-    Raises
-    ------
-    InputError
-        If the lengths differ, a start is not finite, or a value is outside its range.
-
-    Examples
-    --------
-    >>> import pendmap
-    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
-    >>> theta, velocity, turns = pendmap.advance(pendulum, [0.5], [0.0], 40)
-    >>> theta.round(3), velocity.round(3)
-    (array([1.318]), array([-0.27]))
-    """
-    pendulum, units = without_dimensions(pendulum)
-    numerics = Numerics(tol, threads=threads, progress=progress)
-    angles, speeds = starts(theta, velocity)
-    speeds = units.bare(speeds, VELOCITY)
-    periods = check_whole("periods", periods, 0, MOST_PERIODS)
-    steps = optional_whole("steps_per_period", steps_per_period, 1, _MOST_SAMPLES)
-    with core_errors():
-        if steps is None:
-            every = max(1, angles.size // 400)
-            sample = angles[::every].copy(), speeds[::every].copy()
-            steps, _ = _core.choose_steps(pendulum, *sample, numerics.tol)
-        end, speed, turns = _core.advance(
-            pendulum, angles, speeds, periods, steps, numerics.workers, progress
-        )
-    return end, units.given(speed, VELOCITY), turns
 
 
 def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis.grid import ascending, coordinate
+from pendmap.analysis.grid import ascending, coordinate, evenly
 from pendmap.analysis.result import variable
 from pendmap.errors import (
     MOST_CELLS,
@@ -18,15 +18,17 @@ from pendmap.errors import (
     check_whole,
     short_repr,
 )
-from pendmap.model import Effect, without_dimensions
+from pendmap.files import facts
+from pendmap.model import Effect, parse_model, without_dimensions
 from pendmap.model.effects import effects
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    import xarray as xr
     from numpy.typing import ArrayLike
 
     from pendmap.model import Pendulum
@@ -77,8 +79,7 @@ class Varied:
     @property
     def even(self) -> bool:
         """Whether the values are evenly spaced."""
-        steps = np.diff(self.values)
-        return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
+        return evenly(self.values)
 
     @property
     def replaced(self) -> tuple[str, ...]:
@@ -87,11 +88,11 @@ class Varied:
 
 
 def varied(
-    model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int, *, listed: bool = False
+    model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` parameters that vary, from their first and last value and number.
+    """Return the ``count`` parameters that vary.
 
-    Where they may be ``listed``, what is no tuple is an array of values.
+    A tuple has the first value, the last and their number; anything else is an array of values.
     """
     if not isinstance(ranges, dict) or len(ranges) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
@@ -102,7 +103,7 @@ def varied(
             f"ranges must be a mapping like {few}, or on the command line {options}; "
             f"got {given or 'nothing'}"
         )
-    found = tuple(_one(model, name, given, listed=listed) for name, given in ranges.items())
+    found = tuple(_one(model, name, given) for name, given in ranges.items())
     pendulum, _ = without_dimensions(model)
     for axis in found:
         for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
@@ -120,6 +121,14 @@ def varied(
             "stroke_mm and a frequency must not both vary: vary p = Y Omega^2 / g instead"
         )
     return found
+
+
+def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
+    """Return ranges as a request to a store has them: tuples as given, arrays as lists."""
+    return {
+        axis.name: own if isinstance(own, tuple) else axis.values.tolist()
+        for axis, own in zip(axes, ranges.values(), strict=True)
+    }
 
 
 def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum | Rig:
@@ -163,7 +172,7 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
 
 
-def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varied:  # noqa: ANN401
+def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN401
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     # Name in the core, factor and power of w0 of each quantity.
@@ -183,8 +192,7 @@ def _one(model: Pendulum | Rig, name: str, given: Any, *, listed: bool) -> Varie
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
             f"{_of_effect(name)}"
         )
-    by_ends = isinstance(given, tuple) or not listed
-    values = _values(name, given) if by_ends else ascending(name, given)
+    values = _values(name, given) if isinstance(given, tuple) else ascending(name, given)
     if name in own:
         bare, factor, power = own[name]
         if name in {"frequency_hz", "stroke_mm"}:
@@ -223,9 +231,9 @@ def _of_effect(name: str) -> str:
     return f"; {which} has {has}" + ("" if len(known.parameters) == 1 else " if it is in the model")
 
 
-def _values(name: str, given: object) -> Floats:
+def _values(name: str, given: tuple[Any, ...]) -> Floats:
     wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
-    if not isinstance(given, tuple | list) or len(given) != 3:  # noqa: PLR2004
+    if len(given) != 3:  # noqa: PLR2004
         raise InputError(f"{wanted}, got {short_repr(given)}")
     low, high = (check_number(name, end) for end in given[:2])
     count = check_whole(f"{name}: how many", given[2], 1, MOST_CELLS)
@@ -234,6 +242,55 @@ def _values(name: str, given: object) -> Floats:
     if count == 1 and low < high:
         raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
     return np.linspace(low, high, count)
+
+
+def pendulum_of(dataset: xr.Dataset) -> Pendulum | Rig:
+    """Return the model that made a result, with its effects, formulas and notes.
+
+    Of a sweep or a map over parameters it is the model given; where one value of a parameter that
+    varies was selected, the model with that value.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of any analysis, or a selection of it.
+
+    Returns
+    -------
+    Pendulum or Rig
+        Equal to the model given: a :class:`pendmap.Rig` for a result in SI.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> made = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> pendmap.pendulum_of(pendmap.simulate(made, 1.0, 0.0, 5.0)) == made
+    True
+    >>> result = pendmap.sweep(made, {"p": (0.4, 0.7, 4)}, grid=10, check=False)
+    >>> pendmap.pendulum_of(result.isel(p=-1)).p
+    0.7
+    """
+    text = getattr(dataset, "attrs", {}).get("model")
+    if not isinstance(text, str):
+        raise InputError(f"dataset must be a result of pendmap, got {short_repr(type(dataset))}")
+    model = parse_model(text, "dataset")
+    known, own = model.attributes, facts(dataset)
+    names = [*LABELS, *(f"{e.name}.{p}" for e in model.effects for p in e.parameters)]
+    chosen = {
+        name: float(own[name])
+        for name in names
+        if name in dataset.coords and name in own and known.get(name) != own[name]
+    }
+    of_effects = {name: x for name, x in chosen.items() if name not in LABELS}
+    if len(chosen) > len(of_effects):
+        plain = {name: x for name, x in chosen.items() if name in LABELS}
+        model = parse_model(text, "dataset", plain)
+    return with_values(model, of_effects) if of_effects else model
 
 
 def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:

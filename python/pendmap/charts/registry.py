@@ -53,6 +53,11 @@ def ready(dataset: xr.Dataset, action: str) -> xr.Dataset:
     if not isinstance(kind, str) or _builder(kind) is None:
         what = f"a dataset of kind {kind!r}" if hasattr(dataset, "attrs") else short_repr(dataset)
         raise InputError(f"cannot {action} {what}; kinds that can be: {', '.join(kinds())}")
+    if kind == "trajectory" and "start" in dataset.dims:
+        raise InputError(
+            f"cannot {action} {dataset.sizes['start']} trajectories at once: dataset must be one, "
+            "like dataset.isel(start=0)"
+        )
     dataset = shown(dataset)
     refuse_too_large(dataset)
     return dataset

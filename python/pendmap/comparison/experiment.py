@@ -21,7 +21,7 @@ from pendmap.errors import (
 )
 from pendmap.formatting import Readable, counted, percent
 from pendmap.model import Rig
-from pendmap.records.experiment import Experiment
+from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from pendmap.comparison.forced import Statistic
     from pendmap.comparison.steady import Steady
     from pendmap.formatting import Table
-    from pendmap.records import Run
+    from pendmap.records import Experiment, Run
+    from pendmap.records.read import Records
     from pendmap.signal import Floats
 
 
@@ -80,11 +81,12 @@ class Comparison(Readable):
         return [table for table in tables if table[1]], list(_lines(self))
 
 
-def compare(
+def compare(  # noqa: PLR0913 (each is asked for by name)
     model: Rig,
-    experiment: Experiment,
+    records: Records | Sequence[Records],
     *,
     ensemble: Ensemble | None = None,
+    rate_hz: float | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Comparison:
@@ -104,24 +106,45 @@ def compare(
     ----------
     model : Rig
         Model in SI units, from :func:`pendmap.load_model`.
-    experiment : Experiment
-        Records, from :func:`pendmap.read_experiment`.
+    records : path, Experiment, Run, or a sequence of these
+        As for :func:`pendmap.identify`; forced runs too.
     ensemble : Ensemble, optional
         Number and spread of the initial states for a forced run.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     threads : int, optional
         Number of threads; by default one per processor.
     progress : callable, optional
         Called repeatedly with the number of members done and in all, for each forced run.
 
+    Returns
+    -------
+    Comparison
+        Comparisons with each run.
+
     Raises
     ------
     InputError
         If no run can be compared: one needs samples with motion, a forced one also a known drive.
+    OSError
+        If a file cannot be read.
     KeyboardInterrupt
         After Ctrl-C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
+    >>> decay = pendmap.simulate(rig, theta=1.0, velocity=0.0, t_eval=np.arange(0, 20, 0.02))
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
+    >>> every = np.ones(angle.size, bool)
+    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
+    >>> round(pendmap.compare(rig, run).runs[0].rms, 4)
+    0.001
     """
     check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
-    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    experiment = experiment_of(records, rate_hz=rate_hz)
     if ensemble is not None:
         check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
     if threads is not None:

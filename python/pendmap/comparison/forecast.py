@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.replay import Motion, Reasons, compute_part, fit_states, run_forward
+from pendmap.comparison.replay import Reasons, compute_part
+from pendmap.identification.motion import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of

@@ -6,8 +6,6 @@ import contextlib
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
@@ -25,27 +23,29 @@ from pendmap.diagnosis.verdict import decide_verdict
 from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
-from pendmap.model.rig import own_name
+from pendmap.records import experiment_of
 from pendmap.records.summary import unit_wrong
 from pendmap.residuals.by_run import parameters_by_run
 from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from pendmap.diagnosis.functions import TorqueFunction
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
+    from pendmap.records.read import Records
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
-    experiment: Experiment,
+    records: Records | Sequence[Records],
     *,
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
     effects: Collection[Formula | TorqueFunction] = (),
     thresholds: Thresholds | None = None,
+    rate_hz: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects the model lacks.
@@ -56,8 +56,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    experiment : Experiment
-        From :func:`pendmap.read_experiment`.
+    records : path, Experiment, Run, or a sequence of these
+        As for :func:`pendmap.identify`; forced runs too.
     model : Rig, optional
         The baseline; by default viscous damping and Coulomb friction.
     max_effects : int
@@ -69,6 +69,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         first order.
     thresholds : Thresholds, optional
         Thresholds of all decisions.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     progress : callable, optional
         Called with the number of steps done and the number of all steps.
 
@@ -82,7 +84,24 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     InputError
         If no run has samples, no start is found, an effect cannot be a candidate, or no model
         follows the records.
+    OSError
+        If a file cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> drag = pendmap.Effect("quadratic_drag", {"q": 0.03})
+    >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08, effects=(drag,))
+    >>> decay = pendmap.simulate(rig, theta=2.5, velocity=0.0, t_eval=np.arange(0, 15, 0.03))
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
+    >>> every = np.ones(angle.size, bool)
+    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
+    >>> found = pendmap.diagnose(run, max_effects=1)
+    >>> found.verdict, [effect.name for effect in found.effects]
+    ('named', ['quadratic_drag'])
     """
+    experiment = experiment_of(records, rate_hz=rate_hz)
     functions, others = separate_functions(effects)
     own = checked_own(others)
     report = progress or (lambda _done, _total: None)
@@ -163,11 +182,8 @@ def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
 def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes for its file.
 
-    Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` is the covariance
-    of all fitted parameters, widened like the intervals, and has in ``between_runs`` the standard
-    deviation of each parameter that differs between runs by more than its error. ``[provenance]``
-    holds the records with their SHA-256, the version, the command, the verdict and coefficients
-    fixed at 0.
+    ``[covariance]`` is that of :attr:`Discrepancy.model`; ``[provenance]`` holds the records with
+    their SHA-256, the version, the command, the verdict and coefficients fixed at 0.
 
     Parameters
     ----------
@@ -181,30 +197,10 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     Rig
         The best model, with its notes.
     """
-    fit = found.best.fitted.fit
-    model = fit.model
-    covariance = found.best.fitted.widening * fit.covariance
-    named = {effect.name: effect.effect for effect in found.effects}
-    # An effect that is a parameter of the rig is written as an effect.
-    own = {
-        rig: f"{name}.{next(iter(effect.parameters))}"
-        for name, effect in named.items()
-        if (rig := own_name(name)) is not None
-    }
-    kept = tuple(e for e in model.effects if e.name not in named)
     runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
     sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
     notes: dict[str, Any] = {
-        "covariance": {
-            "names": [own.get(name, name) for name in fit.names],
-            "matrix": np.where(np.isfinite(covariance), covariance, 0.0).tolist(),
-            "between_runs": {
-                own.get(name, name): between
-                for name in fit.names
-                if "[" not in name and (between := found.runs.between(name)) > 0
-            },
-        },
         "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
         | {
             "method": "diagnose",
@@ -214,12 +210,4 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     }
     if found.best.fitted.zeroed:
         notes["provenance"]["set_to_zero"] = list(found.best.fitted.zeroed)
-    return dataclasses.replace(
-        model,
-        **dict.fromkeys(own, 0.0),
-        effects=(*kept, *named.values()),
-        Omega=0.0
-        if model.p == 0 and not any(e.drives for e in (*kept, *named.values()))
-        else (model.Omega or 1.0),
-        notes=notes,
-    )
+    return dataclasses.replace(found.model, notes={**found.model.notes, **notes})

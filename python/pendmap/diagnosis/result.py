@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any, Final
+import math
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
+import pandas as pd
 
 from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.next_experiment.limits import Advice, advise
-from pendmap.formatting import Readable
+from pendmap.formatting import Estimate
+from pendmap.identification.results import FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
+from pendmap.model.rig import own_name
 from pendmap.records.summary import doubt_lines, finding_lines
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
@@ -23,7 +30,8 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
-    from pendmap.model import Formula
+    from pendmap.identification.results import Covariance
+    from pendmap.model import Formula, Rig
     from pendmap.model.effects import EffectDefinition
     from pendmap.residuals.by_run import RunByRun
     from pendmap.residuals.torque import Torque
@@ -59,8 +67,10 @@ MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are add
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Discrepancy(Readable):
+class Discrepancy(FitResult):
     """Result of a diagnosis: where a model and records disagree, and why."""
+
+    KIND: ClassVar[str] = "diagnosis"
 
     data: DataSplit  # The records: fitted and held back
     base: ScoredModel  # The baseline
@@ -98,6 +108,98 @@ class Discrepancy(Readable):
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the table and the lines that ``pendmap diagnose`` prints."""
         return [ranking_table(self)], list(as_text(self))
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Parameters of the best model; intervals include what differs between runs."""
+        fit, wider = self.best.fitted.fit, math.sqrt(self.best.fitted.widening)
+        found = {}
+        for name, written in zip(fit.names, self.written_names, strict=True):
+            value, stderr = fit[name], wider * (fit.estimates[name].stderr or math.nan)
+            half = Z95 * math.hypot(stderr, self.runs.between(name))
+            known = math.isfinite(half)
+            ci95 = (value - half, value + half) if known else None
+            found[written] = Estimate(value, stderr if known else None, ci95)
+        for effect in self.effects:
+            for own, value in effect.parameters.items():
+                name = f"{effect.name}.{own}"
+                known_error = found[name].stderr if name in found else None
+                found[name] = Estimate(value, known_error, effect.ci95.get(own))
+        return found
+
+    @property
+    def written_names(self) -> list[str]:
+        """Names of the fitted parameters in the model file, where named effects are effects."""
+        own = {
+            rig: f"{effect.name}.{next(iter(effect.parameters))}"
+            for effect in self.effects
+            if (rig := own_name(effect.name)) is not None
+        }
+        return [own.get(name, name) for name in self.best.fitted.fit.names]
+
+    @property
+    def joint_covariance(self) -> Covariance:
+        """Covariance of the fitted parameters by their names in the model file, widened.
+
+        An effect with a phase is named with a positive size: signs are those of its parameters.
+        """
+        fitted, names = self.best.fitted, self.written_names
+        sizes = {
+            f"{effect.name}.{own}": value
+            for effect in self.effects
+            for own, value in effect.parameters.items()
+            if self.definition(effect.name)[own].role == "size"
+        }
+        pairs = zip(names, fitted.fit.names, strict=True)
+        signs = [-1.0 if sizes.get(name, 0.0) * fitted.fit[own] < 0 else 1.0 for name, own in pairs]
+        return names, fitted.widening * fitted.fit.covariance * np.outer(signs, signs)
+
+    @property
+    def model(self) -> Rig:
+        """The best model, and in its notes the covariance of all fitted parameters, widened.
+
+        Effects have ``ci95``, ``probability`` and ``approximate``. ``[covariance]`` has in
+        ``between_runs`` the standard deviation of each parameter that differs between runs by more
+        than its error.
+        """
+        fit, (names, covariance) = self.best.fitted.fit, self.joint_covariance
+        named = {effect.name: effect.effect for effect in self.effects}
+        # An effect that is a parameter of the rig is written as an effect.
+        own = [rig for name in named if (rig := own_name(name)) is not None]
+        effects = (*(e for e in fit.model.effects if e.name not in named), *named.values())
+        still = fit.model.p == 0 and not any(e.drives for e in effects)
+        between = {
+            written: size
+            for name, written in zip(fit.names, names, strict=True)
+            if "[" not in name and (size := self.runs.between(name)) > 0
+        }
+        matrix = np.where(np.isfinite(covariance), covariance, 0.0).tolist()
+        return dataclasses.replace(
+            fit.model,
+            **dict.fromkeys(own, 0.0),
+            effects=effects,
+            Omega=0.0 if still else (fit.model.Omega or 1.0),
+            notes={"covariance": {"names": list(names), "matrix": matrix, "between_runs": between}},
+        )
+
+    @property
+    def ranking(self) -> pd.DataFrame:
+        """Candidates at the baseline, best first, by name: ``score``, ``size`` and ``shape``.
+
+        ``score`` is the expected fall of the sum of squares in independent readings, ``size`` the
+        expected size, SI.
+        """
+        rows = pd.DataFrame(ranking(self), columns=["name", "score", "size", "shape"])
+        return rows.set_index("name")
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a parameter, of the user's formulas too."""
+        return unit_of(name, self.definition)
+
+    def followed(self) -> Followed:
+        """Return the fit of the best model."""
+        runs = [self.data.runs[k] for k in self.data.fitted_of]
+        return Followed(self.best.fitted.fit, self.best.fitted.runs, runs)
 
     @property
     def verdict(self) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pendmap.formatting import Estimate
-from pendmap.identification.experiment import identified_model, identify_experiment
+from pendmap.identification.experiment import identified_model
+from pendmap.identification.experiment import identify as identify_experiment
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import METHODS, identify
 from pendmap.identification.peaks import Peaks, find_peaks

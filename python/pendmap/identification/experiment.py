@@ -18,29 +18,29 @@ from pendmap.errors import (
 )
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import BEST, check_names, identify, identify_peaks
+from pendmap.identification.methods.registry import BEST, check_names, identify_peaks
+from pendmap.identification.methods.registry import identify as identify_record
 from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
-    OFFSET,
     JointFit,
     fit_together,
     identification_of,
 )
-from pendmap.identification.parameters import SENSOR
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
 from pendmap.identification.table1 import table_of_run
 from pendmap.model import Rig
 from pendmap.model.effects import definition
-from pendmap.records import Experiment
+from pendmap.records import experiment_of
 from pendmap.records.summary import unit_wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from pendmap.model import Effect
-    from pendmap.records import Run
+    from pendmap.records import Experiment, Run
+    from pendmap.records.read import Records
 
 
 MISSES: Final = 1.2  # Residual over noise above which quadratic drag is tried
@@ -58,40 +58,78 @@ def decay_of(experiment: Experiment) -> Run:
     return free[max(lengths, key=lengths.__getitem__)]
 
 
-def identify_experiment(
-    experiment: Experiment,
+def identify(  # noqa: PLR0913 (each is asked for by name)
+    records: Records | Sequence[Records],
     *,
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
     effects: Sequence[Effect | str] = (),
+    rate_hz: float | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> IdentificationReport:
-    """Identify damping from an experiment by several methods.
+    """Identify natural frequency, viscous damping and Coulomb friction by several methods.
 
+    ``th'' + c_over_m th' + w0**2 sin th = -Tr sign(th')`` in SI, with further terms by ``effects``.
     The trajectory method fits all free runs that are not held out jointly, each with its own
     initial state; the other methods use the longest of these runs.
 
     Parameters
     ----------
-    experiment : Experiment
-        Records, from :func:`pendmap.read_experiment`.
+    records : path, Experiment, Run, or a sequence of these
+        Free decays of one rig: files and folders as for :func:`pendmap.read_experiment`, or what
+        it returns.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Starting values and effects of the trajectory method; by default estimated from the record.
     effects : sequence of Effect or str
         Further effects, or their names, whose sizes the trajectory method fits.
+    rate_hz : float, optional
+        Sampling rate, Hz, of files without a column of times.
     progress : callable, optional
         Called with the numbers of steps done and in all: one for each method, the peaks and the
         table.
+
+    Returns
+    -------
+    IdentificationReport
+        Results by method, the fit of the whole records, and table 1.
 
     Raises
     ------
     InputError
         If a method or an effect is unknown, an effect acts on the drive, there is no free decay,
         or the best fit does not follow the records.
+    OSError
+        If a file cannot be read.
+
+    References
+    ----------
+    Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pendmap
+    >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
+    >>> decay = pendmap.simulate(rig, theta=2.0, velocity=0.0, t_eval=np.arange(0, 30, 0.02))
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
+    >>> every = np.ones(angle.size, bool)
+    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
+    >>> report = pendmap.identify(run)
+    >>> report.to_dataframe().loc[["w0", "c_over_m", "Tr"], "value"].round(2).to_dict()
+    {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08}
+    >>> report.predict([0.0, 0.2]).round(2)
+    array([2.  , 1.28])
+    >>> float(report.correlation.loc["c_over_m", "Tr"].round(2))
+    -0.98
+    >>> round(float(report.residual["a"].std()), 4)
+    0.001
+    >>> again = pendmap.identification.IdentificationReport.load(report.save("identify.nc"))
+    >>> again.model == report.model
+    True
     """
-    check_type("experiment", experiment, Experiment, "pendmap.read_experiment('folder')")
+    experiment = experiment_of(records, rate_hz=rate_hz)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     check_callable("progress", progress)
@@ -120,7 +158,7 @@ def identify_experiment(
     report(before - 1, steps)
     peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
     report(before, steps)
-    found |= identify(
+    found |= identify_record(
         run.time,
         run.theta,
         sigma=sigma,
@@ -179,15 +217,14 @@ def _best(
 def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     """Return the model of the best method with the notes of its file.
 
-    ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all jointly fitted
-    parameters, both widened if the residual exceeds the noise; ``[provenance]`` has the method, the
-    records with their SHA-256, the version, the command, and for a fit of the whole record its
+    ``[covariance]`` is that of :attr:`IdentificationReport.model`; ``[provenance]`` has the method,
+    the records with their SHA-256, the version, the command, and for a fit of the whole record its
     residual ``rms`` and the ``noise``, both in rad.
 
     Parameters
     ----------
     report : IdentificationReport
-        Result of :func:`pendmap.identification.identify_experiment`.
+        Result of :func:`pendmap.identify`.
     command : str
         Command line for the provenance.
 
@@ -197,29 +234,16 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         If no method gives a model.
     """
     best = report.best
-    notes: dict[str, Any] = {}
-    if best.covariance is not None:
-        names, matrix = best.covariance
-        # Bias and tilt of a sensor do not belong to the pendulum.
-        own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
-        if "offset" in own:
-            own["offset"] = f"{OFFSET}.d"
-        kept = [names.index(name) for name in own]
-        bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
-        notes["covariance"] = {
-            "names": [*own.values()],
-            "matrix": matrix[np.ix_(kept, kept)].tolist(),
-            "ci95": {own[name]: list(ci95) for name, ci95 in bounds.items() if ci95 is not None},
-        }
     sha256 = report.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise
-    notes["provenance"] = provenance(files, command, rms=rms, noise=noise)
+    notes = {"provenance": provenance(files, command, rms=rms, noise=noise)}
     notes["provenance"]["method"] = best.method
     with named(f"{report.run.name}: the result is no valid model"):
-        return dataclasses.replace(report.model, notes=notes)
+        model = report.model
+        return dataclasses.replace(model, notes={**model.notes, **notes})
 
 
 def provenance(

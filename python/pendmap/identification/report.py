@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import Readable, counted, estimate_text, interval, percent
+from pendmap.formatting import counted, estimate_text, interval, percent
+from pendmap.identification.methods.trajectory import OFFSET
+from pendmap.identification.parameters import SENSOR
+from pendmap.identification.readings import as_fit_run
+from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from pendmap.formatting import Estimate
     from pendmap.identification.methods.base import Identification
     from pendmap.identification.methods.trajectory import JointFit
     from pendmap.identification.peaks import Peaks
+    from pendmap.identification.results import Covariance
     from pendmap.identification.table1 import Table1
     from pendmap.model import Rig
     from pendmap.records import Experiment, Run
@@ -36,7 +44,7 @@ COLUMNS: Final = {
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class IdentificationReport(Readable):
+class IdentificationReport(FitResult):
     """Results of several methods for an experiment.
 
     Parameters
@@ -58,6 +66,8 @@ class IdentificationReport(Readable):
         given.
     """
 
+    KIND: ClassVar[str] = "identification"
+
     experiment: Experiment
     run: Run
     peaks: Peaks
@@ -75,6 +85,24 @@ class IdentificationReport(Readable):
         """Return the tables and lines that ``pendmap identify`` prints."""
         tables = [methods_table(self), table1_table(self)]
         return tables, list(as_text(self))
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Parameters of the best method."""
+        return self.best.parameters
+
+    @property
+    def joint_covariance(self) -> Covariance | None:
+        """Covariance of the best method."""
+        return self.best.covariance
+
+    def followed(self) -> Followed:
+        """Return the fit of the trajectory method."""
+        if self.joint is None:
+            raise InputError(f"{self.run.name}: the trajectory method must have fitted it")
+        pairs = zip(self.joint.runs, self.joint.readings, strict=True)
+        fitted = [as_fit_run(run, reading) for run, reading in pairs]
+        return Followed(self.joint.fit, fitted, self.joint.runs)
 
     @property
     def sound(self) -> Identification | None:
@@ -111,11 +139,27 @@ class IdentificationReport(Readable):
 
     @property
     def model(self) -> Rig:
-        """Model of the best method, with its effects."""
-        best = self.best
-        if best.model is not None:
-            return best.model
-        return dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+        """Model of the best method, with its effects, and in its notes their covariance.
+
+        ``[covariance]`` has ``names``, ``matrix`` and the 95 % intervals ``ci95`` of all jointly
+        fitted parameters, both widened if the residual exceeds the noise.
+        """
+        best, notes = self.best, dict[str, Any]()
+        if best.covariance is not None:
+            names, matrix = best.covariance
+            # Bias and tilt of a sensor do not belong to the pendulum.
+            own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+            if "offset" in own:
+                own["offset"] = f"{OFFSET}.d"
+            kept = [names.index(name) for name in own]
+            bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
+            notes["covariance"] = {
+                "names": [*own.values()],
+                "matrix": matrix[np.ix_(kept, kept)].tolist(),
+                "ci95": {own[n]: list(ci95) for n, ci95 in bounds.items() if ci95 is not None},
+            }
+        found = best.model or dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+        return dataclasses.replace(found, notes=notes)
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:

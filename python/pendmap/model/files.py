@@ -101,7 +101,7 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
-def parse_model(text: str, where: str) -> Pendulum | Rig:
-    """Return the model of :func:`model_text`; ``where`` names it in errors."""
+def parse_model(text: str, where: str, typed: Mapping[str, float] | None = None) -> Pendulum | Rig:
+    """Return the model of :func:`model_text`, with ``typed`` values; ``where`` is for errors."""
     bare: Callable[..., Pendulum | Rig] = Pendulum
-    return parsed_model(tomllib.loads(text), where, bare=bare, si=Rig.of)
+    return parsed_model(tomllib.loads(text), where, typed, bare=bare, si=Rig.of)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
 from pendmap.files import toml_text
 from pendmap.model.covariance import misses
+from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import Effect
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in, read_model
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Pendulum:
+class Pendulum(Dynamics):
     """The parametrically excited pendulum, without dimensions.
 
     ``th'' + gamma th' + (1 + p cos(omega tau + phase)) sin th = torque - theta_r sign(th')`` with

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_keys, check_number, check_type
 from pendmap.model import quantities
+from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
 from pendmap.model.quantities import COUNTERPARTS
@@ -31,7 +32,7 @@ def own_name(effect: str) -> str | None:
 
 
 @dataclasses.dataclass(frozen=True)
-class Rig:
+class Rig(Dynamics):
     """The parametrically excited pendulum in SI.
 
     ``th'' + c_over_m th' + w0**2 (1 + p cos(Omega t + phi)) sin th = torque - Tr sign(th')``

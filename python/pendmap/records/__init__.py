@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pendmap.records.experiment import Experiment, Finding, Run, Segment
 from pendmap.records.noise import NoiseFloor, noise_floor
-from pendmap.records.read import files_of, read_experiment
+from pendmap.records.read import experiment_of, files_of, read_experiment
 
 __all__ = [
     "Experiment",
@@ -12,6 +12,7 @@ __all__ = [
     "NoiseFloor",
     "Run",
     "Segment",
+    "experiment_of",
     "files_of",
     "noise_floor",
     "read_experiment",

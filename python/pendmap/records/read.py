@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pendmap.errors import InputError, check_number
-from pendmap.formatting import counted
+from pendmap.errors import InputError, check_number, short_repr
+from pendmap.formatting import counted, listed
 from pendmap.records import (
     angle,
     clock,
@@ -28,15 +30,18 @@ from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.tables import read_table
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Sequence
-
     from pendmap.records.tables import Table
     from pendmap.records.work import Work
+
+    Records = Experiment | Run | str | os.PathLike[str]
 
 
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
+_FORMS: Final = (
+    "paths, an Experiment like pendmap.read_experiment('folder'), Runs or a list of them"
+)
+_SHOWN: Final = 3  # Names of records in the name of several together
 LEAST_RATE: Final = 1e-3  # Least sampling rate, Hz
 MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
 
@@ -107,6 +112,55 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     digests = {run.file: run.sha256 for run in runs}
     checked, together = checked_together(runs)
     return Experiment(place, checked, planned.known, (*findings, *together), digests)
+
+
+def experiment_of(
+    records: Records | Sequence[Records], *, rate_hz: float | None = None
+) -> Experiment:
+    """Return records in any of their forms as one experiment.
+
+    Records are paths as :func:`read_experiment` takes them, experiments, runs, or a sequence of
+    these, which are runs of one rig: copies among them are used once, runs of one name are
+    numbered, and what is known of the rig must agree. ``rate_hz`` is that of the files.
+    """
+    one = isinstance(records, Experiment | Run | str | os.PathLike)
+    every = [records] if one else list(records) if isinstance(records, Sequence) else []
+    parts = [_experiment(part, rate_hz) for part in every]
+    if not parts:
+        raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
+    if len(parts) == 1:
+        return parts[0]
+    known = dict(parts[0].known)
+    for part in parts[1:]:
+        for name, value in part.known.items():
+            if known.setdefault(name, value) != value:
+                raise InputError(
+                    f"{name} must be one for all records, got {known[name]} and {value}"
+                )
+    runs, before = list[Run](), Counter[str]()
+    for run in (run for part in parts for run in part.runs):
+        before[run.name] += 1
+        name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
+        runs.append(run if name == run.name else dataclasses.replace(run, name=name))
+    checked, together = checked_together(runs)
+    findings = dict.fromkeys([*(found for part in parts for found in part.findings), *together])
+    digests = {file: digest for part in parts for file, digest in part.sha256.items()}
+    place = Path(listed([part.path.name for part in parts], _SHOWN))
+    return Experiment(place, checked, known, tuple(findings), digests)
+
+
+def _experiment(records: object, rate_hz: float | None) -> Experiment:
+    """Return one form of records as an experiment."""
+    if isinstance(records, str | os.PathLike):
+        return read_experiment(records, rate_hz=rate_hz)
+    if rate_hz is not None:
+        raise InputError("rate_hz must be left out where no file is read")
+    if isinstance(records, Run):
+        digests = {records.file: records.sha256} if records.sha256 else {}
+        return Experiment(Path(records.file or records.name), (records,), sha256=digests)
+    if not isinstance(records, Experiment):
+        raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
+    return records
 
 
 def _planned(place: Path) -> Description:

@@ -1,18 +1,23 @@
 """Recordings for the Rerun viewer; the only package that imports rerun.
 
 ``record`` writes the recording of a dataset, ``record_identification`` that of an identification,
-``record_discrepancy`` that of a diagnosis; ``open_viewer`` shows a recording; ``Live`` sends a
-trajectory to a running viewer during its computation.
+``record_discrepancy`` that of a diagnosis, ``view`` that of any of them; ``open_viewer`` shows a
+recording; ``Live`` sends a trajectory to a running viewer during its computation.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+import os
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import xarray as xr
+
 from pendmap.charts import registry
-from pendmap.errors import ViewerError
+from pendmap.errors import InputError, ViewerError, short_repr
 from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
 from pendmap.viewer.frame import SUFFIXES
 from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
@@ -25,11 +30,8 @@ from pendmap.viewer.window import (
 )
 
 if TYPE_CHECKING:
-    import os
-    from pathlib import Path
-
-    import xarray as xr
-
+    from pendmap.diagnosis import Discrepancy
+    from pendmap.identification import IdentificationReport
     from pendmap.viewer.discrepancy import record_discrepancy
     from pendmap.viewer.identification import record_identification
 
@@ -48,6 +50,7 @@ __all__ = [
     "record",
     "record_discrepancy",
     "record_identification",
+    "view",
 ]
 
 _KINDS = {
@@ -60,6 +63,12 @@ _OF_RECORDS = {
     "record_discrepancy": "pendmap.viewer.discrepancy",
     "record_identification": "pendmap.viewer.identification",
 }
+
+_RECORDS = {
+    "Discrepancy": "record_discrepancy",
+    "IdentificationReport": "record_identification",
+}
+"""Functions of results of records, by their type: importing the types takes half a second."""
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
@@ -131,3 +140,62 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         content=frame.identifier(dataset),
         known=frame.properties(dataset),
     )
+
+
+def view(
+    result: xr.Dataset | IdentificationReport | Discrepancy | str | os.PathLike[str],
+    path: str | os.PathLike[str] | None = None,
+) -> Path:
+    """Write the Rerun recording of a result, or open it in the viewer.
+
+    Parameters
+    ----------
+    result : xarray.Dataset, IdentificationReport, Discrepancy or path
+        A result of any analysis, of :func:`pendmap.identify` or :func:`pendmap.diagnose`; or a
+        recording (.rrd), which is opened.
+    path : str or path, optional
+        The recording to write, ``.rrd``; an existing one is replaced. Without it the viewer shows
+        the result, from a file in a temporary folder.
+
+    Returns
+    -------
+    Path
+        The recording.
+
+    Raises
+    ------
+    InputError
+        If there is no recording of such a result, or for another suffix.
+    NoDisplayError, ViewerError
+        If the viewer cannot be opened; the message names the recording, which is complete.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> result = pendmap.basins(pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0), 20)
+    >>> pendmap.view(result, "basins.rrd").name
+    'basins.rrd'
+    """
+    if isinstance(result, str | os.PathLike):
+        if path is not None:
+            raise InputError(f"path must be left out where a recording is opened, got {path!r}")
+        open_viewer(result)
+        return Path(result)
+    kind = type(result).__name__
+    if isinstance(result, xr.Dataset):
+        write: Any = record
+    elif kind in _RECORDS:
+        write = __getattr__(_RECORDS[kind])
+    else:
+        raise InputError(
+            "result must be a dataset, an identification, a diagnosis or the path of a recording, "
+            f"got {short_repr(result)}"
+        )
+    if path is not None:
+        return Path(write(result, path))
+    target = Path(tempfile.mkdtemp(prefix="pendmap-")) / "result.rrd"
+    write(result, target)
+    open_viewer(target)
+    return target

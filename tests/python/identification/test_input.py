@@ -21,14 +21,11 @@ TIME = np.arange(50) / 10
 @pytest.mark.parametrize(
     ("call", "given", "complaint"),
     [
-        (
-            identify_experiment,
-            ("folder",),
-            "experiment must be an Experiment, like .*, got 'folder'",
-        ),
+        (identify_experiment, (3,), "records must be paths, an Experiment like .*, got 3"),
+        (identify_experiment, ([],), r"records must be paths, .*, got \[\]"),
         (compare, ("model.toml", THERE), "model must be a Rig, like .*, got 'model.toml'"),
         (compare, (Pendulum(), THERE), "model must be a Rig"),
-        (compare, (Rig(w0=6.2), "folder"), "experiment must be .*, got 'folder'"),
+        (compare, (Rig(w0=6.2), [THERE, 3]), "records must be .*, got 3"),
         (identify, ([], []), "time must have samples"),
         (identify, (TIME[::-1], np.cos(TIME)), "time must increase"),
     ],

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.comparison.data import held_parts
-from pendmap.comparison.replay import Motion, run_forward
 from pendmap.diagnosis.next_experiment.proposals import list_proposals
 from pendmap.diagnosis.scores import candidate_slopes
 from pendmap.errors import FitDiverged
 from pendmap.formatting import counted
+from pendmap.identification.motion import Motion, run_forward
 from pendmap.identification.parameters import PER_RUN
 from pendmap.identification.runs import FORCED_WINDOW_SWINGS, FitRun
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
 from pendmap.formatting import Estimate, counted, estimate_text
+from pendmap.identification.results import Parameters
 from pendmap.model import Rig
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.formatting import Table
+    from pendmap.identification.results import Covariance
     from pendmap.signal import Floats
 
 
@@ -23,7 +26,7 @@ MISFIT: Final = 2.0  # chi^2 per degree of freedom above which a method of peaks
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Identification:
+class Identification(Parameters):
     """Damping identified by one method from a record.
 
     Parameters
@@ -50,6 +53,8 @@ class Identification:
         Whether the search converged; if not, no model is returned.
     """
 
+    KIND: ClassVar[str] = "identification_by_method"
+
     method: str = ""
     estimates: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
     used: str = ""
@@ -62,6 +67,20 @@ class Identification:
 
     def __repr__(self) -> str:
         return f"<Identification {self.short}>"
+
+    def text_parts(self) -> tuple[list[Table], list[str]]:
+        """Return the table of the parameters, the data used and the warnings."""
+        return [self.parameter_table()], [line for line in (self.used, *self.warnings) if line]
+
+    @property
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Estimates, and those derived from them."""
+        return {**self.estimates, **self.derived}
+
+    @property
+    def joint_covariance(self) -> Covariance | None:
+        """Names and covariance matrix of the estimates."""
+        return self.covariance
 
     @property
     def short(self) -> str:

@@ -1,0 +1,258 @@
+"""What results of records have in common: parameters, residual, motion of the model, files."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import importlib.metadata
+import json
+import os
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from pendmap.errors import InputError, short_repr
+from pendmap.files.dataset import FORMAT_VERSION, load, made_by, save
+from pendmap.files.tree import Packed, unpacked
+from pendmap.formatting import Readable, estimate_text, html_table, interval, moment
+from pendmap.identification.motion import Motion, run_forward
+from pendmap.model.labels import unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike
+
+    from pendmap.formatting import Estimate
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.records import Run
+    from pendmap.signal import Floats
+
+    Covariance = tuple[Sequence[str], Floats]
+
+EXACT: Final = 1e-9  # Nominal noise that sets the integrator's tolerance of a prediction, rad
+STEP: Final = 1e-3  # Time between samples that are added, since a run has three or more, s
+
+
+class Followed(NamedTuple):
+    """A fit of whole records."""
+
+    fit: TrajectoryFit
+    fitted: Sequence[FitRun]  # in the order of the fit
+    runs: Sequence[Run]  # the records of each
+
+
+class Parameters(Readable):
+    """A result with parameters, which a file can hold."""
+
+    KIND: ClassVar[str]
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> Mapping[str, Estimate]:
+        """Estimates by name, in SI."""
+
+    @property
+    @abc.abstractmethod
+    def joint_covariance(self) -> Covariance | None:
+        """Names and covariance matrix of jointly fitted parameters, SI; None if it is unknown."""
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a parameter; empty for a pure number."""
+        return unit_of(name)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row a parameter.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``parameter``; ``value``, ``stderr`` (standard error), ``low`` and ``high`` (the
+            95 % interval), nan where unknown, and ``unit`` (SI; empty for a pure number).
+
+        Raises
+        ------
+        InputError
+            If no method gives parameters.
+        """
+        rows = [
+            (name, e.value, e.stderr, *(e.ci95 or (None, None)), self.unit(name))
+            for name, e in self.parameters.items()
+        ]
+        columns = ["parameter", "value", "stderr", "low", "high", "unit"]
+        types = dict.fromkeys(columns[1:-1], np.float64)
+        return pd.DataFrame(rows, columns=columns).astype(types).set_index("parameter")
+
+    @property
+    def correlation(self) -> pd.DataFrame:
+        """Correlations of the jointly fitted parameters, by name; nan of undetermined ones.
+
+        InputError is raised if the method gives no covariance.
+        """
+        if self.joint_covariance is None:
+            raise InputError("correlation must be of a method with a covariance, this has none")
+        names, matrix = self.joint_covariance
+        sizes = np.sqrt(np.where(np.isfinite(np.diag(matrix)), np.diag(matrix), np.nan))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values = np.where(np.isfinite(matrix), matrix, np.nan) / np.outer(sizes, sizes)
+        return pd.DataFrame(values, index=list(names), columns=list(names))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the whole result, which :meth:`load` reads back with the same numbers.
+
+        The file has the table of :meth:`to_dataframe` over ``parameter`` for other tools, and in
+        ``content`` (JSON) and ``array_0``, ... all the rest for this version of pendmap.
+        :func:`pendmap.save_model` writes the model alone, as TOML.
+
+        Parameters
+        ----------
+        path : str or path
+            A .nc (NetCDF 4) or .zarr file; it is complete or absent.
+
+        Raises
+        ------
+        InputError
+            For another suffix, or a result with a Python function.
+        OSError
+            If the file cannot be written.
+        """
+        packed = Packed(self)
+        data: dict[str, Any] = {"content": ((), json.dumps(packed.tree))}
+        for name, column in self.to_dataframe().reset_index().items():
+            values = column.to_numpy()
+            data[str(name)] = (
+                "parameter",
+                values.astype(str) if values.dtype == object else values,
+            )
+        for name, values in packed.arrays.items():
+            data[name] = ([f"{name}_{k}" for k in range(values.ndim)], values)
+        attributes = {
+            "kind": self.KIND,
+            "format_version": FORMAT_VERSION,
+            "title": repr(self),
+            "pendmap_version": importlib.metadata.version("pendmap"),
+        }
+        with made_by(f"{type(self).__name__}.save"):
+            return save(xr.Dataset(data, attrs=attributes), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a result that :meth:`save` wrote.
+
+        Raises
+        ------
+        InputError
+            If it is no such result, or of another version of pendmap.
+        OSError
+            If it cannot be read.
+        """
+        where, dataset = os.fspath(path), load(path)
+        kind = dataset.attrs["kind"]
+        if kind != cls.KIND:
+            raise InputError(f"{where}: kind must be {cls.KIND}, got {kind}")
+        try:
+            arrays = {str(name): each.to_numpy() for name, each in dataset.variables.items()}
+            found = unpacked(json.loads(dataset["content"].item()), arrays)
+        except Exception as error:  # a damaged file may raise any error
+            raise InputError(f"{where}: cannot be read as {cls.__name__}: {error}") from error
+        if not isinstance(found, cls):
+            raise InputError(f"{where}: must hold {cls.__name__}, got {short_repr(found)}")
+        return found
+
+    def parameter_table(self) -> tuple[list[str], list[list[str]]]:
+        """Return header and rows of the parameters with errors, intervals and units."""
+        rows = [
+            [name, estimate_text(e), interval(e), self.unit(name)]
+            for name, e in self.parameters.items()
+        ]
+        return ["parameter", "value", "95 % interval", "unit"], rows
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() + html_table(*self.parameter_table())
+
+
+class FitResult(Parameters):
+    """A result with a fit of whole records: residual and motion of the model too."""
+
+    @abc.abstractmethod
+    def followed(self) -> Followed:
+        """Return the fit of the whole records; InputError is raised if there is none."""
+
+    @property
+    def residual(self) -> dict[str, xr.DataArray]:
+        """Reading less fitted model of each fitted run, rad, over ``time``, s on the run's clock.
+
+        Samples that are not fitted are nan. A diagnosis fits block means of dense readings.
+        InputError is raised without a fit of whole records.
+        """
+        fit, fitted, runs = self.followed()
+        found = {}
+        for given, run, values in zip(fitted, runs, fit.residuals, strict=True):
+            time = given.time + _begin(given, run)
+            found[run.name] = xr.DataArray(
+                np.where(given.counted, values, np.nan),
+                {"time": ("time", time, {"units": "s", "long_name": "time of the record"})},
+                name="residual",
+                attrs={"units": "rad", "long_name": "reading less fitted model"},
+            )
+        return found
+
+    def predict(self, t: ArrayLike, run: str | None = None) -> Floats:
+        """Return the angle of the fitted model in a run: its motion, without the sensor's errors.
+
+        Between the samples of a window, and after the last one, the model moves from the fitted
+        state at the window's first sample. A forced run has windows of up to three swings.
+
+        Parameters
+        ----------
+        t : array_like
+            Times on the run's clock, s, from its first fitted sample on.
+        run : str, optional
+            Name of a fitted run; by default the first.
+
+        Returns
+        -------
+        ndarray
+            Angle, rad, not wrapped, of the shape of ``t``.
+
+        Raises
+        ------
+        InputError
+            If there is no fit of whole records or no such run, or a time is before it.
+        FitDiverged
+            If the model diverges after the record.
+        """
+        fit, fitted, runs = self.followed()
+        names = [each.name for each in runs]
+        if run is not None and run not in names:
+            raise InputError(f"run must be one of {', '.join(names)}, got {short_repr(run)}")
+        place = 0 if run is None else names.index(run)
+        given, begin = fitted[place], _begin(fitted[place], runs[place])
+        try:
+            times = np.asarray(t, dtype=np.float64) - begin
+        except (TypeError, ValueError, OverflowError):
+            times = np.array(np.nan)
+        windows = [(given.time[a], (x, v)) for k, a, _, x, v in fit.windows if k == place]
+        firsts = np.array([first for first, _ in windows])
+        if not np.isfinite(times).all() or (times.size and times.min() < firsts[0]):
+            least = moment(begin + float(firsts[0]))
+            raise InputError(f"t must be finite times from {least} s on, got {short_repr(t)}")
+        found, owner = np.empty(times.shape), np.searchsorted(firsts, times, side="right") - 1
+        given = dataclasses.replace(given, sigma=EXACT, trusted=None, rod_sensor=None, count=None)
+        given = dataclasses.replace(given, drive=fit.drive_of(given, place))
+        for k in np.unique(owner):
+            (first, state), own = windows[k], owner == k
+            grid = np.union1d(times[own], first + STEP * np.arange(3))
+            ahead = dataclasses.replace(given, time=grid, theta=np.zeros(grid.size))
+            ((_, (theta, _)),) = run_forward(Motion.of(fit), [ahead], [state])
+            found[own] = theta[np.searchsorted(grid, times[own])]
+        return found
+
+
+def _begin(given: FitRun, run: Run) -> float:
+    """Return the time on the clock of a run at time 0 of its fit, s."""
+    return 0.0 if given.drive is not None else float(run.time[0])

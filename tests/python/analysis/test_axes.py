@@ -1,0 +1,109 @@
+"""Axes of arrays, and the model that made a result."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import pendmap
+from pendmap import Axis, Effect, Formula, Grid, InputError, Pendulum, Rig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import xarray as xr
+
+DRAG = Effect("quadratic_drag", {"q": 0.02}, ci95={"q": (0.01, 0.03)}, probability=0.9)
+OWN = Formula("own_pull", "-k*sin(2*theta)", {"k": 2})
+BARE = Pendulum(gamma=0.1, p=0.6, omega=2.0, effects=(DRAG, OWN(k=0.01)))
+SI = Rig(w0=6.2, c_over_m=0.7, p=0.6, Omega=12.1, effects=(DRAG,))
+
+
+def test_an_array_has_the_centres_of_cells() -> None:
+    grid = Grid(theta=np.linspace(-1, 1, 5), velocity=[0.5, 1.5, 2.5, 3.5])
+    assert grid.theta == Axis(-1.25, 1.25, 5)
+    assert grid.velocity.centres == pytest.approx([0.5, 1.5, 2.5, 3.5], abs=1e-15)
+    result = pendmap.basins(Pendulum(p=0.6), grid)
+    assert result.theta.values == pytest.approx(np.linspace(-1, 1, 5), abs=1e-15)
+    for values in (np.geomspace(0.1, 1, 5), [1.0, 2.0, 4.0, 8.0], [1.0], np.array([])):
+        with pytest.raises(InputError, match="velocity must be") as error:
+            Grid(velocity=values)  # type: ignore[arg-type]
+        assert "\n" not in str(error.value)
+
+
+def test_a_whole_number_is_the_default_window() -> None:
+    for model in (BARE, SI):
+        w0 = model.units.w0
+        result = pendmap.basins(model, 8, check=False)
+        assert result.label.equals(pendmap.basins(model, Grid.square(8, w0), check=False).label)
+        assert float(result.velocity_bounds.max()) == pytest.approx(3 * w0)
+        assert "(the default window)" in result.attrs["summary"]
+        swept = pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=8, check=False)
+        assert float(swept.velocity[-1]) == pytest.approx(3 * w0 * 7 / 8)
+
+
+def test_uneven_values_of_parameters_are_mapped_where_they_are(tmp_path: Path) -> None:
+    values = [0.2, 0.5, 0.9, 1.6]
+    one = {"p": np.array(values), "omega": (1.8, 2.2, 2)}
+    found = pendmap.parameter_map(Pendulum(), one, starts=4)
+    assert found.p.values.tolist() == values
+    even = pendmap.parameter_map(Pendulum(), {"p": np.linspace(0.2, 1.6, 3), "omega": [2.0]})
+    same = pendmap.parameter_map(Pendulum(), {"p": (0.2, 1.6, 3), "omega": (2.0, 2.0, 1)})
+    assert even.drop_attrs().equals(same.drop_attrs())
+    diagram = pendmap.bifurcation(Pendulum(), {"p": np.geomspace(0.1, 0.8, 4)}, starts=4)
+    assert diagram.p.values == pytest.approx(np.geomspace(0.1, 0.8, 4))
+    place = tmp_path / "map.zarr"
+    stored = pendmap.parameter_map(Pendulum(), one, starts=4, store=place)
+    assert stored.regime.equals(found.regime)
+    with pytest.raises(InputError, match="p must be ascending values"):
+        pendmap.bifurcation(Pendulum(), {"p": [0.4, 0.2]})
+
+
+RESULTS: dict[str, Callable[[Any], xr.Dataset]] = {
+    "simulate": lambda model: pendmap.simulate(model, [1.0, 0.5], 0.0, 5.0),
+    "basins": lambda model: pendmap.basins(model, 6, check=False),
+    "basins_of": lambda model: pendmap.basins_of(model, [1.0], [0.0], check=False),
+    "sweep": lambda model: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=6, check=False),
+    "parameter_map": lambda model: pendmap.parameter_map(
+        model, {"p": [0.5, 0.6], "gamma": [0.1]}, starts=2
+    ),
+    "bifurcation": lambda model: pendmap.bifurcation(model, {"p": [0.5, 0.6]}, starts=2),
+    "orbit": lambda model: pendmap.orbit(model, grid=Grid.square(12, model.units.w0)),
+    "lyapunov": lambda model: pendmap.lyapunov(model, max_periods=200),
+    "lifetime": lambda model: pendmap.lifetime(model, starts=100, max_periods=200),
+    "tongues": lambda model: pendmap.tongues(model, [1.9, 2.0]),
+    "melnikov": lambda model: pendmap.melnikov(model, [2.0]),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+@pytest.mark.parametrize("model", [BARE, SI], ids=["bare", "si"])
+def test_every_result_has_the_model_that_made_it(
+    name: str, model: Pendulum | Rig, tmp_path: Path
+) -> None:
+    result = RESULTS[name](model)
+    assert pendmap.pendulum_of(result) == model
+    assert pendmap.pendulum_of(pendmap.load(pendmap.save(result, tmp_path / "a.nc"))) == model
+
+
+def test_results_are_of_every_function() -> None:
+    functions = {name for _, names, _ in pendmap.ANALYSES.values() for name in names}
+    assert functions == {*RESULTS}
+
+
+def test_a_selected_value_is_in_the_model() -> None:
+    swept = functools.partial(pendmap.sweep, grid=5, check=False)
+    both = swept(BARE, {"p": [0.5, 0.7], "quadratic_drag.q": [0.01, 0.03]})
+    one = pendmap.pendulum_of(both.isel({"p": 1, "quadratic_drag.q": 0}))
+    assert (one.p, one.effects[0].parameters["q"]) == (0.7, 0.01)
+    assert one.effects[1] == BARE.effects[1]
+    slow = pendmap.pendulum_of(swept(SI, {"frequency_hz": [1.5, 2.0]}).isel(frequency_hz=0))
+    assert slow.Omega == pytest.approx(3 * np.pi)
+    braked = pendmap.pendulum_of(swept(SI, {"torque": [0.01, 0.02]}).isel(torque=1))
+    assert braked.pendulum.torque == pytest.approx(0.02)
+    with pytest.raises(InputError, match="dataset must be a result of pendmap"):
+        pendmap.pendulum_of(3)  # type: ignore[arg-type]

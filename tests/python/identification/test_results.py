@@ -1,0 +1,187 @@
+"""Tables, residuals, predictions and files of identifications, and records in all their forms."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from decays import decay, record
+from pendmap import InputError, Rig, Run
+from pendmap.identification import Identification, IdentificationReport
+from pendmap.identification.report import as_json
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run as Command
+
+TRUE = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
+BEGIN = 3.0  # Time of the first sample of a run, s
+
+
+def made(name: str = "a", release: float = 2.0, seed: int = 1) -> Run:
+    """Return a record of an independent integration with noise."""
+    time, theta = record(decay(release=release, until=40.0), seconds=30, seed=seed)
+    return Run(name, f"{name}.csv", "free", time + BEGIN, theta, np.ones(time.size, bool))
+
+
+@pytest.fixture(scope="module")
+def report() -> IdentificationReport:
+    return pendmap.identify([made("a"), made("b", 1.0, 2)])
+
+
+def test_a_row_has_value_error_interval_and_unit(report: IdentificationReport) -> None:
+    table = report.to_dataframe()
+    assert list(table.columns) == ["value", "stderr", "low", "high", "unit"]
+    assert table.index.name == "parameter"
+    for name, true in TRUE.items():
+        row = table.loc[name]
+        assert abs(row.value - true) < 4 * row.stderr
+        assert row.low < row.value < row.high
+        assert row.value == report.best[name]
+    assert table.unit.to_dict()["Tr"] == "rad/s²"
+    peaks = report.methods["log_decrement"].to_dataframe()
+    assert set(peaks.index) <= {"w0", "c_over_m", "zeta", "Tr", "theta_r", "offset"}
+
+
+def test_correlations_are_those_of_the_covariance(report: IdentificationReport) -> None:
+    assert report.best.covariance is not None
+    names, matrix = report.best.covariance
+    table = report.correlation
+    assert list(table.index) == list(table.columns) == list(names)
+    assert np.diag(table) == pytest.approx(1.0)
+    errors = report.to_dataframe().stderr[list(names)].to_numpy()
+    assert table.to_numpy() * np.outer(errors, errors) == pytest.approx(matrix, rel=1e-9)
+    bare = Identification("peaks", report.best.estimates)
+    with pytest.raises(InputError, match="correlation must be of a method with a covariance"):
+        _ = bare.correlation
+
+
+def test_the_residual_is_the_reading_less_the_model_and_its_zero(
+    report: IdentificationReport,
+) -> None:
+    assert list(report.residual) == ["a", "b"]
+    for run in report.runs:
+        residual = report.residual[run.name]
+        assert residual.attrs["units"] == "rad"
+        assert np.array_equal(residual.time, run.time)
+        model = report.predict(run.time, run.name) + report.best["offset"]
+        assert residual.values == pytest.approx(run.theta - model, abs=1e-7)
+
+
+def test_a_prediction_is_the_motion_of_the_fitted_model(report: IdentificationReport) -> None:
+    """From the fitted state by scipy, up to the first turn, where friction changes its sense."""
+    assert report.joint is not None
+    (*_, theta, velocity), rig = report.joint.fit.windows[0], report.model
+
+    def rhs(_: float, y: list[float]) -> list[float]:
+        friction = rig.c_over_m * y[1] + rig.Tr * np.sign(y[1] or -1.0)
+        return [y[1], -(rig.w0**2) * np.sin(y[0]) - friction]
+
+    times = np.linspace(0.05, 0.5, 7)
+    span, fine = (0.0, 0.5), {"rtol": 1e-11, "atol": 1e-11}
+    exact = solve_ivp(rhs, span, [theta, velocity], t_eval=times, method="DOP853", **fine)
+    assert report.predict(times + BEGIN) == pytest.approx(exact.y[0], abs=1e-7)
+    assert report.predict(BEGIN + 0.5).shape == ()
+    order = report.predict([BEGIN + 2, BEGIN, BEGIN + 40])
+    assert order[1] == pytest.approx(theta, abs=1e-12)
+    assert order[0] == pytest.approx(float(report.predict(BEGIN + 2)), abs=1e-9)
+    with pytest.raises(InputError, match="run must be one of a, b, got 'c'"):
+        report.predict(4.0, "c")
+    with pytest.raises(InputError, match=r"t must be finite times from 3 s on, got 2\.0"):
+        report.predict(2.0)
+
+
+def test_what_is_loaded_has_the_same_numbers(report: IdentificationReport, tmp_path: Path) -> None:
+    path = report.save(tmp_path / "identify.nc")
+    again = IdentificationReport.load(path)
+    assert json.dumps(as_json(again)) == json.dumps(as_json(report))
+    assert str(again) == str(report)
+    assert again._repr_html_() == report._repr_html_()
+    assert again.to_dataframe().equals(report.to_dataframe())
+    assert again.correlation.equals(report.correlation)
+    assert np.array_equal(again.predict(report.run.time), report.predict(report.run.time))
+    assert again.run is again.runs[0]
+    assert again.model == report.model
+    one = report.best.save(tmp_path / "one.nc")
+    assert Identification.load(one).to_dataframe().equals(report.to_dataframe())
+    with pytest.raises(InputError, match="kind must be identification, got identification_by"):
+        IdentificationReport.load(one)
+    with pytest.raises(InputError, match=r"suffix|must be"):
+        report.save(tmp_path / "identify.csv")
+
+
+def test_a_damaged_file_is_refused_on_one_line(
+    report: IdentificationReport, tmp_path: Path
+) -> None:
+    dataset = pendmap.load(report.save(tmp_path / "identify.nc"))
+    tree = dataset["content"].item()
+    for old, new, complaint in (
+        ("pendmap.records.experiment:Run", "os:system", "'os:system' is no class of pendmap"),
+        ("pendmap.records.experiment:Run", "pendmap.files.atomic:os", "cannot be read as"),
+        ('"lab_time_s"', '"lab"', "Run lacks lab_time_s: another version of pendmap wrote it"),
+        ("{", "", "cannot be read as IdentificationReport"),
+    ):
+        bad = dataset.assign(content=((), tree.replace(old, new)))
+        with pytest.raises(InputError, match=complaint) as error:
+            IdentificationReport.load(pendmap.save(bad, tmp_path / "bad.nc"))
+        assert "\n" not in str(error.value)
+
+
+def test_the_models_file_keeps_the_covariance(report: IdentificationReport, tmp_path: Path) -> None:
+    saved = pendmap.load_model(pendmap.save_model(report.model, tmp_path / "rig.toml"))
+    assert saved == report.model
+    table = saved.notes["covariance"]
+    assert table["names"] == ["w0", "c_over_m", "Tr", "encoder_offset.d"]
+    assert report.best.covariance is not None
+    assert np.array_equal(table["matrix"], report.best.covariance[1])
+
+
+def test_records_are_taken_in_all_their_forms(tmp_path: Path, report: IdentificationReport) -> None:
+    names = "trajectory", "combined"
+    files = []
+    for run in report.runs:
+        files.append(tmp_path / run.file)
+        rows = np.column_stack((run.time, run.theta))
+        np.savetxt(files[-1], rows, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.17g")
+    read = [pendmap.read_experiment(file) for file in files]
+    forms = [files, [str(file) for file in files], read, [read[0], read[1].runs[0]], tmp_path]
+    found = [pendmap.identify(form, methods=names).to_dataframe() for form in forms]
+    assert all(table.equals(found[0]) for table in found[1:])
+    one = [pendmap.identify(form, methods=names) for form in (read[0], read[0].runs[0], files[0])]
+    assert {each.best["w0"] for each in one} == {one[0].best["w0"]}
+    twice = pendmap.identify([files[0], files[0]], methods=names)
+    assert twice.best["w0"] == one[0].best["w0"]
+    assert [run.name for run in twice.experiment.runs] == ["a", "a (2)"]
+    other = dataclasses.replace(read[1], known={"gravity": 9.8})
+    with pytest.raises(InputError, match=r"gravity must be one for all records, got 9.7 and 9.8"):
+        pendmap.identify([dataclasses.replace(read[0], known={"gravity": 9.7}), other])
+    with pytest.raises(InputError, match="rate_hz must be left out where no file is read"):
+        pendmap.identify(read, rate_hz=100.0)
+    with pytest.raises(FileNotFoundError):
+        pendmap.compare(Rig(w0=6.2), tmp_path / "nothing.csv")
+    compared = pendmap.compare(report.model, files)
+    assert [one.run.name for one in compared.runs] == ["a", "b"]
+
+
+def test_the_function_gives_what_the_command_gives(
+    tmp_path: Path, pendmap_command: Command
+) -> None:
+    run = made()
+    rows = np.column_stack((run.time, run.theta))
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    said = pendmap_command("identify", "a.csv", "--json")
+    assert said.returncode == 0, said.stderr
+    found = pendmap.identify(tmp_path / "a.csv")
+    methods = json.loads(said.stdout)["methods"]
+    assert methods == json.loads(json.dumps(as_json(found)["methods"]))
+
+
+def test_all_of_it_stands_at_the_top() -> None:
+    assert {"identify", "diagnose", "compare", "view", "pendulum_of"} <= set(dir(pendmap))

@@ -1,0 +1,120 @@
+"""The equation of motion as functions: against scipy's integrators, formulas and differences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import Effect, Formula, InputError, Pendulum, Rig
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+OWN = Formula("own_pull", "-k*sin(2*theta)*cos(phase)*v", {"k": 1})
+MODELS = (
+    Pendulum(gamma=0.1, p=1.0, omega=2.0, phase=0.3, torque=0.05),
+    Pendulum(gamma=0.1, p=0.6, omega=2.0, effects=(Effect("cubic_damping", {"k3": 0.03}),)),
+    Pendulum(
+        *(0.1, 0.6, 1.7),
+        lab_time=20.0,
+        effects=(
+            Effect("viscous_drift", {"r": 0.002}),
+            Effect("inertia_ripple", {"e": 0.1, "n": 2, "psi": 0.4}),
+            Effect("added_mass", {"e": 0.1}),
+            Effect("lateral_drive", {"e": 0.2, "phase": 0.5}),
+            Effect("drive_second_harmonic", {"e": 0.2, "phase": 0.7}),
+            Effect("encoder_gain", {"e": 0.05}),
+            OWN(k=0.1),
+        ),
+    ),
+    Rig(
+        *(6.2, 0.3, 0.0, 0.5, 0.8, 12.0, 0.4),
+        lab_time_s=5.0,
+        effects=(Effect("cubic_damping", {"k3": 0.01}), Effect("viscous_drift", {"r": 0.01})),
+    ),
+)
+
+
+def dop853(model: Pendulum | Rig, times: NDArray[np.float64], start: tuple[float, float]) -> Any:  # noqa: ANN401
+    """Return the states of scipy's integrator at these times, shape (2, N)."""
+    span, fine = (0.0, float(times[-1])), {"rtol": 1e-12, "atol": 1e-12}
+    return solve_ivp(model.rhs, span, start, method="DOP853", t_eval=times, **fine).y
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_simulate_solves_the_equation_that_the_model_gives(model: Pendulum | Rig) -> None:
+    times = np.linspace(0.0, 15.0 / model.units.w0, 40)
+    start = 1.0, 0.5 * model.units.w0
+    run = pendmap.simulate(model, *start, t_eval=times, tol=1e-12)
+    expected = dop853(model, times, start)
+    # Dense output of scipy's is of order 7: its error exceeds that of a step.
+    assert run.theta.values == pytest.approx(expected[0], abs=2e-10)
+    assert run.velocity.values == pytest.approx(expected[1], abs=2e-10 * model.units.w0)
+
+
+def test_the_acceleration_is_the_papers_equation_and_its_effects() -> None:
+    draw = np.random.default_rng(1)
+    t, theta, v = draw.uniform(-3, 3, (3, 50))
+    effects = Effect("cubic_damping", {"k3": 0.03}), Effect("viscous_drift", {"r": 0.01})
+    pendulum = Pendulum(0.2, 0.7, 1.9, 0.3, 0.05, 0.1, lab_time=4.0, effects=effects)
+    lifted = 1 + 0.7 * np.cos(1.9 * t + 0.3)
+    damping = 0.2 * v + 0.03 * v**3 + 0.01 * (4.0 + t) * v + 0.1 * np.sign(v)
+    expected = 0.05 - lifted * np.sin(theta) - damping
+    assert pendulum.acceleration(t, theta, v) == pytest.approx(expected, abs=1e-14)
+    rig = Rig.from_pendulum(pendulum, 6.2)
+    in_si = rig.acceleration(t / 6.2, theta, v * 6.2)
+    assert in_si == pytest.approx(6.2**2 * expected, rel=1e-12, abs=1e-12)
+    grid = pendulum.acceleration(0.0, theta[:, None], v[None, :])
+    assert grid.shape == (50, 50)
+    assert grid[3, 7] == pendulum.acceleration(0.0, theta[3], v[7])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_jacobian_is_that_of_differences_and_serves_implicit_methods(
+    model: Pendulum | Rig,
+) -> None:
+    t, theta, v, h = 0.7, 1.1, 0.4 * model.units.w0, 1e-5
+    found = model.jacobian(t, theta, v)
+    columns = [
+        (model.rhs(t, [theta + a, v + b]) - model.rhs(t, [theta - a, v - b])) / (2 * h)
+        for a, b in ((h, 0.0), (0.0, h))
+    ]
+    assert found == pytest.approx(np.array(columns).T, rel=1e-7, abs=1e-7)
+    start, until = [1.0, 0.0], 5.0 / model.units.w0
+    run = solve_ivp(
+        *(model.rhs, (0.0, until), start),
+        method="Radau",
+        jac=lambda t, y: model.jacobian(t, *y),
+        rtol=1e-9,
+        atol=1e-9,
+        vectorized=True,
+    )
+    end = float(pendmap.simulate(model, *start, until, tol=1e-12).theta[-1])
+    assert run.y[0, -1] == pytest.approx(end, abs=1e-6)
+
+
+def test_friction_opposes_the_sense_of_the_motion() -> None:
+    model = Pendulum(gamma=0.0, p=0.0, theta_r=0.2)
+    assert model.acceleration(0, 0, [0.1, 0.0, -0.0, -0.1]).tolist() == [-0.2, -0.2, 0.2, 0.2]
+    run = pendmap.simulate(model, 1.0, 0.0, 10.0, tol=1e-12)
+    turn = float(run.event_time[0])
+    until = np.array([0.0, 0.999 * turn])
+    ((_, end), _) = dop853(model, until, (1.0, -1e-300))
+    exact = pendmap.simulate(model, 1.0, 0.0, t_eval=until, tol=1e-12)
+    assert end == pytest.approx(float(exact.theta[-1]), abs=1e-10)
+
+
+def test_what_no_function_of_time_and_state_gives_is_refused() -> None:
+    blank = Effect.blank("dahl_friction", Pendulum().units)
+    with pytest.raises(InputError, match="effects must act by time, angle and velocity alone"):
+        Pendulum(effects=(blank,)).acceleration(0, 0, 0)
+    with pytest.raises(InputError, match="theta must be finite numbers, got nan"):
+        Pendulum().acceleration(0, float("nan"), 0)
+    with pytest.raises(InputError, match="t, theta and v must have shapes that broadcast"):
+        Pendulum().jacobian([0, 1], [0, 1, 2], 0)
+    with pytest.raises(InputError, match=r"y must have the shape \(2,\) or \(2, k\), got \(3,\)"):
+        Pendulum().rhs(0, [1, 2, 3])
