@@ -12,17 +12,22 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from pendmap.charts import registry
-from pendmap.errors import ViewerError
-from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
-from pendmap.viewer.frame import SUFFIXES
-from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
-from pendmap.viewer.window import (
-    NoDisplayError,
-    NotARecordingError,
-    RecordingNotFoundError,
-    check_display,
-    open_viewer,
-)
+from pendmap.errors import MissingExtraError, ViewerError
+
+try:
+    from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
+    from pendmap.viewer.frame import SUFFIXES
+    from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
+    from pendmap.viewer.window import (
+        NoDisplayError,
+        NotARecordingError,
+        RecordingNotFoundError,
+        check_display,
+        open_viewer,
+    )
+except ModuleNotFoundError as error:
+    text = f"recordings and the viewer need the extra pendmap[viewer] ({error})"
+    raise MissingExtraError(text) from error
 
 if TYPE_CHECKING:
     import os
