@@ -4,9 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all fuzz lint bench build-times clean develop
+.PHONY: demo test test-all lanes wheel fuzz lint bench build-times clean develop
 
-demo: $(VENV)/.demo ## set up everything and map the basins of p = 1.7
+demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
 
 develop: $(VENV)/.develop ## set up everything for work on pendmap itself
@@ -21,9 +21,15 @@ test: $(VENV)/.develop ## set up everything and run the tests, all but the thoro
 
 test-all: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
 	cargo test --locked --quiet
-	for simd in $$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])'); do \
-		PENDMAP_SIMD=$$simd cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
+	$(MAKE) lanes SIMD="$$($(BIN)/python -c 'from pendmap import _core; print(*_core.simd_available()[1:])')"
 	$(PYTEST)
+
+lanes: ## what the lanes compute, on each instruction set of SIMD
+	for simd in $(SIMD); do \
+		PENDMAP_SIMD=$$simd cargo test --locked --quiet --test rust -- $(LANES) || exit 1; done
+
+wheel: $(VENV)/bin/maturin ## a wheel of this system, in target/wheels
+	$(BIN)/maturin build --release --locked
 
 SEED ?= 1
 COUNT ?= 1000
@@ -62,7 +68,7 @@ $(VENV)/bin/maturin:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
 
 $(VENV)/.demo: $(VENV)/bin/maturin $(CORE)
-	. $(BIN)/activate && maturin develop --release --locked --quiet
+	. $(BIN)/activate && maturin develop --release --locked --quiet --extras viewer
 	touch $@
 
 $(VENV)/.develop: $(VENV)/bin/maturin $(CORE)

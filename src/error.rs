@@ -152,8 +152,8 @@ impl fmt::Display for Error {
             ),
             Self::Simd { name } => write!(
                 f,
-                "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
-                 them, got '{name}'"
+                "PENDMAP_SIMD must be avx512, avx2, sse, neon or portable, as far as this processor \
+                 has them, got '{name}'"
             ),
             Self::Tolerance { tol, reached } => write!(
                 f,

@@ -32,6 +32,10 @@ class InputError(ValueError):
         super().__init__(one_line(str(message)))
 
 
+class MissingExtraError(InputError, ImportError):
+    """The packages of an extra are not installed; the message names the extra."""
+
+
 class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the caller)
     """A fit diverged: its trajectory overflowed, or its values are outside a model's range."""
 

@@ -11,6 +11,7 @@ use crate::integrate::reference::problem::OdeProblem;
 use crate::integrate::reference::sample::sample;
 use crate::integrate::tangent::{Number, Tangent};
 use crate::lanes::dispatch::Register;
+#[cfg(target_arch = "x86_64")]
 use crate::lanes::pack::Bundle;
 use crate::lanes::{Lane, Real};
 use crate::model::{Observation, Pendulum};

@@ -19,13 +19,15 @@ pub enum InstructionSet {
     Avx2,
     /// SSE4.2, without FMA: 12 lanes in six registers.
     Sse,
+    /// NEON of 64-bit ARM, with FMA: 24 lanes in twelve registers.
+    Neon,
     /// Plain Rust, for any processor.
     Portable,
 }
 
 impl InstructionSet {
     /// All instruction sets, fastest first.
-    pub const ALL: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Sse, Self::Portable];
+    pub const ALL: [Self; 5] = [Self::Avx512, Self::Avx2, Self::Sse, Self::Neon, Self::Portable];
 
     /// The name accepted by `PENDMAP_SIMD` and shown by `pendmap info`.
     #[must_use]
@@ -34,6 +36,7 @@ impl InstructionSet {
             Self::Avx512 => "avx512",
             Self::Avx2 => "avx2",
             Self::Sse => "sse",
+            Self::Neon => "neon",
             Self::Portable => "portable",
         }
     }
@@ -49,6 +52,8 @@ impl InstructionSet {
             Self::Avx2 => pulp::x86::V3::try_new().is_some(),
             #[cfg(all(target_arch = "x86_64", feature = "sse"))]
             Self::Sse => pulp::x86::V2::try_new().is_some(),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => pulp::aarch64::Neon::try_new().is_some(),
             #[allow(unreachable_patterns, reason = "one for what this build leaves out")]
             _ => false,
         }
@@ -175,6 +180,8 @@ entries! {
     avx2: pulp::x86::V3;
     #[cfg(all(target_arch = "x86_64", feature = "sse"))]
     sse: pulp::x86::V2;
+    #[cfg(target_arch = "aarch64")]
+    neon: pulp::aarch64::Neon;
     portable: pulp::Scalar;
 }
 
@@ -200,6 +207,12 @@ pub fn run<J: Job>(simd: InstructionSet, job: J) -> J::Output {
             }
         }
         _ => {}
+    }
+    #[cfg(target_arch = "aarch64")]
+    if simd == InstructionSet::Neon
+        && let Some(isa) = pulp::aarch64::Neon::try_new()
+    {
+        return neon::run(isa, job);
     }
     let _ = simd;
     portable::run(Scalar::new(), job)

@@ -152,3 +152,39 @@ mod x86 {
         }
     }
 }
+
+#[cfg(target_arch = "aarch64")]
+mod aarch64 {
+    use pulp::aarch64::Neon;
+
+    use super::{Bundle, Fused, Isa, Simd, cast};
+
+    impl Isa for Neon {
+        const FUSED: bool = true;
+        type Lanes = Bundle<Self, 12>;
+        type Narrow = Bundle<Self, 6>;
+        type Few = Bundle<Self, 4>;
+        type Single = Fused;
+
+        #[inline(always)]
+        fn multiply_add(self, a: Self::f64s, b: Self::f64s, c: Self::f64s) -> Self::f64s {
+            self.mul_add_e_f64s(a, b, c)
+        }
+        #[inline(always)]
+        fn lowest_bit_to_sign(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.neon.vshlq_n_u64::<63>(cast(bits)))
+        }
+        #[inline(always)]
+        fn lowest_bits_to_exponent(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.neon.vshlq_n_u64::<52>(cast(bits)))
+        }
+        #[inline(always)]
+        fn exponent_to_lowest_bits(self, bits: Self::u64s) -> Self::u64s {
+            cast(self.neon.vshrq_n_u64::<52>(cast(bits)))
+        }
+        #[inline(always)]
+        fn sign_bits(self, values: Self::f64s) -> u8 {
+            u8::from(values.0.is_sign_negative()) | u8::from(values.1.is_sign_negative()) << 1
+        }
+    }
+}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import functools
 import hashlib
 import pickle
@@ -10,6 +9,11 @@ import tempfile
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+try:
+    import fcntl
+except ImportError:  # Windows: processes repeat one another's work
+    fcntl = None  # type: ignore[assignment]
 
 from pendmap import virtual_rig
 from pendmap.diagnosis import Discrepancy, diagnose
@@ -40,7 +44,8 @@ def diagnosed(
     known = KNOWN[0] / f"{hashlib.sha256(asked).hexdigest()}.pickle"
     with known.with_suffix(".lock").open("w") as lock:
         # Other processes wait here until the diagnosis is complete.
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
         if known.exists():
             return pickle.loads(known.read_bytes())  # type: ignore[no-any-return]  # noqa: S301 (our own)
         where = virtual_rig.places(folder / "hidden", replace=True)

@@ -142,8 +142,8 @@ fn instruction_sets() {
     }
     let error = "avx1024".parse::<InstructionSet>().expect_err("refused");
     assert_eq!(error, Error::Simd { name: "avx1024".to_owned() });
-    let expected = "PENDMAP_SIMD must be avx512, avx2, sse or portable, as far as this processor has \
-                    them, got 'avx1024'";
+    let expected = "PENDMAP_SIMD must be avx512, avx2, sse, neon or portable, as far as this processor \
+                    has them, got 'avx1024'";
     assert_eq!(error.to_string(), expected);
     assert!("AVX2".parse::<InstructionSet>().is_err() && "".parse::<InstructionSet>().is_err());
     assert!(InstructionSet::Portable.available());

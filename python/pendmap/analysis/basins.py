@@ -236,11 +236,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
 
     Notes
     -----
-    The same request gives the same bits on any number of threads and on all processors that
-    multiply and add with one rounding (AVX2, AVX-512). Other processors, or ``sse`` and
-    ``portable`` of the environment variable ``PENDMAP_SIMD``, round otherwise: where basins are
-    smooth no label differs, where they are fractal up to 33 % do (``p = 1.7``). The attribute
-    ``simd`` names the instruction set.
+    The same request gives the same bits on any number of threads and on all processors with AVX2 or
+    AVX-512. Other processors, or ``sse``, ``neon`` and ``portable`` of the environment variable
+    ``PENDMAP_SIMD``, may round otherwise: where basins are smooth no label differs, where they are
+    fractal up to 33 % do (``p = 1.7``). The attribute ``simd`` names the instruction set.
 
     Raises
     ------

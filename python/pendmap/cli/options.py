@@ -73,7 +73,7 @@ def _use_simd(ctx: click.Context, _: click.Parameter, value: str | None) -> None
 simd_option = option(
     "--simd",
     INSTRUCTION_SET,
-    "Instruction set: avx512, avx2, sse or portable.  [default: the quickest here]",
+    "Instruction set: avx512, avx2, sse, neon or portable.  [default: the quickest here]",
     callback=_use_simd,
     expose_value=False,
 )

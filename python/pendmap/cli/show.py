@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import importlib
+import importlib.util
 import json
 import math
 import shlex
@@ -82,6 +83,7 @@ class Outputs:
     view: bool = False
     as_json: bool = False
     quiet: bool = False
+    left_out: str = ""
 
     @classmethod
     def take(
@@ -93,13 +95,18 @@ class Outputs:
         *,
         default: bool = True,
     ) -> Outputs:
-        """Remove the output options from ``given``; if none is given, by default all files."""
+        """Remove the output options from ``given``; if none is given, by default all files.
+
+        Without the viewer the recording is left out of all files.
+        """
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
         taken = {field: given.pop(field) for field in fields}
         if isinstance(taken.get("out"), Address):
             taken |= {"address": taken["out"], "out": None}
         if default and not any(value for field, value in taken.items() if field != "quiet"):
+            if "rerun" in taken and importlib.util.find_spec("rerun") is None:
+                taken["left_out"] = name + files.pop("rerun")
             taken |= {field: default_file(name + files[field]) for field in files if field in taken}
         if taken.get("view") and taken["rerun"] is None:
             taken["rerun"] = default_file(f"{name}.rrd")
@@ -201,6 +208,8 @@ class Outputs:
             for line in lines:
                 click.echo(line)
             written.say()
+            if written and self.left_out:
+                click.echo(f"Left out: {self.left_out}, which needs the extra pendmap[viewer]")
         written.check()
         recording = written.name(self.rerun) if self.view else None
         if recording is not None:

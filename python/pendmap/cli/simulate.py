@@ -45,9 +45,9 @@ def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     start = (given.pop("theta"), given.pop("velocity"))
     live = None
     if address is not None:  # connected before anything is computed
-        from pendmap import viewer
-
         with named("--live"):
+            from pendmap import viewer
+
             live = viewer.Live(model, start, address)
 
     from pendmap.analysis.trajectory import SCHEMA, simulate

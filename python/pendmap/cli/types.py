@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import click
 
-from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, short_repr
+from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, MissingExtraError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -213,6 +213,8 @@ def _import_library(name: str, suffix: str) -> None:
     module, extra = _LIBRARIES.get(suffix, ("pendmap.files", ""))
     try:
         importlib.import_module(module)
+    except MissingExtraError as error:
+        raise InputError(f"{name!r}: {error}") from error
     except Exception as error:
         raise InputError(
             f"{name!r}: {suffix} needs {extra}, which cannot be imported "
@@ -222,7 +224,7 @@ def _import_library(name: str, suffix: str) -> None:
 
 _LIBRARIES = {
     **dict.fromkeys((".png", ".svg", ".pdf", ".html", ".md"), ("pendmap.render", "matplotlib")),
-    ".rrd": ("pendmap.viewer", "rerun-sdk"),
+    ".rrd": ("pendmap.viewer", "the extra pendmap[viewer]"),
     ".nc": ("netCDF4", "netcdf4"),
     ".zarr": ("zarr", "the extra pendmap[zarr]"),
 }

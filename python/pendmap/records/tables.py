@@ -117,9 +117,15 @@ def _parquet(data: bytes, where: str) -> Table:
 def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
     """Return names and numbers of a Parquet file's columns, if its declared size is allowed."""
     import pandas as pd
-    import pyarrow as pa
-    from pyarrow import parquet
 
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ModuleNotFoundError:
+        raise InputError(
+            f"{where}: a Parquet file needs the extra pendmap[viewer] (pyarrow), or must be saved"
+            " as CSV"
+        ) from None
     file = parquet.ParquetFile(io.BytesIO(data))
     # Sizes are read from the row groups: reading a damaged column's may crash the process.
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]

@@ -17,17 +17,22 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from pendmap.charts import registry
-from pendmap.errors import InputError, ViewerError, short_repr
-from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
-from pendmap.viewer.frame import SUFFIXES
-from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
-from pendmap.viewer.window import (
-    NoDisplayError,
-    NotARecordingError,
-    RecordingNotFoundError,
-    check_display,
-    open_viewer,
-)
+from pendmap.errors import InputError, MissingExtraError, ViewerError, short_repr
+
+try:
+    from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
+    from pendmap.viewer.frame import SUFFIXES
+    from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
+    from pendmap.viewer.window import (
+        NoDisplayError,
+        NotARecordingError,
+        RecordingNotFoundError,
+        check_display,
+        open_viewer,
+    )
+except ModuleNotFoundError as error:
+    text = f"recordings and the viewer need the extra pendmap[viewer] ({error})"
+    raise MissingExtraError(text) from error
 
 if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy

@@ -136,7 +136,7 @@ def _program() -> Path:
             return program
     found = shutil.which("rerun")
     if found is None:
-        raise ViewerError("the viewer is not installed; it comes with the package rerun-sdk")
+        raise ViewerError("the viewer is not installed; it comes with the extra pendmap[viewer]")
     return Path(found)
 
 

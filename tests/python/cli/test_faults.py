@@ -119,7 +119,7 @@ def test_free_space_is_checked_before_the_computation(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "words", "needs"),
     [
-        ("rerun", SMALL, "rerun-sdk"),
+        ("rerun", SMALL, "pendmap[viewer]"),
         ("zarr", (*SMALL, "--out", "m.zarr"), "pendmap[zarr]"),
         ("matplotlib", (*SMALL, "--plot", "m.png"), "matplotlib"),
     ],
