@@ -88,8 +88,8 @@ class IdentificationReport(FitResult):
 
     @property
     def parameters(self) -> Mapping[str, Estimate]:
-        """Parameters of the best method."""
-        return self.best.parameters
+        """Parameters of the best method; none if no method gives a model."""
+        return {} if self.sound is None else self.sound.parameters
 
     @property
     def joint_covariance(self) -> Covariance | None:

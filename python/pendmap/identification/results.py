@@ -73,11 +73,6 @@ class Parameters(Readable):
         pandas.DataFrame
             Index ``parameter``; ``value``, ``stderr`` (standard error), ``low`` and ``high`` (the
             95 % interval), nan where unknown, and ``unit`` (SI; empty for a pure number).
-
-        Raises
-        ------
-        InputError
-            If no method gives parameters.
         """
         rows = [
             (name, e.value, e.stderr, *(e.ci95 or (None, None)), self.unit(name))
@@ -122,7 +117,8 @@ class Parameters(Readable):
         """
         packed = Packed(self)
         data: dict[str, Any] = {"content": ((), json.dumps(packed.tree))}
-        for name, column in self.to_dataframe().reset_index().items():
+        table = self.to_dataframe().reset_index()
+        for name, column in table.items() if len(table) else ():
             values = column.to_numpy()
             data[str(name)] = (
                 "parameter",
@@ -172,7 +168,8 @@ class Parameters(Readable):
         return ["parameter", "value", "95 % interval", "unit"], rows
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + html_table(*self.parameter_table())
+        head, rows = self.parameter_table()
+        return super()._repr_html_() + (html_table(head, rows) if rows else "")
 
 
 class FitResult(Parameters):

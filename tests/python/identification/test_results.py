@@ -117,6 +117,21 @@ def test_what_is_loaded_has_the_same_numbers(report: IdentificationReport, tmp_p
         report.save(tmp_path / "identify.csv")
 
 
+def test_a_report_without_a_model_is_shown_and_kept(tmp_path: Path) -> None:
+    run = made()
+    few = dataclasses.replace(
+        run, time=run.time[:12], theta=run.theta[:12], trusted=run.trusted[:12]
+    )
+    empty = pendmap.identify(few, methods=["log_decrement"])
+    assert empty.sound is None
+    assert len(empty.to_dataframe()) == 0
+    assert "not applicable" in empty._repr_html_()
+    again = IdentificationReport.load(empty.save(tmp_path / "empty.nc"))
+    assert str(again) == str(empty)
+    with pytest.raises(InputError, match="the trajectory method must have fitted it"):
+        _ = again.residual
+
+
 def test_a_damaged_file_is_refused_on_one_line(
     report: IdentificationReport, tmp_path: Path
 ) -> None:
