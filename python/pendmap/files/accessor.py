@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 import pendmap
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @xr.register_dataset_accessor("pendmap")  # type: ignore[no-untyped-call]
@@ -26,10 +22,10 @@ class Accessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, ax: Axes | None = None, **look: Any) -> Axes:  # noqa: ANN401 (as plot.draw)
+    def plot(self, ax: Any = None, **look: Any) -> Any:  # noqa: ANN401 (as plot.draw)
         """Draw one part of the result into Axes; arguments are those of ``pendmap.plot.draw``."""
         return pendmap.plot.draw(self._dataset, ax, **look)
 
-    def figure(self, **look: Any) -> Figure:  # noqa: ANN401 (as plot.figure)
+    def figure(self, **look: Any) -> Any:  # noqa: ANN401 (as plot.figure)
         """Return the figure of the result; arguments are those of ``pendmap.plot.figure``."""
         return pendmap.plot.figure(self._dataset, **look)
