@@ -372,7 +372,7 @@ def simulate(
     samples: int,
     lyapunov: bool,
     live: Callable[[_Floats, _Floats, _Floats], object] | None = None,
-    times: Sequence[float] = (),
+    times: Sequence[float] = ...,
 ) -> Trajectory: ...
 def thinned(count: int, others: int) -> NDArray[np.int64]: ...
 def orbits(
