@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
 import pendmap
-from drawn import made, named
+from drawn import made
 from pendmap import InputError, Pendulum, render, viewer
-from pendmap.charts import palette, parameter_map
+from pendmap.charts import legend, palette, parameter_map
 from pendmap.charts.selection import shown
 from pendmap.charts.trajectory import resting
 from recordings import recorded
@@ -95,10 +95,12 @@ def test_a_selection_of_a_basin_map_is_drawn(
                 continue
             drawn = at(np.ma.filled(settle.get_array(), np.nan), settle.get_extent(), x, y)
             assert np.isnan(drawn) if periods < 0 else drawn == max(periods, 1)
-    for name, text in zip(part["attractor"].values, named(figure), strict=False):
-        share = np.mean(part["label"].values == list(MAP["attractor"].values).index(name) + 1)
-        said = text.removeprefix(str(name).replace("-", "\N{MINUS SIGN}") + ", ").split()[0]
-        assert float(said) == pytest.approx(100 * share, abs=0.51)
+    for entry in legend.entries(shown(part)):
+        if entry.id < 1:
+            continue
+        place = list(MAP["attractor"].values).index(entry.name) + 1
+        share = np.mean(part["label"].values == place)
+        assert float(entry.share.split()[0]) == pytest.approx(100 * share, abs=0.51)
 
 
 def test_a_selection_of_an_adaptive_map_estimates_its_own_settling_time() -> None:
