@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from drawn import made, named
+from drawn import made, named, regions
 from pendmap import Pendulum, Rig, render
 from pendmap.charts import bifurcation as drawn
 from pendmap.charts import palette
@@ -93,7 +93,7 @@ def test_results_in_si_agree() -> None:
 
 def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
     figure = made(diagram)
-    texts = named(figure)
+    texts = named(figure) + regions(figure)
     assert "rotation 1:+1" in texts
     assert "tumbling chaos" in texts
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]
