@@ -116,6 +116,8 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "tongues": lambda: pendmap.tongues(pendulum, [1.0, 2.0]),
         "uncertainty_exponent": lambda: pendmap.uncertainty_exponent(halves),
         "draw": lambda: render.draw(basins, folder / "basins.png"),
+        "view": lambda: pendmap.view(basins, folder / "view.rrd"),
+        "pendulum_of": lambda: pendmap.pendulum_of(basins),
         "record": lambda: viewer.record(basins, folder / "basins.rrd"),
         "save zarr": lambda: pendmap.save(basins, folder / "again.zarr"),
     }
