@@ -124,10 +124,10 @@ class Chart:
             scale = self.size[1] / sum(parts) * min(1.0, max(width / self.size[0], 0.6))
             inches = [scale * part for part in parts]
         rows, heights = [], []
-        for row, high_ in zip(self.rows, inches, strict=True):
+        for row, tall in zip(self.rows, inches, strict=True):
             for k in range(0, len(row), fit):
                 rows.append([_narrow(panel) for panel in row[k : k + fit]])
-                heights.append(high_)
+                heights.append(tall)
         return dataclasses.replace(self, rows=rows, heights=heights, columns=0, size=None)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 ACCELERATION = 2  # Power of ``w0`` of an acceleration
 
 
-class Dynamics:
+class Dynamics(abc.ABC):
     """Acceleration, its derivatives, and the right-hand side of the equation of motion.
 
     Time in the laboratory goes on, as in :func:`pendmap.simulate`. Friction opposes the velocity,
@@ -28,9 +29,9 @@ class Dynamics:
     """
 
     @property
+    @abc.abstractmethod
     def units(self) -> Units:
         """The units of arguments and results."""
-        raise NotImplementedError
 
     def acceleration(self, t: ArrayLike, theta: ArrayLike, v: ArrayLike) -> Floats:
         """Return ``th''``, with all effects and friction.
