@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.varied import pendulum_of as pendulum_of
     from pendmap.comparison.experiment import compare as compare
     from pendmap.diagnosis.diagnose import diagnose as diagnose
+    from pendmap.engine.bar import ProgressBar as ProgressBar
     from pendmap.errors import FitDiverged as FitDiverged
     from pendmap.errors import InputError as InputError
     from pendmap.files.dataset import load as load
@@ -126,6 +127,7 @@ _OTHERS = {
     "analysis.varied": ["pendulum_of"],
     "comparison.experiment": ["compare"],
     "diagnosis.diagnose": ["diagnose"],
+    "engine.bar": ["ProgressBar"],
     "errors": ["FitDiverged", "InputError"],
     "files.dataset": ["load", "save"],
     "identification.experiment": ["identify"],

@@ -6,10 +6,12 @@ import abc
 import dataclasses
 import html
 import math
+import re
+import textwrap
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
@@ -23,6 +25,11 @@ ERROR_DIGITS: Final = 2  # Significant digits of a standard error
 MOST_PLACES: Final = 15  # Largest number of decimal places of an estimate
 
 MINUS: Final = "\N{MINUS SIGN}"  # Minus sign of figures
+
+WIDTH: Final = 80  # Columns of a terminal
+
+_GLUE: Final = "\N{NO-BREAK SPACE}"
+_GLUED: Final = re.compile(r"(?<=\d) (?=%|\+-)|(?<=\+-) |(?<= =) |(?<=\S) (?== )")
 
 LONG_AGO: Final = 1e3  # Time from which six digits are coarser than 1 ms, s
 
@@ -104,7 +111,7 @@ class Readable(abc.ABC):
 
     def __str__(self) -> str:
         tables, lines = self.text_parts()
-        return "\n".join([*(columns(*table) for table in tables if table[1]), *lines])
+        return "\n".join([*(columns(*table) for table in tables if table[1]), *map(wrapped, lines)])
 
     def _repr_html_(self) -> str:
         tables, lines = self.text_parts()
@@ -112,12 +119,46 @@ class Readable(abc.ABC):
         return "".join(html_table(*table) for table in tables if table[1]) + f"<p>{below}</p>"
 
 
-def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table as text with aligned columns: header, rows, a final newline."""
+def wrapped(text: str, width: int = WIDTH) -> str:
+    """Break lines longer than ``width`` columns between words; what follows is indented by two."""
+
+    def lines(line: str) -> Iterator[str]:
+        start = line[: len(line) - len(line.lstrip())]
+        if len(line) <= width:
+            yield line
+            return
+        whole = _GLUED.sub(_GLUE, line.strip())  # a number and its unit stay together
+        parts = textwrap.wrap(
+            whole,
+            width,
+            initial_indent=start,
+            subsequent_indent=start + "  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        yield from (part.replace(_GLUE, " ") for part in parts)
+
+    return "\n".join(part for line in text.split("\n") for part in lines(line))
+
+
+def columns(head: Sequence[str], rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
+    """Return a table as text with aligned columns: header, rows, a final newline.
+
+    What is wider than ``width`` continues in further tables, which repeat the first column.
+    """
     lines = [head, *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(head))]
-    padded = ("  ".join(map(str.ljust, line, wide)) for line in lines)
-    return "\n".join(line.rstrip() for line in padded) + "\n"
+    parts: list[list[int]] = [[0]]
+    for k in range(1, len(head)):
+        if len(parts[-1]) > 1 and sum(wide[j] + 2 for j in parts[-1]) + wide[k] > width:
+            parts.append([0])
+        parts[-1].append(k)
+
+    def written(part: list[int]) -> str:
+        padded = ("  ".join(line[k].ljust(wide[k]) for k in part) for line in lines)
+        return "\n".join(line.rstrip() for line in padded) + "\n"
+
+    return "\n".join(map(written, parts))
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

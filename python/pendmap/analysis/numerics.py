@@ -107,6 +107,26 @@ def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
     return report
 
 
+def in_rounds(progress: Progress | None, typical: int) -> Progress | None:
+    """Return the progress of rounds whose number is not known: it rises with each, and never falls.
+
+    A round begins where the work done does not rise. After k rounds the share is k / (k +
+    ``typical``).
+    """
+    if progress is None:
+        return None
+    rounds, last = 0, 0
+
+    def report(done: int, total: int) -> None:
+        nonlocal rounds, last
+        rounds += done <= last
+        last = done
+        passed = rounds + done / max(total, 1)
+        progress(round(_STEPS * passed / (passed + typical)), _STEPS)
+
+    return report
+
+
 def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:
     """Return a whole number between two bounds, or None if none is given."""
     return None if value is None else check_whole(name, value, least, most)

@@ -14,7 +14,7 @@ from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
-from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.numerics import Numerics, in_rounds
 from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
 from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
@@ -40,6 +40,7 @@ _OF_P = "1", "amplitude of the drive over gravity"  # Unit and meaning of p
 _STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
 _TIPS = 8  # Tips of tongues, omega = 2/k, k = 1, 2, ..., that a summary lists without damping
+_ROUNDS = 8  # Searches that are half of the work
 _STRIP = 1e-6  # Width in p of a strip of stability below which a summary leaves it out
 _TABLES = {"curves": ("critical", ""), "inverted": ("inverted", "inverted_")}
 """Tables of critical amplitudes over draws: JSON key, dimension, prefix of the variables."""
@@ -267,8 +268,10 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     """Return frequencies, where folds were sought, and rows: hanging, undamped, inverted rest."""
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
+    moved = in_rounds(numerics.progress, _ROUNDS)
+
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        run = numerics.workers, numerics.progress
+        run = numerics.workers, moved
         return _core.tongues(one, upright, at.tolist(), p_max, folds, *run)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
@@ -289,6 +292,8 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
         again = partial(solve, one=pendulum, upright=False, folds=True)
         looked = critical_curves.fold_ends(frequencies, found, np.isin(frequencies, asked), again)
+    if numerics.progress is not None:
+        numerics.progress(1, 1)
     return frequencies, looked, (found, undamped, upright)
 
 

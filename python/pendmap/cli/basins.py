@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.analysis import analysis_command
+from pendmap.cli.groups import group
 from pendmap.cli.options import (
     draws_option,
+    flag,
     max_periods_option,
     option,
     seed_option,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 
 _CELLS = 1000  # Default number of cells on each side
+_ANALYSIS = group("Analysis", "--adaptive")
 
 
 @analysis_command(
@@ -35,14 +38,24 @@ _CELLS = 1000  # Default number of cells on each side
         "Bound after which a start is undecided.  [default: 4000; more where damping"
         " is small, less if chaos coexists]"
     ),
-    option("--layer-periods", whole(1, MOST_PERIODS), "Periods of the finite-time layers."),
     seed_option("Shifts the samples, and draws the models of --draws."),
-    click.option(
+    flag(
         "--adaptive",
-        is_flag=True,
-        help="Compute the cells at boundaries alone, and a sample of the others.",
+        "Compute the cells at boundaries alone, and a sample of the others.",
+        group=_ANALYSIS,
     ),
-    draws_option,
+    option(
+        "--layer-periods",
+        whole(1, MOST_PERIODS),
+        "Periods of the finite-time layers.",
+        group=_ANALYSIS,
+    ),
+    draws_option(_ANALYSIS),
+    examples=(
+        "pendmap basins --p 1.7",
+        "pendmap basins --p 1 --theta-r 0.05 --grid 400 --out friction.nc",
+        "pendmap basins --p 0.6 --grid 2000 --adaptive",
+    ),
     stored=True,
 )
 def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401

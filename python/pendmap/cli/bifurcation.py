@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from pendmap.cli.analysis import analysis_command
+from pendmap.cli.groups import START
 from pendmap.cli.model_options import varied_model_options
 from pendmap.cli.options import option, search_options
 from pendmap.cli.types import NUMBER
@@ -14,9 +15,13 @@ from pendmap.cli.types import NUMBER
 
 @analysis_command(
     "bifurcation",
-    option("--theta", NUMBER, "Angle from which both sweeps start, rad."),
-    option("--velocity", NUMBER, "Velocity of that start, in SI rad/s."),
+    option("--theta", NUMBER, "Angle from which both sweeps start, rad.", group=START),
+    option("--velocity", NUMBER, "Velocity of that start, in SI rad/s.", group=START),
     search_options,
+    examples=(
+        "pendmap bifurcation --vary p 0.9:2:2000",
+        "pendmap bifurcation --p 0.9:2:500 --theta-r 0.02 --out bifurcation.pdf",
+    ),
     model=varied_model_options,
     stored=True,
 )

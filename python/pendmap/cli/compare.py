@@ -4,35 +4,48 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from pendmap.cli.groups import argument, group, new_command
 from pendmap.cli.model_options import rig_from
 from pendmap.cli.options import (
-    json_option,
     option,
-    plot_option,
+    output_options,
     reading_options,
     seed_option,
     threads_option,
 )
-from pendmap.cli.show import Outputs, doubts_first, write_all
-from pendmap.cli.types import FILE, NUMBER, whole
+from pendmap.cli.show import Outputs, write_all
+from pendmap.cli.text import doubts_first
+from pendmap.cli.types import NUMBER, whole
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@click.command("compare")
-@click.argument("model", type=FILE, metavar="MODEL")
-@click.argument("path", type=FILE, metavar="EXPERIMENT")
-@plot_option
-@option("--members", whole(20, 100_000), "Ensemble members for each forced run.", 400)
-@option("--spread", NUMBER, "Their spread about the measured start, rad, and over w0.", 0.01)
+_ENSEMBLE = group("Ensemble", "--members 1000 --spread 0.02")
+
+
+@new_command(
+    "compare",
+    "pendmap compare identify.toml decay",
+    "pendmap compare rig.toml shaken --members 1000 --spread 0.02 --json",
+)
+@argument("model", "MODEL")
+@argument("path", "EXPERIMENT")
+@option(
+    "--members", whole(20, 100_000), "Ensemble members for each forced run.", 400, group=_ENSEMBLE
+)
+@option(
+    "--spread",
+    NUMBER,
+    "Their spread about the measured start, rad, and over w0.",
+    0.01,
+    group=_ENSEMBLE,
+)
 @seed_option("Draws them.")
 @threads_option
-@json_option("; alone, no files")
 @reading_options
+@output_options(".nc", recording=False)
 def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,
@@ -51,7 +64,7 @@ def command(  # noqa: PLR0913 (an option each)
     of a motion from the first measured peak, in percent of the measured ones, as in the paper's
     table 1. A forced run is compared with an ensemble from a neighbourhood of its start: by wells
     visited, escapes, angle covered, time to settle and greatest velocity, and by the steady state
-    that it ends on. Writes compare.png if no figure is named. --json alone writes no file.
+    that it ends on. Writes compare.nc and compare.png if no output is named.
     """
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.experiment import as_json
@@ -64,7 +77,7 @@ def command(  # noqa: PLR0913 (an option each)
     with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = write_all(outputs.files(comparison, None), keep=True)
+    written = write_all(outputs.files(comparison, comparison.save), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
     lines = doubts_first(comparison, doubts)

@@ -9,55 +9,52 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from pendmap.cli.groups import OUTPUT, argument, group, new_command
 from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import (
-    json_option,
-    option,
-    plot_option,
-    reading_options,
-    rerun_option,
-    view_option,
-)
-from pendmap.cli.show import Outputs, table, write_all
-from pendmap.cli.types import FILE, REPORT, output_file, whole
+from pendmap.cli.options import option, output_options, reading_options
+from pendmap.cli.show import Outputs, write_all
+from pendmap.cli.text import table
+from pendmap.cli.types import EFFECT, FILE, REPORT, REPORTS, whole
 from pendmap.errors import instruction_set, named
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@click.command("diagnose")
-@click.argument("path", type=FILE, metavar="EXPERIMENT")
+_FIT = group("Candidates", "--max-effects 1 --without magnet")
+
+
+@new_command(
+    "diagnose",
+    "pendmap diagnose hidden",
+    "pendmap diagnose hidden --model rig.toml --report report",
+)
+@argument("path", "EXPERIMENT")
 @option(
     "--model model_path",
     FILE,
     "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
     metavar="FILE",
+    group=_FIT,
 )
-@option("--max-effects", whole(0, 6), "Effects added at most, 0 to 6.", 3)
-@click.option(
-    "--without", multiple=True, metavar="NAME", help="Leave this effect out; may be repeated."
-)
+@option("--max-effects", whole(0, 6), "Effects added at most, 0 to 6.", 3, group=_FIT)
+@option("--without", EFFECT, "Leave this effect out; may be repeated.", multiple=True, group=_FIT)
 @option(
     "--effects effects_path",
     FILE,
     "User-defined candidates in addition to the library's: [[formula]] of a .toml.",
     metavar="FILE",
+    group=_FIT,
 )
-@option("--out", output_file(".toml"), "New model: .toml.  [default: diagnose.toml]")
-@plot_option
+@reading_options
 @option(
     "--report",
     REPORT,
     "Report: .html with embedded figures, .md with separate figures, or a folder with both.",
     metavar="FILE|DIR",
+    group=OUTPUT,
 )
-@rerun_option
-@view_option
-@json_option("; alone, no file but the model")
-@reading_options
+@output_options(".toml", *REPORTS, json="; alone, no file but the model")
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-import sys
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import json_option, option
-from pendmap.cli.types import FILE
+from pendmap.cli.groups import OUTPUT, argument, new_command
+from pendmap.cli.options import json_option, option, verbose_option
+from pendmap.cli.text import say, write_json
+from pendmap.cli.types import EFFECT, FILE
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
@@ -18,25 +20,33 @@ if TYPE_CHECKING:
 
     from pendmap.model.effects import EffectDefinition, EffectParameter
 
+_NAMES = 23  # Width of the column of names
 
-@click.command("effects")
-@click.argument("names", nargs=-1, metavar="[NAME]...")
+
+@new_command(
+    "effects",
+    "pendmap effects",
+    "pendmap effects stribeck_friction magnet",
+    "pendmap effects --effects own.toml",
+)
+@argument("names", "[NAME]...", EFFECT, nargs=-1)
 @option(
     "--effects path",
     FILE,
     "Show those of a file instead, its [[formula]]; they are checked.",
     metavar="FILE",
+    group=OUTPUT,
 )
+@verbose_option("Also parameters and which data reveal each.")
 @json_option()
-def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None:
+def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
     The formulas are terms on the right of th'' = ..., with v = th'; those of drives give the motion
     of the pivot, those of readings what the sensor shows. In brackets: values of interest without
-    dimensions, and the factor that converts them to those of a model file in SI. With NAMEs: only
-    those effects, with examples for a model file.
+    dimensions, and the factor that converts them to those of a model file in SI. With NAMEs: all
+    about these effects, with examples for a model file.
     """
-    from pendmap.cli.show import write_json
     from pendmap.model import load_formulas
     from pendmap.model.effects import definition, effects
 
@@ -47,40 +57,28 @@ def command(*, names: tuple[str, ...], path: Path | None, as_json: bool) -> None
     shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
         write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})
-    elif sys.stdout.isatty():
-        _draw(shown)
-    else:
-        for effect in shown:
-            _write(effect)
-    if wanted and not as_json:
-        click.echo(
-            "\nIn a model file without dimensions, which simulate and basins take by --model:"
-        )
+        return
+    whole = verbose or bool(wanted)
+    for group, members in itertools.groupby(shown, lambda effect: effect.group):
+        say(click.style(group, bold=True))
+        for effect in members:
+            _write(effect, whole=whole)
+    if wanted:
+        say("\nIn a model file without dimensions, which simulate and basins take by --model:")
         for effect in shown:
             said = [known[effect.name].table] if effect.name in known else []
             tables = {"formula": said, "effect": [_example(effect)]}
             click.echo(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip())
+    elif not whole:
+        say("\nAll about one: pendmap effects NAME; about all: pendmap effects --verbose")
 
 
-def _draw(effects: list[EffectDefinition]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table("effect", "formula", "parameters", "revealed by", "maps", show_lines=True)
-    for effect in effects:
-        parameters = "\n".join(_parameter(parameter) for parameter in effect.parameters)
-        cells = (effect.name, effect.formula, parameters, effect.revealed_by, _maps(effect))
-        # Text, not markup: a formula may have brackets.
-        table.add_row(*(Text(cell) for cell in cells))
-    Console().print(table)
-
-
-def _write(effect: EffectDefinition) -> None:
-    click.echo(f"{effect.name:<24} {effect.formula}")
-    for parameter in effect.parameters:
-        click.echo(f"{'':<26} {_parameter(parameter)}")
-    click.echo(f"{'':<26} {effect.group}; maps {_maps(effect)}; revealed by {effect.revealed_by}")
+def _write(effect: EffectDefinition, *, whole: bool) -> None:
+    say(f"  {effect.name:<{_NAMES}} {effect.formula}")
+    if whole:
+        for parameter in effect.parameters:
+            say(f"      {_parameter(parameter)}")
+        say(f"      maps {_maps(effect)}; revealed by {effect.revealed_by}")
 
 
 def _maps(effect: EffectDefinition) -> str:

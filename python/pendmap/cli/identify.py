@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from pendmap.cli.options import output_options, reading_options
-from pendmap.cli.show import Outputs, Written, doubts_first, write_all
-from pendmap.cli.types import FILE
+from pendmap.cli.groups import argument, group, new_command
+from pendmap.cli.options import option, output_options, reading_options, verbose_option
+from pendmap.cli.show import Outputs, Written, write_all
+from pendmap.cli.text import doubts_first
+from pendmap.cli.types import EFFECT, METHOD
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
@@ -19,39 +20,51 @@ if TYPE_CHECKING:
 
 
 SUFFIX = ".toml"
+_FIT = group("Fit", "--effect quadratic_drag")
 
 
-@click.command("identify")
-@click.argument("path", type=FILE, metavar="EXPERIMENT")
-@click.option(
-    "--method", "methods", multiple=True, metavar="NAME", help="Only this method; may be repeated."
+@new_command(
+    "identify",
+    "pendmap identify run.csv",
+    "pendmap identify decay --effect quadratic_drag --out rig.toml --out rig.pdf",
+    "pendmap identify decay --verbose",
 )
-@click.option(
-    "--effect",
-    "effects",
+@argument("path", "EXPERIMENT")
+@option(
+    "--method methods",
+    METHOD,
+    "Only this method; may be repeated.",
     multiple=True,
-    metavar="NAME",
-    help="Fit this effect of the library too; may be repeated.",
+    group=_FIT,
+)
+@option(
+    "--effect effects",
+    EFFECT,
+    "Fit this effect of the library too; may be repeated.",
+    multiple=True,
+    group=_FIT,
 )
 @reading_options
-@output_options((SUFFIX,), "Model")
+@output_options(SUFFIX)
+@verbose_option("Also the tables of all methods, intervals, and what was noticed.")
 def command(
     *,
     path: Path,
     methods: tuple[str, ...],
     effects: tuple[str, ...],
     rate_hz: float | None,
+    verbose: bool,
     **given: Any,  # noqa: ANN401
 ) -> None:
     """Identify natural frequency, viscous damping and Coulomb friction from free decays.
 
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. The default
-    method fits a trajectory to the whole record; the paper's method and others are listed too. In
-    brackets: standard errors in the last digits. Writes identify.toml, a model for --model of every
-    other command, identify.png and identify.rrd if no output is named. --json alone writes no file.
+    method fits a trajectory to the whole record; --verbose lists the paper's method and others too.
+    In brackets: standard errors in the last digits. Writes identify.toml, a model for --model of
+    every other command, identify.png and identify.rrd if no output is named.
     """
     from pendmap.identification import identified_model, identify_experiment
-    from pendmap.identification.report import as_json, foremost
+    from pendmap.identification.report import as_json, foremost, in_short
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
@@ -65,7 +78,10 @@ def command(
 
     def finish(written: Written) -> None:
         more = {"model": written.name(outputs.out), "simd": instruction_set()}
-        lines = doubts_first(report, [f"Warning: {text}" for text in foremost(report)])
+        lines = in_short(report)
+        if verbose:
+            doubts = [f"Warning: {text}" for text in foremost(report)]
+            lines = itertools.chain(lines, [""], doubts_first(report, doubts))
         outputs.finish(written, lambda: as_json(report) | more, lines)
 
     try:

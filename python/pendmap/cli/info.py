@@ -9,6 +9,7 @@ import platform
 
 import click
 
+from pendmap.cli.groups import new_command
 from pendmap.cli.options import json_option
 
 _DEPENDENCIES = (
@@ -20,11 +21,12 @@ _DEPENDENCIES = (
     "matplotlib",
     "rerun-sdk",
     "click",
-    "rich",
+    "cloup",
+    "tqdm",
 )
 
 
-@click.command("info")
+@new_command("info", "pendmap info --json")
 @json_option()
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from pendmap.cli.options import json_option, plot_option, quiet_option, rate_option
+from pendmap.cli.groups import argument, new_command
+from pendmap.cli.options import output_options, rate_option
 from pendmap.cli.show import Outputs, write_all
-from pendmap.cli.types import FILE
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@click.command("look")
-@click.argument("path", type=FILE, metavar="FILE|FOLDER")
-@plot_option
+@new_command("look", "pendmap look run.csv", "pendmap look runs --out records.png")
+@argument("path", "FILE|FOLDER")
 @rate_option
-@json_option()
-@quiet_option
+@output_options(recording=False, json="")
 def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
     """Describe the contents and faults of a record, before anything is fitted.
 

@@ -19,6 +19,7 @@ import click
 from pendmap import ANALYSES
 from pendmap.errors import FitDiverged, InputError, NotWrittenError, ViewerError, one_line
 from pendmap.files import COMPLETE, STOPS
+from pendmap.formatting import WIDTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,20 +32,22 @@ _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 """Error numbers of a full disk: the request itself was valid."""
 
 _COMMANDS = {
-    "info": "Show the version, the instruction set used, the threads.",
-    "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     **{name: text for name, _, text in ANALYSES.values()},
     "merge": "Complete a result that was computed in parts, or whose run was stopped.",
     "look": "Describe a record: channels, rate, noise, releases, faults.",
-    "identify": "Find natural frequency, damping and friction in a free decay, by every method.",
+    "identify": "Find natural frequency, damping and friction in a free decay.",
     "compare": "Compare a model with records that it was not fitted to.",
     "diagnose": "Find where model and records disagree, and which effect is missing.",
+    "effects": "Show the library of effects: formula, parameters, which data reveal each.",
     "rig": "Write an experiment of a virtual rig, with its true parameters.",
     "paper": "Draw a figure of the paper, by its number.",
     "plot": "Draw a result again, without computing.",
     "view": "Open a recording in the Rerun viewer.",
+    "info": "Show the version, the instruction set used, the threads.",
 }
 """Commands and their descriptions, in the order of --help."""
+_SECTIONS = {"Maps and motions": "merge", "Records": "rig", "Other": "info"}
+"""Sections of --help, and the last command of each."""
 _NAMED = re.compile(
     r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL
 )
@@ -87,11 +90,23 @@ class _Commands(click.Group):
             raise click.UsageError(f"Invalid value for '{option}': {named['rest']}") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        with formatter.section("Commands"):
-            formatter.write_dl(list(_COMMANDS.items()))
+        rows, names = list(_COMMANDS.items()), list(_COMMANDS)
+        first = 0
+        for title, last in _SECTIONS.items():
+            end = names.index(last) + 1
+            with formatter.section(title):
+                formatter.write_dl(rows[first:end], col_max=12)
+            first = end
+        with formatter.section("Examples"):
+            for line in ("pendmap basins --p 1.7", "pendmap identify run.csv"):
+                formatter.write(f"  {line}\n")
+        formatter.write("\npendmap COMMAND --help shows the options of a command.\n")
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDTH},
+)
 @click.version_option(package_name="pendmap", message="pendmap %(version)s")
 def command() -> None:
     """Basin maps and attractors of parametrically excited pendulums.

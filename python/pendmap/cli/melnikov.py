@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
-
+from pendmap.cli.groups import new_command
 from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import output_options, simd_option
+from pendmap.cli.options import RESULTS, output_options, simd_option
 from pendmap.cli.show import show
 
 
-@click.command("melnikov")
+@new_command(
+    "melnikov",
+    "pendmap melnikov --omega 1 --theta-r 0.02",
+    "pendmap melnikov --torque 0.2 --json",
+)
 @model_options
 @simd_option
-@click.option("--quiet", is_flag=True, help="No summary.")
-@output_options()
+@output_options(*RESULTS)
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Compute the amplitude at which homoclinic tangles begin, by Melnikov's criterion.
 
     First order, with Coulomb friction and effects. A torque that keeps up a rotation tilts the
     potential: the threshold is that of the loop of upright rest. Writes melnikov.nc, melnikov.png
-    and melnikov.rrd if no output is named. --json alone writes no file.
+    and melnikov.rrd if no output is named.
     """
     model, outputs = begin(given, "melnikov")
 

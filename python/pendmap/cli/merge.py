@@ -5,18 +5,17 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-import click
-
-from pendmap.cli.options import drawing_options, progress_options, worker_options
+from pendmap.cli.groups import argument, new_command
+from pendmap.cli.options import machine_options, output_options, worker_options
 from pendmap.cli.show import Outputs, made_here, show
 from pendmap.cli.stored import workers
 
 
-@click.command("merge")
-@click.argument("store")
+@new_command("merge", "pendmap merge map.zarr", "pendmap merge map.zarr --workers 8 --out map.png")
+@argument("store", "STORE", str)
 @worker_options
-@progress_options
-@drawing_options
+@machine_options
+@output_options()
 def command(
     *,
     store: str,

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import option
+from pendmap.cli.groups import MODEL, SI
+from pendmap.cli.options import added, option
 from pendmap.cli.show import Outputs
 from pendmap.cli.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
@@ -31,10 +32,12 @@ _BARE = {
     "theta_r": "Coulomb friction Tr/w0^2.",
 }
 _SI = {
-    "stroke_mm": "Amplitude Y of the pivot's motion, half of its way, mm; with a model in SI.",
-    "frequency_hz": "Frequency of the drive, Hz; with a model in SI.",
+    "c_over_m": "Viscous damping c/m, 1/s.",
+    "Tr": "Coulomb friction Tr, rad/s^2.",
+    "stroke_mm": "Amplitude Y of the pivot's motion, half of its way, mm.",
+    "frequency_hz": "Frequency of the drive, Hz.",
 }
-_SAME = {"stroke_mm": "p", "frequency_hz": "omega"}
+_SAME = {"c_over_m": "gamma", "Tr": "theta_r", "stroke_mm": "p", "frequency_hz": "omega"}
 
 
 def varied_model_options(function: Command) -> Command:
@@ -64,15 +67,16 @@ def varied_model_options(function: Command) -> Command:
             given[which] = first / math.tau if frequency == "Omega" else first
         return function(**given, ranges=ranges)
 
-    vary = click.option(
+    vary = option(
         "--vary",
-        nargs=2,
-        multiple=True,
-        type=(str, RANGE),
-        metavar="NAME A:B:N",
-        help="A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
+        (str, RANGE),
+        "A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
         " model in SI also Omega, c_over_m, Tr, phi, frequency_hz (p is kept), stroke_mm (Omega"
         " is).",
+        nargs=2,
+        multiple=True,
+        metavar="NAME A:B:N",
+        group=MODEL,
     )
     return model_options(vary(with_ranges), NUMBER_OR_RANGE)
 
@@ -88,20 +92,20 @@ def model_options(
         "times are in s and velocities in rad/s; the options from --gamma to --theta-r have "
         "no dimensions there either.",
         metavar="FILE.toml",
+        group=SI,
     )
-    preset = option("--preset", click.Choice(sorted(PRESETS)), "A point of the paper's figure 2.")
-    function = model(preset(function))
-    for name, text in reversed((_BARE | _SI).items()):
-        if name in left_out:
-            continue
+    preset = option(
+        "--preset", click.Choice(sorted(PRESETS)), "A point of the paper's figure 2.", group=MODEL
+    )
+    parameters = []
+    for name, text in (_BARE | _SI).items():
         default = getattr(Pendulum(), name, None)
-        function = click.option(
-            f"--{name.replace('_', '-')}",
-            type=kind,
-            default=None,
-            help=text if default is None else f"{text}  [default: {default:g}]",
-        )(function)
-    return function
+        shown = text if default is None else f"{text}  [default: {default:g}]"
+        names = f"--{name.replace('_', '-').lower()} {name}"
+        if name not in left_out:
+            parameters.append(option(names, kind, shown, group=MODEL if name in _BARE else SI))
+    bare = len(_BARE.keys() - set(left_out))
+    return added(*parameters[:bare], preset, model, *parameters[bare:])(function)
 
 
 def model_from(given: dict[str, Any]) -> Pendulum | Rig:
@@ -112,13 +116,11 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     if model is not None and preset is not None:
         raise click.UsageError("one of --model and --preset must be left out, got both")
     for one, other in _SAME.items():
-        option = f"--{one.replace('_', '-')}"
+        option, same = (f"--{n.replace('_', '-').lower()}" for n in (one, other))
         if one in typed and other in typed:
-            raise click.UsageError(f"one of {option} and --{other} must be left out, got both")
+            raise click.UsageError(f"one of {option} and {same} must be left out, got both")
         if one in typed and model is None:
-            raise click.UsageError(
-                f"{option} must have --model of a file in SI; here it is --{other}"
-            )
+            raise click.UsageError(f"{option} must have --model of a file in SI; here it is {same}")
     for name in _SI:
         if name in typed:
             check(name, typed[name])
@@ -127,11 +129,13 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     return base if model is None else load_model(model, typed)
 
 
-def begin(given: dict[str, Any], name: str) -> tuple[Pendulum | Rig, Outputs]:
+def begin(
+    given: dict[str, Any], name: str, *, going_on: bool = False
+) -> tuple[Pendulum | Rig, Outputs]:
     """Remove the options of model and outputs from ``given``; refuse the model's file as output."""
     file = given["model"]
     model = model_from(given)
-    return model, Outputs.take(given, name, reads=[file])
+    return model, Outputs.take(given, name, reads=[file], going_on=going_on)
 
 
 def rig_from(path: Path) -> Rig:

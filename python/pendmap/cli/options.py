@@ -6,7 +6,9 @@ import os
 from typing import TYPE_CHECKING, Any
 
 import click
+import cloup
 
+from pendmap.cli.groups import ACCURACY, LONG, MACHINE, OUTPUT, RECORD, START, STARTS
 from pendmap.cli.types import (
     AXIS,
     INSTRUCTION_SET,
@@ -44,9 +46,11 @@ RESULTS = (".nc", ".zarr")  # Suffixes of files that a dataset is written to
 
 def option(
     names: str,
-    kind: click.ParamType[Any] | type[int],
+    kind: Any,  # noqa: ANN401 (of click)
     text: str,
-    default: float | None = None,
+    default: Any = None,  # noqa: ANN401 (of click)
+    *,
+    group: cloup.OptionGroup,
     **more: Any,  # noqa: ANN401 (of click)
 ) -> Decorator:
     """Return an option from its names, type and help, to which the default is appended.
@@ -54,8 +58,14 @@ def option(
     Names are separated by spaces; the parameter's name is the last if it differs.
     """
     if default is not None:
-        text += f"  [default: {default:g}]".replace("e-0", "e-")
-    return click.option(*names.split(), type=kind, default=default, help=text, **more)
+        shown = f"{default:g}" if isinstance(default, float | int) else str(default)
+        text += f"  [default: {shown}]".replace("e-0", "e-")
+    return cloup.option(*names.split(), type=kind, default=default, help=text, group=group, **more)
+
+
+def flag(names: str, text: str, *, group: cloup.OptionGroup) -> Decorator:
+    """Return an option without a value."""
+    return cloup.option(*names.split(), is_flag=True, help=text, group=group)
 
 
 def _use_simd(ctx: click.Context, _: click.Parameter, value: str | None) -> None:
@@ -76,42 +86,52 @@ simd_option = option(
     "Instruction set: avx512, avx2, sse, neon or portable.  [default: the quickest here]",
     callback=_use_simd,
     expose_value=False,
+    group=MACHINE,
 )
-tol_option = option("--tol", NUMBER, "Error after 5 periods.", 1e-6)
-threads_option = option("--threads", whole(1, MOST_THREADS), "Threads.  [default: one a processor]")
-quiet_option = click.option("--quiet", is_flag=True, help="No progress, no summary.")
-draws_option = option(
-    "--draws",
-    whole(2, MOST_DRAWS),
-    "Number of models drawn from the [covariance] of --model: uncertainty of the result.",
+tol_option = option("--tol", NUMBER, "Error after 5 periods.", 1e-6, group=ACCURACY)
+threads_option = option(
+    "--threads", whole(1, MOST_THREADS), "Threads.  [default: one a processor]", group=MACHINE
+)
+quiet_option = flag("--quiet", "No progress, no summary.", group=OUTPUT)
+overwrite_option = flag(
+    "--overwrite",
+    "Replace files that exist. Without it a default name gets a number, and a name that is given"
+    " is refused.",
+    group=OUTPUT,
 )
 rate_option = option(
     "--rate rate_hz",
     NUMBER,
     "Readings a second, for files without a column of times.",
     metavar="HZ",
+    group=RECORD,
 )
-plot_option = option("--plot", output_file(*PICTURES), "Figure: .png .svg .pdf.")
-rerun_option = option("--rerun", output_file(".rrd"), "Rerun recording: .rrd.")
-view_option = click.option(
-    "--view", is_flag=True, help="Write the recording and open the viewer on it."
-)
+
+
+def draws_option(group: cloup.OptionGroup) -> Decorator:
+    """Return the option --draws."""
+    text = "Number of models drawn from the [covariance] of --model: uncertainty of the result."
+    return option("--draws", whole(2, MOST_DRAWS), text, group=group)
+
+
+def verbose_option(what: str) -> Decorator:
+    """Return the option --verbose with the help ``what``."""
+    return flag("--verbose", what, group=OUTPUT)
 
 
 def json_option(further: str = "") -> Decorator:
     """Return the option --json, whose help ends with ``further``."""
-    text = "One JSON object on stdout"
-    return click.option("--json", "as_json", is_flag=True, help=f"{text}{further}.")
+    return flag("--json as_json", f"One JSON object on stdout{further}.", group=OUTPUT)
 
 
 def seed_option(what: str) -> Decorator:
     """Return the option --seed with the help ``what``."""
-    return option("--seed", whole(0, MOST_SEED), what, 0)
+    return option("--seed", whole(0, MOST_SEED), what, 0, group=ACCURACY)
 
 
 def max_periods_option(what: str) -> Decorator:
     """Return the option --max-periods with the help ``what``."""
-    return option("--max-periods", whole(1, MOST_PERIODS), what)
+    return option("--max-periods", whole(1, MOST_PERIODS), what, group=ACCURACY)
 
 
 def added(*options: Decorator) -> Decorator:
@@ -125,24 +145,25 @@ def added(*options: Decorator) -> Decorator:
     return add
 
 
-progress_options = added(threads_option, simd_option, quiet_option)
-reading_options = added(rate_option, simd_option, quiet_option)
+machine_options = added(threads_option, simd_option)
+reading_options = added(rate_option, simd_option)
 start_options = added(
-    option("--theta", NUMBER, "Angle at the start, rad.", 1.0),
-    option("--velocity", NUMBER, "Velocity at the start, in SI rad/s.", 0.0),
+    option("--theta", NUMBER, "Angle at the start, rad.", 1.0, group=START),
+    option("--velocity", NUMBER, "Velocity at the start, in SI rad/s.", 0.0, group=START),
 )
 
 
 def window_options(cells: int) -> Decorator:
     """Return the options of a window with this many cells on each side by default."""
     return added(
-        option("--theta", AXIS, f"Initial angles, rad.  [default: -pi:pi:{cells}]"),
+        option("--theta", AXIS, f"Initial angles, rad.  [default: -pi:pi:{cells}]", group=STARTS),
         option(
             "--velocity",
             AXIS,
             f"Initial velocities, in SI rad/s.  [default: -3:3:{cells}, in SI times w0]",
+            group=STARTS,
         ),
-        option("--grid", whole(1, MOST_CELLS), "Cells on each side of the window."),
+        option("--grid", whole(1, MOST_CELLS), "Cells on each side of the window.", group=STARTS),
     )
 
 
@@ -160,7 +181,7 @@ def take_window(given: dict[str, Any], cells: int, w0: float) -> Grid:
 
 
 search_options = added(
-    option("--starts", whole(1, MOST_CELLS), "Starts each.", 9),
+    option("--starts", whole(1, MOST_CELLS), "Starts each.", 9, group=ACCURACY),
     tol_option,
     max_periods_option("Bound after which a start is watched.  [default: depends on damping]"),
     seed_option("Shifts the starts, and draws the models of --draws."),
@@ -168,42 +189,56 @@ search_options = added(
 """Options of a search for attractors at each of many parameters."""
 
 
-drawing_options = added(plot_option, rerun_option, view_option, json_option("; alone, no files"))
 store_options = added(
-    click.option("--resume", is_flag=True, help="Go on with the unfinished run in --out F.zarr."),
-    click.option(
-        "--dry-run", is_flag=True, help="Only tell time, memory and disk, from timed samples."
-    ),
+    flag("--resume", "Go on with the unfinished run in --out F.zarr.", group=LONG),
+    flag("--dry-run", "Only tell time, memory and disk, from timed samples.", group=LONG),
     option(
         "--part",
         PART,
         "Compute part K of N of the tiles of --out F.zarr; pendmap merge completes it.",
         metavar="K/N",
+        group=LONG,
     ),
-    click.option(
-        "--mix", is_flag=True, help="Go on with a store begun where numbers are rounded otherwise."
-    ),
+    flag("--mix", "Go on with a store begun where numbers are rounded otherwise.", group=LONG),
 )
 """Options of analyses that are kept in a store."""
 worker_options = added(
-    option("--workers count", whole(1, MOST_WORKERS), "Processes of this machine that compute."),
-    option("--scheduler", TEXT, "Dask scheduler whose workers compute, like tcp://host:8786."),
+    option(
+        "--workers count",
+        whole(1, MOST_WORKERS),
+        "Processes of this machine that compute.",
+        group=LONG,
+    ),
+    option(
+        "--scheduler",
+        TEXT,
+        "Dask scheduler whose workers compute, like tcp://host:8786.",
+        group=LONG,
+    ),
 )
 """Options of who computes the tiles of a result."""
 
 
 def output_options(
-    suffixes: tuple[str, ...] = RESULTS, what: str = "Result", *, stored: bool = False
+    *suffixes: str, recording: bool = True, stored: bool = False, json: str = "; alone, no files"
 ) -> Decorator:
-    """Return --out with these suffixes, --plot, --rerun, --view and --json.
+    """Return --out, --plot, --rerun, --view, --overwrite, --json and --quiet.
 
-    What is ``stored`` may be at an address, and is kept tile by tile in a .zarr.
+    Suffixes are those of the files of data or text beside figures and recordings. What is
+    ``stored`` may be at an address, and is kept tile by tile in a .zarr.
     """
-    kinds = " or ".join(suffixes)
+    shown = ".rrd" if recording else ""
+    kinds = [*suffixes, *PICTURES, *([shown] if shown else [])]
+    text = f"File to write, as its suffix says: {' '.join(kinds)}; may be repeated."
     if stored:
-        text = (
-            f"{what}: {kinds}, a path or an address like s3://; .zarr keeps tiles as they are done."
-        )
-        return added(option("--out", output_or_address(*suffixes), text), drawing_options)
-    out = option("--out", output_file(*suffixes), f"{what}: {kinds}.")
-    return added(out, drawing_options)
+        text += " A .zarr, also at an address like s3://, keeps tiles as they are done."
+    kind = output_or_address(*kinds) if stored else output_file(*kinds)
+    options = [option("--out", kind, text, multiple=True, group=OUTPUT)]
+    figure = "Figure: .png .svg .pdf."
+    options.append(option("--plot", output_file(*PICTURES), figure, group=OUTPUT))
+    if recording:
+        text = "Rerun recording: .rrd."
+        options.append(option("--rerun", output_file(".rrd"), text, group=OUTPUT))
+        text = "Write the recording and open the viewer on it."
+        options.append(flag("--view", text, group=OUTPUT))
+    return added(*options, overwrite_option, json_option(json), quiet_option)

@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.options import json_option, option, seed_option, simd_option
-from pendmap.cli.show import table, write_all, write_json
+from pendmap.cli.groups import OUTPUT, argument, new_command
+from pendmap.cli.options import (
+    json_option,
+    option,
+    overwrite_option,
+    quiet_option,
+    seed_option,
+    simd_option,
+)
+from pendmap.cli.show import free_name, keep_files, write_all
+from pendmap.cli.text import say, table, write_json
 from pendmap.cli.types import PICTURES, default_file, output_file
 
 if TYPE_CHECKING:
@@ -18,29 +27,33 @@ if TYPE_CHECKING:
 _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
 
 
-@click.command("paper")
-@click.argument("figure", metavar="FIGURE", nargs=-1, required=True)
+@new_command("paper", "pendmap paper 2", "pendmap paper table1", "pendmap paper all --out figures")
+@argument("figure", "FIGURE", str, nargs=-1, required=True)
+@seed_option("Of the rig's noise.")
+@simd_option
 @option(
     "--out",
     click.Path(path_type=Path, file_okay=False),
     "Folder for the files, made if it is not there.  [default: the current one]",
     metavar="DIR",
+    group=OUTPUT,
 )
 @option(
     "--plot",
     output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
+    group=OUTPUT,
 )
-@seed_option("Of the rig's noise.")
+@overwrite_option
 @json_option()
-@simd_option
-@click.option("--quiet", is_flag=True, help="Do not list the files written.")
+@quiet_option
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
     seed: int,
+    overwrite: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -62,11 +75,10 @@ def command(  # noqa: PLR0913 (an option each)
     if out is not None:
         out.mkdir(exist_ok=True)  # the parent folder must exist, as for every other file
     folder = out or Path()
-    for key in keys if plot is None else ():  # before anything is computed
-        default_file(folder / _name(key))
+    places = _places(keys, folder, plot, overwrite=overwrite)  # before anything is computed
     if _LONG in keys and not quiet:
         click.echo(f"Figure {_LONG} takes about 2 minutes.", err=True)
-    written = write_all(_files(keys, folder, plot, seed))
+    written = write_all(_files(places, seed))
     if as_json:
         write_json({"files": written})
     elif not quiet:
@@ -75,25 +87,33 @@ def command(  # noqa: PLR0913 (an option each)
 
             found = figures.report(seed)
             for each in (methods_table(found), table1_table(found), figures.printed_table()):
-                click.echo(table(*each))
+                say(table(*each))
         written.say()
     written.check()
 
 
-def _files(
-    keys: Sequence[str], out: Path, plot: Path | None, seed: int
-) -> Iterator[tuple[Callable[[Path], Path], Path]]:
+def _places(
+    keys: Sequence[str], folder: Path, plot: Path | None, *, overwrite: bool
+) -> dict[str, Path]:
+    """Return the file of each figure; refuse those that cannot be written, or exist."""
+    if plot is not None:
+        if not overwrite:
+            keep_files({plot: "--plot"})
+        return dict.fromkeys(keys, plot)
+    places = {}
+    for key in keys:
+        name, suffix = ("table_1", ".csv") if key.startswith("table") else (f"figure_{key}", ".png")
+        name, _ = free_name(str(folder / name), [suffix], overwrite=overwrite)
+        places[key] = default_file(name + suffix)
+    return places
+
+
+def _files(places: dict[str, Path], seed: int) -> Iterator[tuple[Callable[[Path], Path], Path]]:
     from pendmap.paper import figures
 
-    for key in keys:
-        path = plot or out / _name(key)
+    for key, path in places.items():
         if path.suffix != ".csv":
             yield functools.partial(figures.draw, key, seed=seed), path
         if key == figures.TABLE:
             csv = path.with_suffix(".csv")
             yield lambda to: figures.write_table(figures.report(seed), to), csv
-
-
-def _name(key: str) -> str:
-    """Return a figure's file, or that of the table."""
-    return "table_1.csv" if key.startswith("table") else f"figure_{key}.png"

@@ -2,71 +2,89 @@
 
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import option
-from pendmap.cli.show import write_all
-from pendmap.cli.types import FILE, PICTURES, default_file, output_file
+from pendmap.cli.groups import argument, group, new_command
+from pendmap.cli.options import flag, option, output_options
+from pendmap.cli.show import Outputs, write_all
+from pendmap.cli.types import OptionType
 from pendmap.errors import InputError, named
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@click.command("plot")
-@click.argument("file", type=FILE)
+_LAYERS = {
+    "basins": "labels settle turns exponent",
+    "basins over draws": "probability entropy",
+    "a map": "kinds exponent attractors period winding undecided",
+    "a map over draws": "certainty",
+    "a trajectory": "history energy phase section",
+    "a bifurcation diagram": "theta velocity",
+    "critical curves": "omega-p e-alpha2",
+}
+"""Names of layers, by what has them."""
+_SHOWN = "; ".join(f"{', '.join(names.split())} of {what}" for what, names in _LAYERS.items())
+_LAYER = OptionType("name", str, lambda: " ".join(_LAYERS.values()).split())
+_LOOK = group("Look", "--layer settle --width 86 --no-title")
+
+
+@new_command(
+    "plot",
+    "pendmap plot basins.nc --layer settle --out settle.svg",
+    "pendmap plot basins.nc --width 86 --no-title --out column.pdf",
+    "pendmap plot basins.nc --out basins.rrd",
+)
+@argument("file", "FILE")
 @option(
-    "--out --plot out",
-    output_file(*PICTURES),
-    "Figure to write: .png .svg .pdf.  [default: FILE with .png]",
-)
-@click.option(
     "--layer",
-    help="One part only: labels, settle, turns, exponent of basins, over draws probability and"
-    " entropy; kinds, exponent, attractors, period, winding, undecided, 'share KIND', over draws"
-    " certainty of a map; history, energy, phase, section of a trajectory; theta, velocity of a"
-    " bifurcation diagram; omega-p, e-alpha2 of critical curves.",
+    _LAYER,
+    f"One part only: {_SHOWN}; 'share KIND' of a map.",
+    group=_LOOK,
 )
-@click.option("--size", help="Width x height in inches, like 8x4.")
-@option("--width", click.FloatRange(40, 500), "Width in mm: 86 is a journal's column, 178 are two.")
-@click.option(
-    "--no-title", is_flag=True, help="No title and subtitle, for a figure with a caption."
+@option("--size", str, "Width x height in inches, like 8x4.", group=_LOOK)
+@option(
+    "--width",
+    click.FloatRange(40, 500),
+    "Width in mm: 86 is a journal's column, 178 are two.",
+    group=_LOOK,
 )
-@option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.")
-@click.option("--colormap", help="Colours of the fields, by matplotlib's names.")
-@click.option("--quiet", is_flag=True, help="Do not list the files written.")
+@flag("--no-title", "No title and subtitle, for a figure with a caption.", group=_LOOK)
+@option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.", group=_LOOK)
+@option("--colormap", str, "Colours of the fields, by matplotlib's names.", group=_LOOK)
+@output_options(json="")
 def command(  # noqa: PLR0913 (the options above)
     *,
     file: Path,
-    out: Path | None,
     layer: str | None,
     size: str | None,
     width: float | None,
     no_title: bool,
     dpi: int | None,
     colormap: str | None,
-    quiet: bool,
+    **given: Any,  # noqa: ANN401 (outputs)
 ) -> None:
-    """Draw a result again, in another size, colours or layer, without computing."""
+    """Draw a result again, in another size, colours or layer, without computing.
+
+    FILE is a result, .nc or .zarr. Figures and recordings are written; if none is named, FILE.png.
+    """
     if size and width:
         raise click.UsageError("only one of --size and --width must be given, got both")
     look: dict[str, Any] = {"size": _size(size), "width": width, "title": not no_title}
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
-    target = out or default_file(file.with_suffix(".png"))
+    name = str(file.with_suffix(""))
+    outputs = Outputs.take(given, name, reads=[file], default=["plot"])
 
-    from pendmap import render
     from pendmap.files.dataset import load
 
-    draw = functools.partial(
-        render.draw, load(file), layer=layer, dpi=dpi, colormap=colormap, **look
-    )
+    dataset = load(file)
+    look |= {"layer": layer, "dpi": dpi, "colormap": colormap}
     with named(str(file)):
         try:
-            written = write_all([(draw, target)])
+            written = write_all(outputs.files(dataset, None, look=look))
         except (InputError, MemoryError):
             raise
         except Exception as error:
@@ -74,9 +92,7 @@ def command(  # noqa: PLR0913 (the options above)
             raise InputError(
                 f"cannot be drawn: its content is not a result's: {type(error).__name__}: {error}"
             ) from error
-    if written and not quiet:
-        written.say()
-    written.check()
+    outputs.finish(written, lambda: {"files": [*written]}, [])
 
 
 def _size(text: str | None) -> tuple[float, float] | None:

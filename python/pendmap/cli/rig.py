@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.options import json_option, option
-from pendmap.cli.show import write_all, write_json
-from pendmap.cli.types import FILE, NUMBER, PICTURES, output_file
+from pendmap.cli.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.options import flag, json_option, option, quiet_option
+from pendmap.cli.show import keep_files, write_all
+from pendmap.cli.text import say, write_json
+from pendmap.cli.types import EFFECT, FILE, NUMBER, PICTURES, output_file
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -19,54 +21,81 @@ if TYPE_CHECKING:
     from pendmap import virtual_rig
 
 
-@click.command("rig")
-@click.argument("name", required=False, metavar="[free_decay|forced|hidden]")
-@option("--out", FILE, "Folder to write.", metavar="DIR")
-@option("--seed", click.IntRange(min=0), "Draws all.", 0)
-@click.option(
-    "--effect",
-    "effects",
-    multiple=True,
-    metavar="NAME",
-    help="Effect to hide, more than once for several: a name of --list, also with its parameters"
-    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
+_RUNS = group("Runs", "--free 3 --forced 2 --duration 40")
+_HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
+_RIG = group("Rig", "--w0 6.2 --c-over-m 0.05 --tr 0.08")
+_SENSOR = group("Sensor", "--noise 0.2 --counts 1024")
+
+
+@new_command(
+    "rig",
+    "pendmap rig free_decay --free 3 --out decay",
+    "pendmap rig hidden --effect quadratic_drag --seed 3 --out hidden",
 )
-@option("--size", NUMBER, "Scales drawn effects.", 1.0)
-@option("--noise", NUMBER, "Degrees.  [default: 0.1; hidden: 0.05 to 0.5]")
-@option("--correlation", NUMBER, "AR(1) of the noise.", 0.0)
-@option("--counts", int, "A turn; 0: no steps.", 4096)
-@option("--rate", NUMBER, "Samples a second, Hz.", 100.0)
-@option("--jitter", NUMBER, "Of the clock, s rms.", 0.0)
-@option("--dropouts", NUMBER, "Share of samples lost.", 0.0)
-@option("--outliers", NUMBER, "Share that is false.", 0.0)
+@argument("name", "[free_decay|forced|hidden]", str, required=False)
+@option("--free", int, "Free decays.  [default: 1; forced: 0; hidden: 5]", group=_RUNS)
+@option("--forced", int, "Runs under drive.  [default: 0; forced and hidden: 4]", group=_RUNS)
+@option(
+    "--duration",
+    NUMBER,
+    "Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
+    group=_RUNS,
+)
+@option("--seed", click.IntRange(min=0), "Draws all.", 0, group=_RUNS)
+@option(
+    "--effect effects",
+    EFFECT,
+    "Effect to hide, more than once for several: a name of --list, also with its parameters"
+    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
+    multiple=True,
+    group=_HIDDEN,
+)
+@option("--size", NUMBER, "Scales drawn effects.", 1.0, group=_HIDDEN)
 @option(
     "--mess",
     NUMBER,
     "Weak disturbances in addition to the effects (texture of the bearing, drifting zero, slow "
     "noise), in multiples of the noise.",
     0.0,
+    group=_HIDDEN,
 )
-@option("--free", int, "Free decays.  [default: 1; forced: 0; hidden: 5]")
-@option("--forced", int, "Runs under drive.  [default: 0; forced and hidden: 4]")
+@flag("--list listing", "List the effects and stop.", group=_HIDDEN)
+@option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]", group=_RIG)
 @option(
-    "--duration",
+    "--c-over-m",
     NUMBER,
-    "Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
+    "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]",
+    group=_RIG,
 )
-@option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]")
-@option("--c-over-m", NUMBER, "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]")
-@option("--tr friction", NUMBER, "Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]")
-@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.")
-@click.option("--replace", is_flag=True, help="Replace an experiment that is there.")
-@click.option("--list", "listing", is_flag=True, help="List the effects and stop.")
+@option(
+    "--tr friction",
+    NUMBER,
+    "Coulomb friction Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]",
+    group=_RIG,
+)
+@option("--theta-r", NUMBER, "The same without dimensions: Tr/w0^2.", group=_RIG)
+@option("--noise", NUMBER, "Degrees.  [default: 0.1; hidden: 0.05 to 0.5]", group=_SENSOR)
+@option("--correlation", NUMBER, "AR(1) of the noise.", 0.0, group=_SENSOR)
+@option("--counts", int, "A turn; 0: no steps.", 4096, group=_SENSOR)
+@option("--rate", NUMBER, "Samples a second, Hz.", 100.0, group=_SENSOR)
+@option("--jitter", NUMBER, "Of the clock, s rms.", 0.0, group=_SENSOR)
+@option("--dropouts", NUMBER, "Share of samples lost.", 0.0, group=_SENSOR)
+@option("--outliers", NUMBER, "Share that is false.", 0.0, group=_SENSOR)
+@option("--out", FILE, "Folder to write.", metavar="DIR", group=OUTPUT)
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=OUTPUT)
+@flag(
+    "--overwrite --replace overwrite",
+    "Replace an experiment or a figure that is there.",
+    group=OUTPUT,
+)
 @json_option()
-@click.option("--quiet", is_flag=True, help="Do not list the files written.")
+@quiet_option
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,
     out: Path | None,
     plot: Path | None,
-    replace: bool,
+    overwrite: bool,
     listing: bool,
     as_json: bool,
     quiet: bool,
@@ -87,7 +116,9 @@ def command(  # noqa: PLR0913 (an option each)
         missing = "NAME (free_decay, forced or hidden)" if name is None else "--out DIR"
         raise click.UsageError(f"{missing} is missing")
     request = virtual_rig.Request(name, **given)
-    where = virtual_rig.places(out, replace=replace)
+    where = virtual_rig.places(out, replace=overwrite)
+    if plot is not None and not overwrite:
+        keep_files({plot: "--plot"})
     experiment = virtual_rig.make(request)
     both = f"{where.experiment}, {where.truth}"
 
@@ -108,10 +139,10 @@ def command(  # noqa: PLR0913 (an option each)
         if whole:
             seconds = sum(run.plan.duration for run in experiment.runs)
             runs = counted(len(experiment.runs), "run")
-            click.echo(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
-            click.echo(f"The truth: {where.truth}")
+            say(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
+            say(f"The truth: {where.truth}")
         if drawn:
-            click.echo(f"The records: {drawn}")
+            say(f"The records: {drawn}")
     written.check()
 
 
@@ -143,5 +174,4 @@ def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:
         write_json({"effects": effects})
         return
     for effect in effects:
-        click.echo(f"{effect['name']:<26} {effect['formula']}")
-        click.echo(f"{'':<26} {effect['parameters']}")
+        say(f"{effect['name']}\n    {effect['formula']}\n    {effect['parameters']}")

@@ -7,8 +7,7 @@ import dataclasses
 import functools
 import importlib
 import importlib.util
-import json
-import math
+import itertools
 import shlex
 import sys
 import time
@@ -18,10 +17,11 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from pendmap.cli.options import RESULTS
-from pendmap.cli.types import Address, default_file
+from pendmap.cli.text import say, write_json
+from pendmap.cli.types import PICTURES, REPORTS, Address, default_file
 from pendmap.errors import InputError, NotWrittenError, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
-from pendmap.formatting import columns, duration
+from pendmap.formatting import duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pendmap.analysis.result import Schema
-    from pendmap.formatting import Readable
 
     Write = Callable[[Path], Path | str]
 
@@ -71,6 +70,15 @@ class Forecast:
             self._say(f"This takes about {duration(now - self._began + left)}.")
 
 
+_FIELDS: Final = {
+    **dict.fromkeys(PICTURES, "plot"),
+    **dict.fromkeys(REPORTS, "report"),
+    ".rrd": "rerun",
+}
+"""What a file of ``--out`` is, by its suffix; other files are the result itself."""
+_SAME: Final = {"out": ["out", "address"], "address": ["out", "address"]}
+
+
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Output files and options of a command."""
@@ -84,37 +92,55 @@ class Outputs:
     as_json: bool = False
     quiet: bool = False
     left_out: str = ""
+    kept: tuple[str, ...] = ()
 
     @classmethod
-    def take(
+    def take(  # noqa: PLR0913 (by name)
         cls,
         given: dict[str, Any],
         name: str,
         suffix: str = RESULTS[0],
         reads: Iterable[Path | None] = (),
         *,
-        default: bool = True,
+        default: bool | Collection[str] = True,
+        going_on: bool = False,
     ) -> Outputs:
         """Remove the output options from ``given``; if none is given, by default all files.
 
-        Without the viewer the recording is left out of all files.
+        Names of ``default`` choose among these. Without the viewer the recording is left out of
+        them. A file that exists is kept, unless --overwrite is given or a run in it goes on.
         """
+        overwrite, named_files = given.pop("overwrite"), given.pop("out")
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
+        taken: dict[str, Any] = {field: given.pop(field) for field in fields} | {"out": None}
+        options = {taken[f]: f"--{f}" for f in ("plot", "report", "rerun") if taken.get(f)}
+        for path in named_files:
+            field = (
+                "address" if isinstance(path, Address) else _FIELDS.get(path.suffix.lower(), "out")
+            )
+            other = next((taken[f] for f in _SAME.get(field, [field]) if taken.get(f)), None)
+            if other is not None:
+                raise click.UsageError(f"one of {other} and {path} must be left out, got both")
+            taken[field] = path
+            options[path] = "--out"
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
-        taken = {field: given.pop(field) for field in fields}
-        if isinstance(taken.get("out"), Address):
-            taken |= {"address": taken["out"], "out": None}
-        if default and not any(value for field, value in taken.items() if field != "quiet"):
-            if "rerun" in taken and importlib.util.find_spec("rerun") is None:
-                taken["left_out"] = name + files.pop("rerun")
-            taken |= {field: default_file(name + files[field]) for field in files if field in taken}
-        if taken.get("view") and taken["rerun"] is None:
-            taken["rerun"] = default_file(f"{name}.rrd")
-        if "report" in taken and taken["out"] is None:  # a diagnosis always writes its model
-            taken["out"] = default_file(name + suffix)
-        outputs = cls(**taken)
-        places = {"--out": [outputs.out], "--plot": [outputs.plot], "--rerun": [outputs.rerun]}
-        keep_inputs(reads, places | {"--report": _report_files(outputs.report)})
+        wanted = {f: end for f, end in files.items() if f in {*fields, "out"}}
+        if not isinstance(default, bool):
+            wanted = {f: end for f, end in wanted.items() if f in default}
+        if not default or any(value for f, value in taken.items() if f != "quiet"):
+            wanted = {}
+            if taken.get("view") and taken["rerun"] is None:
+                wanted["rerun"] = ".rrd"
+            if "report" in taken and taken["out"] is None:  # a diagnosis always writes its model
+                wanted["out"] = suffix
+        elif "rerun" in wanted and importlib.util.find_spec("rerun") is None:
+            taken["left_out"] = name + wanted.pop("rerun")
+        free, kept = free_name(name, wanted.values(), overwrite=overwrite)
+        taken |= {f: default_file(free + end) for f, end in wanted.items()}
+        outputs = cls(**taken, kept=kept)
+        keep_inputs(reads, outputs, options)
+        if not overwrite and not going_on:
+            keep_files(options)
         if outputs.view:
             from pendmap import viewer
 
@@ -161,22 +187,14 @@ class Outputs:
         if not sys.stderr.isatty():
             yield Forecast(functools.partial(click.echo, err=True)).report
             return
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from pendmap.engine.bar import ProgressBar
 
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(name, total=None)
-            forecast = Forecast(bar.console.print)
+        with ProgressBar(name, leave=False) as bar:
+            forecast = Forecast(bar.write)
 
             def report(done: int, total: int) -> None:
                 forecast.report(done, total)
-                bar.update(task, completed=done, total=total or None)
+                bar(done, total)
 
             yield report
 
@@ -185,8 +203,12 @@ class Outputs:
         result: Any,  # noqa: ANN401 (a dataset or a report)
         save: Write | None,
         record: str = "record",
+        look: Mapping[str, Any] | None = None,
     ) -> Iterator[tuple[Write, Path]]:
-        """Yield writer and path of each file; import matplotlib and Rerun only when needed."""
+        """Yield writer and path of each file; import matplotlib and Rerun only when needed.
+
+        ``look`` has arguments of the figure.
+        """
         if self.out is not None and save is not None:
             yield save, self.out
         for path, module, write in (
@@ -196,7 +218,8 @@ class Outputs:
         ):
             if path is not None:
                 home = importlib.import_module(f"pendmap.{module}")
-                yield functools.partial(getattr(home, write), result), path
+                more = look or {} if write == "draw" else {}
+                yield functools.partial(getattr(home, write), result, **more), path
 
     def finish(
         self, written: Written, fields: Callable[[], dict[str, Any]], lines: Iterable[str]
@@ -206,10 +229,12 @@ class Outputs:
             write_json(fields())
         elif not self.quiet:
             for line in lines:
-                click.echo(line)
+                say(line)
             written.say()
+            if written and self.kept:
+                say(f"Kept: {', '.join(self.kept)} (--overwrite replaces)")
             if written and self.left_out:
-                click.echo(f"Left out: {self.left_out}, which needs the extra pendmap[viewer]")
+                say(f"Left out: {self.left_out}, which needs the extra pendmap[viewer]")
         written.check()
         recording = written.name(self.rerun) if self.view else None
         if recording is not None:
@@ -218,16 +243,39 @@ class Outputs:
             viewer.open_viewer(recording)
 
 
-def _report_files(report: Path | None) -> list[Path]:
+def _report_files(report: Path) -> list[Path]:
     """Return the files of a report without its figures; a folder holds one of either kind."""
-    if report is None:
-        return []
     in_folder = report.is_dir() or not report.suffix
     return [report / "report.html", report / "report.md"] if in_folder else [report]
 
 
+def free_name(
+    name: str, suffixes: Collection[str], *, overwrite: bool
+) -> tuple[str, tuple[str, ...]]:
+    """Return a name under which no file has these suffixes, and the files that have ``name``."""
+    there = tuple(name + end for end in suffixes if Path(name + end).exists())
+    if overwrite or not there:
+        return name, ()
+    numbered = (f"{name}-{number}" for number in itertools.count(2))
+    return next(n for n in numbered if not any(Path(n + e).exists() for e in suffixes)), there
+
+
+def keep_files(options: Mapping[Path | Address, str]) -> None:
+    """Refuse files that exist, named by their option."""
+    for path, option in options.items():
+        files = [] if isinstance(path, Address) else [path]
+        if option == "--report" and files:
+            files = _report_files(files[0])
+        for file in files:
+            if file.exists():
+                raise click.UsageError(
+                    f"Invalid value for '{option}': {str(file)!r}: must be a new file, got one that"
+                    " exists: --overwrite replaces it"
+                )
+
+
 def keep_inputs(
-    inputs: Iterable[Path | None], outputs: Mapping[str, Iterable[Path | None]]
+    inputs: Iterable[Path | None], outputs: Outputs, options: Mapping[Path | Address, str]
 ) -> None:
     """Refuse outputs, named by their option, that are inputs or folders of inputs."""
 
@@ -236,12 +284,15 @@ def keep_inputs(
         return any(output.samefile(place) for place in places)
 
     read = [path for path in inputs if path is not None and path.exists()]
-    for option, paths in outputs.items():
-        for output in paths:
-            if output is not None and output.exists() and any(lost(path, output) for path in read):
+    for named_file in (outputs.out, outputs.plot, outputs.rerun, outputs.report):
+        if named_file is None:
+            continue
+        files = _report_files(named_file) if named_file is outputs.report else [named_file]
+        for output in files:
+            if output.exists() and any(lost(path, output) for path in read):
                 raise click.UsageError(
-                    f"Invalid value for '{option}': {str(output)!r}: is an input, which would be "
-                    "lost: it must be another file"
+                    f"Invalid value for '{options.get(named_file, '--out')}': {str(output)!r}: is"
+                    " an input, which would be lost: it must be another file"
                 )
 
 
@@ -266,11 +317,6 @@ def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Sequence
     outputs.finish(written, lambda: schema.json(dataset), lines)
 
 
-def write_json(fields: dict[str, Any]) -> None:
-    """Write one JSON object to stdout."""
-    click.echo(json.dumps(plain(fields), allow_nan=False))
-
-
 class Written(list[str]):
     """Names of the files that are complete, and why others are not."""
 
@@ -286,7 +332,7 @@ class Written(list[str]):
     def say(self) -> None:
         """Report the files that are complete, if any are."""
         if self:
-            click.echo("Written: " + ", ".join(map(one_line, self)))
+            say("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
         """Raise an error if a file was refused, or could not be written to the disk."""
@@ -319,30 +365,3 @@ def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Wri
             except OSError as error:
                 written.missed.append(f"cannot write {path}: {error.strerror or error}")
     return written
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table with a bold header and aligned columns, whatever the terminal's width."""
-    first, *others = columns(head, rows).split("\n")
-    return "\n".join([click.style(first, bold=True), *others])
-
-
-def doubts_first(found: Readable, doubts: Collection[str]) -> Iterator[str]:
-    """Yield doubts, then the tables and lines of a result's text without them."""
-    yield from doubts
-    tables, lines = found.text_parts()
-    yield from (table(head, rows) for head, rows in tables if rows)
-    yield from (line for line in lines if line not in doubts)
-
-
-def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
-    """Convert numpy numbers to Python's, and numbers that are not finite to None."""
-    if isinstance(value, dict):
-        return {str(key): plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -4,41 +4,48 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
-
+from pendmap.cli.groups import ACCURACY, OUTPUT, group, new_command
 from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import option, output_options, simd_option, start_options
+from pendmap.cli.options import RESULTS, flag, option, output_options, simd_option, start_options
 from pendmap.cli.show import show
 from pendmap.cli.types import NUMBER, whole
 from pendmap.errors import MOST_SAMPLES, named
 
+_ANALYSIS = group("Trajectory", "--until 500 --samples 128")
 _VIEWER = "127.0.0.1:9876"
 
 
-@click.command("simulate")
+@new_command(
+    "simulate",
+    "pendmap simulate --p 1.5 --omega 0.87 --theta-r 0.2",
+    "pendmap simulate --preset fig2b --until 20000 --lyapunov",
+    "pendmap simulate --preset fig2c --theta 1 --until 600 --out chaos.png",
+)
 @model_options
 @start_options
-@option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0)
-@option("--tol", NUMBER, "Error after 5 periods.", 1e-9)
-@option("--samples", whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]")
-@click.option("--lyapunov", is_flag=True, help="Also the Lyapunov exponent of this stretch.")
-@click.option(
+@option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0, group=_ANALYSIS)
+@option("--tol", NUMBER, "Error after 5 periods.", 1e-9, group=ACCURACY)
+@option(
+    "--samples", whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]", group=_ANALYSIS
+)
+@flag("--lyapunov", "Also the Lyapunov exponent of this stretch.", group=_ANALYSIS)
+@option(
     "--live",
+    str,
+    f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
     is_flag=False,
     flag_value=_VIEWER,
     metavar="[HOST:PORT]",
-    help=f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
+    group=OUTPUT,
 )
 @simd_option
-@click.option("--quiet", is_flag=True, help="No summary.")
-@output_options()
+@output_options(*RESULTS)
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Integrate one trajectory: time history, energy, phase plane, Poincaré section.
 
-    Writes simulate.nc, simulate.png and simulate.rrd if no output is named. --json alone writes no
-    file. --view writes the recording it opens: simulate.rrd, or what --rerun names. --live needs a
-    viewer that runs (rerun --bind 127.0.0.1); Ctrl-C then ends the trajectory where it is, and what
-    was computed is written.
+    Writes simulate.nc, simulate.png and simulate.rrd if no output is named. --live needs a viewer
+    that runs (rerun --bind 127.0.0.1); Ctrl-C then ends the trajectory where it is, and what was
+    computed is written.
     """
     address = given.pop("live")
     model, outputs = begin(given, "simulate")

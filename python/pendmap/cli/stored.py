@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.show import made_here, show, write_json
+from pendmap.cli.show import made_here, show
+from pendmap.cli.text import say, write_json
 from pendmap.cli.types import Address
 
 if TYPE_CHECKING:
@@ -31,6 +32,11 @@ class Kept:
     count: int | None
     scheduler: str | None
     dry_run: bool
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether an existing store is not replaced."""
+        return self.resume or self.part is not None or self.dry_run
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Kept:
@@ -99,4 +105,4 @@ def show_part(dataset: xr.Dataset, outputs: Outputs) -> None:
     if outputs.as_json:
         write_json(dataset.attrs)
     elif not outputs.quiet:
-        click.echo(f"{title}\n{summary}")
+        say(f"{title}\n{summary}")

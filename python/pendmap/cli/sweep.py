@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli.analysis import analysis_command
+from pendmap.cli.groups import group
 from pendmap.cli.model_options import varied_model_options
 from pendmap.cli.options import (
     max_periods_option,
@@ -26,21 +25,23 @@ if TYPE_CHECKING:
 
 
 _CELLS = 100  # Default number of cells on each side
+_ANALYSIS = group("Analysis", "--layer-periods 10")
 
 
 @analysis_command(
     "sweep",
-    click.option(
-        "--analysis",
-        default="basins",
-        show_default=True,
-        help="What is done for each model: basins.",
-    ),
     window_options(_CELLS),
     tol_option,
     max_periods_option("Bound after which a start is undecided.  [default: as for basins]"),
-    option("--layer-periods", whole(1, MOST_PERIODS), "Periods of planes without basins."),
+    option("--analysis", str, "What is done for each model: basins.", "basins", group=_ANALYSIS),
+    option(
+        "--layer-periods",
+        whole(1, MOST_PERIODS),
+        "Periods of planes without basins.",
+        group=_ANALYSIS,
+    ),
     seed_option("Shifts the samples."),
+    examples=("pendmap sweep --p 0.5:1.7:25 --grid 60",),
     model=varied_model_options,
     stored=True,
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.analysis import analysis_command
+from pendmap.cli.groups import group
 from pendmap.cli.model_options import model_options
 from pendmap.cli.options import draws_option, option, seed_option
 from pendmap.cli.types import NUMBER, VALUES
@@ -16,18 +17,31 @@ if TYPE_CHECKING:
     from pendmap.cli.show import Outputs
 
 
+_ANALYSIS = group("Analysis", "--omega 0.5:3:200 --p-max 6")
+
+
 @analysis_command(
     "tongues",
-    option("--omega omegas", VALUES, "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]"),
-    option("--p-max", NUMBER, "Largest amplitude.", 6.0),
-    click.option(
-        "--plane",
-        type=click.Choice(["omega-p", "e-alpha2"]),
-        default="omega-p",
-        help="Plane drawn: of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 = 1/omega^2.",
+    option(
+        "--omega omegas",
+        VALUES,
+        "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
+        group=_ANALYSIS,
     ),
-    draws_option,
+    option("--p-max", NUMBER, "Largest amplitude.", 6.0, group=_ANALYSIS),
+    option(
+        "--plane",
+        click.Choice(["omega-p", "e-alpha2"]),
+        "Plane drawn: of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 = 1/omega^2.",
+        "omega-p",
+        group=_ANALYSIS,
+    ),
+    draws_option(_ANALYSIS),
     seed_option("Draws the models."),
+    examples=(
+        "pendmap tongues --omega 0.5:3:200 --p-max 6",
+        "pendmap tongues --gamma 0 --plane e-alpha2 --out mathieu.pdf",
+    ),
     model=functools.partial(model_options, left_out=("omega", "frequency_hz")),
 )
 def command(_: object, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noqa: ANN401

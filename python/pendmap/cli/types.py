@@ -10,24 +10,41 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, MissingExtraError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 T = TypeVar("T")
 
 PICTURES = (".png", ".svg", ".pdf")  # Suffixes of figures
+REPORTS = (".html", ".md")  # Suffixes of reports
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 
 class OptionType(click.ParamType[T], Generic[T]):
-    """Type of an option, from its name and a function that reads a text or raises InputError."""
+    """Type of an option, from its name and a function that reads a text or raises InputError.
 
-    def __init__(self, name: str, read: Callable[[str], T]) -> None:
-        self.name, self.read = name, read
+    ``known`` returns the values that a shell completes.
+    """
+
+    def __init__(
+        self, name: str, read: Callable[[str], T], known: Callable[[], Iterable[str]] | None = None
+    ) -> None:
+        self.name, self.read, self._known = name, read, known
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Return the known values that begin with what is typed."""
+        known = self._known() if self._known is not None else ()
+        return [CompletionItem(value) for value in known if value.startswith(incomplete)]
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> T:
         """Return the value of a text; other values are returned unchanged."""
@@ -187,7 +204,7 @@ def default_file(name: str | Path) -> Path:
 
 def _report(text: str) -> Path:
     """Refuse a report that cannot be written: a file, or a folder, which may be missing."""
-    path, suffixes = Path(text), (".html", ".md")
+    path, suffixes = Path(text), REPORTS
     if path.suffix and not path.is_dir():
         return _output(suffixes, text)
     if path.exists() and not path.is_dir():
@@ -240,6 +257,18 @@ def _part(text: str) -> tuple[int, int]:
     return number, parts
 
 
+def _effects() -> Iterable[str]:
+    from pendmap.model.effects import effects
+
+    return [effect.name for effect in effects()]
+
+
+def _methods() -> Iterable[str]:
+    from pendmap.identification import METHODS
+
+    return METHODS
+
+
 FILE: click.Path = click.Path(path_type=Path)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
@@ -249,6 +278,8 @@ NUMBER_OR_RANGE = OptionType[float | AxisText](
 )
 PART = OptionType("K/N", _part)
 TEXT = OptionType("text", str)
+EFFECT = OptionType("name", str, _effects)
+METHOD = OptionType("name", str, _methods)
 VALUES = OptionType("A:B:N", _values)
 INSTRUCTION_SET = OptionType("name", _instruction_set)
 REPORT = OptionType("file", _report)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-
-from pendmap.cli.types import FILE
+from pendmap.cli.groups import argument, new_command
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@click.command("view")
-@click.argument("file", type=FILE)
+@new_command("view", "pendmap view basins.rrd")
+@argument("file", "FILE")
 def command(*, file: Path) -> None:
     """Open a recording (.rrd) in the Rerun viewer."""
     from pendmap import viewer

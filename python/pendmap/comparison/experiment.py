@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
+import pandas as pd
 
 from pendmap.analysis.numerics import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
@@ -19,7 +20,8 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
-from pendmap.formatting import Readable, counted, percent
+from pendmap.formatting import counted, percent
+from pendmap.identification.saved import Saved
 from pendmap.model import Rig
 from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
@@ -35,12 +37,13 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
+_UNITS: Final = {"period": "s", "peak": "rad"}
 FITS: Final = 1.1
 """Rms residual over noise up to which a model fits; the noise is known to a few percent."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Comparison(Readable):
+class Comparison(Saved):
     """Comparison of a model with an experiment.
 
     Parameters
@@ -56,6 +59,9 @@ class Comparison(Readable):
     left_out : tuple of (str, str)
         Name of each other run, and the reason why it is not compared.
     """
+
+    KIND: ClassVar[str] = "comparison"
+    ROWS: ClassVar[str] = "row"
 
     model: Rig
     experiment: Experiment
@@ -74,6 +80,35 @@ class Comparison(Readable):
     def every(self) -> tuple[RunComparison | ForcedComparison, ...]:
         """All runs that were compared, free decays first."""
         return (*self.runs, *self.forced)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row a run and quantity.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``run`` and ``quantity``; ``record`` and ``model`` (of an ensemble the median),
+            ``low`` and ``high`` (95 % of the ensemble), ``chance`` (its two-sided p-value of the
+            record), ``error_percent`` (absolute), nan where there is none, and ``unit``. The
+            quantity ``residual`` has the noise of the record and the rms of the model.
+        """
+        rows: list[tuple[Any, ...]] = []
+        for one in self.every:
+            name = one.run.name
+            rows.append((name, "residual", one.sigma, one.rms, *[math.nan] * 4, "rad"))
+            if isinstance(one, RunComparison):
+                rows += [
+                    (name, f"{r.what} {r.asked:g}", r.measured, *[math.nan] * 4, e, _UNITS[r.what])
+                    for r in one.table.rows
+                    for e in [r.errors.get(MODEL, math.nan)]
+                ]
+            else:
+                rows += [
+                    (name, e.name, e.measured, e.median, *e.ci95, e.chance, math.nan, e.unit)
+                    for e in one.statistics
+                ]
+        columns = ["run", "quantity", "record", "model", "low", "high", "chance", "error_percent"]
+        return pd.DataFrame(rows, columns=[*columns, "unit"]).set_index(columns[:2])
 
     def text_parts(self) -> tuple[list[Table], list[str]]:
         """Return the tables and the lines that ``pendmap compare`` prints."""
@@ -350,7 +385,7 @@ def _lines(comparison: Comparison) -> Iterator[str]:
     yield from doubt_lines(comparison.experiment, *runs)
     for one in comparison.runs:
         for row in one.table.rows:
-            unit = "s" if row.what == "period" else "rad"
+            unit = _UNITS[row.what]
             error = row.errors.get(MODEL, math.nan)
             said = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
             yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"

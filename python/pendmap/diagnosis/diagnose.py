@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+from pendmap.analysis.numerics import in_rounds
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
     from pendmap.records.read import Records
+
+_FITS = 10  # Fits that are half of the work; a diagnosis makes 15 or more
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
@@ -104,22 +107,21 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     experiment = experiment_of(records, rate_hz=rate_hz)
     functions, others = separate_functions(effects)
     own = checked_own(others)
-    report = progress or (lambda _done, _total: None)
-    steps = max_effects + 3
+    moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
     check_functions(data.runs, functions)
     with _refuse_divergence(experiment):
         base, core = fit_baseline(data, model, without)
     # Windows are as long as those over which the baseline followed the runs.
     data = dataclasses.replace(data, fitted=base.runs)
-    report(1, steps)
+    moved(1, 1)
     state = State(data, base, thresholds or Thresholds(), max_effects, without, own=own)
+    state.moved = lambda: moved(1, 1)
     with _refuse_divergence(experiment):
-        nearest = state.scored(search(state, core, lambda done: report(1 + done, steps)))
+        nearest = state.scored(search(state, core))
         begin = state.scored(impose_physics(state.data, state.base) or state.base)
         if not unit_wrong(experiment, *data.runs):
             refuse_astray(experiment.path, data.fitted, nearest.fitted.fit)
-        report(steps - 1, steps)
         last, fitted = nearest.fitted, state.data.fitted
         runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
         after = residual_torque(fitted, last.fit, last.noise)
@@ -136,6 +138,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
             Torque.unknown(begin.fitted.noise),
         )
     scores = state.scores(begin.fitted)
+    if progress is not None:
+        progress(1, 1)
     return Discrepancy(
         data,
         begin,

@@ -23,7 +23,7 @@ from pendmap.diagnosis.refit import key_of
 from pendmap.diagnosis.state import Attempt
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.state import State
 
 
-def search(state: State, core: FittedModel | None, progress: Callable[[int], None]) -> FittedModel:
-    """Return the best model; ``progress`` receives the number of its effects after each step."""
+def search(state: State, core: FittedModel | None) -> FittedModel:
+    """Return the best model."""
     best = state.reweight(min((t for t in (state.base, core) if t), key=lambda t: t.chi2))
     core = best
     best = prune_effects(state, cheapest_start(state, core))
@@ -63,7 +63,6 @@ def search(state: State, core: FittedModel | None, progress: Callable[[int], Non
         if step is None:
             break
         best, starts = prune_effects(state, state.reweight(step)), []
-        progress(len(best.chosen))
     return state.reweight(best)
 
 

@@ -23,7 +23,7 @@ from pendmap.diagnosis.scores import Scores, score_candidates
 from pendmap.errors import FitDiverged
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
@@ -83,6 +83,7 @@ class State:
         self.left_out, self.own = without, own
         self.errors = (0.0,) * len(data.fitted)
         self.attempts: list[Attempt] = []
+        self.moved: Callable[[], object] = lambda: None  # called after each fit
         self._begin(base)
 
     def _begin(self, base: FittedModel) -> None:
@@ -137,6 +138,7 @@ class State:
         """Store a fit; return the best one with the same effects."""
         if fitted is None:
             return None
+        self.moved()
         key = key_of(fitted.chosen)
         known = self._fits.get(key)
         best = fitted if known is None or fitted.chi2 < known.chi2 else known
@@ -153,6 +155,7 @@ class State:
     def scores(self, fitted: FittedModel) -> Scores:
         """Return the scores of all candidates at a fit."""
         if fitted not in self._scores:
+            self.moved()
             self._scores[fitted] = score_candidates(self.data, fitted, self._candidates(fitted))
         return self._scores[fitted]
 

@@ -43,6 +43,10 @@ COLUMNS: Final = {
 """Columns of the table of methods and their headers; effects' parameters follow."""
 
 
+_SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
+"""Symbols and units of the parameters that are said first."""
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class IdentificationReport(FitResult):
     """Results of several methods for an experiment.
@@ -287,6 +291,27 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
         if name in report.table.lost:
             yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
     yield from finding_lines(report.experiment, *report.runs)
+
+
+def in_short(report: IdentificationReport) -> Iterator[str]:
+    """Yield the line with the parameters, the data they are from, and what makes them doubtful."""
+    best = report.sound
+    if best is not None:
+        known = {**best.estimates, **best.derived}
+        names = [*_SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *_SHORT))]
+        yield ", ".join(
+            f"{_SHORT.get(name, (name, ''))[0]} = {estimate_text(known[name])}"
+            f" {_SHORT.get(name, (name, ''))[1]}".rstrip()
+            for name in names
+            if name in known
+        )
+        yield f"{best.method}: {best.used}"
+    said = left_out(report.experiment, report.runs)
+    if said:
+        yield said
+    for text in (*foremost(report), *(best.warnings if best is not None else ())):
+        yield f"Warning: {text}"
+    yield from _drag(report)
 
 
 def foremost(report: IdentificationReport) -> list[str]:

@@ -1,28 +1,23 @@
-"""What results of records have in common: parameters, residual, motion of the model, files."""
+"""What results of records have in common: parameters, residual, motion of the model."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
-import importlib.metadata
-import json
-import os
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from pendmap.errors import InputError, short_repr
-from pendmap.files.dataset import FORMAT_VERSION, load, made_by, save
-from pendmap.files.tree import Packed, unpacked
-from pendmap.formatting import Readable, estimate_text, html_table, interval, moment
+from pendmap.formatting import estimate_text, html_table, interval, moment
 from pendmap.identification.motion import Motion, run_forward
+from pendmap.identification.saved import Saved
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     from numpy.typing import ArrayLike
 
@@ -46,10 +41,10 @@ class Followed(NamedTuple):
     runs: Sequence[Run]  # the records of each
 
 
-class Parameters(Readable):
+class Parameters(Saved):
     """A result with parameters, which a file can hold."""
 
-    KIND: ClassVar[str]
+    ROWS: ClassVar[str] = "parameter"
 
     @property
     @abc.abstractmethod
@@ -95,69 +90,6 @@ class Parameters(Readable):
         with np.errstate(invalid="ignore", divide="ignore"):
             values = np.where(np.isfinite(matrix), matrix, np.nan) / np.outer(sizes, sizes)
         return pd.DataFrame(values, index=list(names), columns=list(names))
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the whole result, which :meth:`load` reads back with the same numbers.
-
-        The file has the table of :meth:`to_dataframe` over ``parameter`` for other tools, and in
-        ``content`` (JSON) and ``array_0``, ... all the rest for this version of pendmap.
-        :func:`pendmap.save_model` writes the model alone, as TOML.
-
-        Parameters
-        ----------
-        path : str or path
-            A .nc (NetCDF 4) or .zarr file; it is complete or absent.
-
-        Raises
-        ------
-        InputError
-            For another suffix, or a result with a Python function.
-        OSError
-            If the file cannot be written.
-        """
-        packed = Packed(self)
-        data: dict[str, Any] = {"content": ((), json.dumps(packed.tree))}
-        table = self.to_dataframe().reset_index()
-        for name, column in table.items() if len(table) else ():
-            values = column.to_numpy()
-            data[str(name)] = (
-                "parameter",
-                values.astype(str) if values.dtype == object else values,
-            )
-        for name, values in packed.arrays.items():
-            data[name] = ([f"{name}_{k}" for k in range(values.ndim)], values)
-        attributes = {
-            "kind": self.KIND,
-            "format_version": FORMAT_VERSION,
-            "title": repr(self),
-            "pendmap_version": importlib.metadata.version("pendmap"),
-        }
-        with made_by(f"{type(self).__name__}.save"):
-            return save(xr.Dataset(data, attrs=attributes), path)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a result that :meth:`save` wrote.
-
-        Raises
-        ------
-        InputError
-            If it is no such result, or of another version of pendmap.
-        OSError
-            If it cannot be read.
-        """
-        where, dataset = os.fspath(path), load(path)
-        kind = dataset.attrs["kind"]
-        if kind != cls.KIND:
-            raise InputError(f"{where}: kind must be {cls.KIND}, got {kind}")
-        try:
-            arrays = {str(name): each.to_numpy() for name, each in dataset.variables.items()}
-            found = unpacked(json.loads(dataset["content"].item()), arrays)
-        except Exception as error:  # a damaged file may raise any error
-            raise InputError(f"{where}: cannot be read as {cls.__name__}: {error}") from error
-        if not isinstance(found, cls):
-            raise InputError(f"{where}: must hold {cls.__name__}, got {short_repr(found)}")
-        return found
 
     def parameter_table(self) -> tuple[list[str], list[list[str]]]:
         """Return header and rows of the parameters with errors, intervals and units."""

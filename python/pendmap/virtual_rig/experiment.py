@@ -47,6 +47,8 @@ class Request:
         Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
     w0, c_over_m, friction : float
         The rig in SI, rad/s, 1/s, rad/s^2.
+    theta_r : float
+        The friction without dimensions, ``friction / w0**2``, in its place.
     free, forced : int
         Numbers of runs of each kind, at most 99 together.
     duration : float
@@ -75,6 +77,7 @@ class Request:
     w0: float | None = None
     c_over_m: float | None = None
     friction: float | None = None
+    theta_r: float | None = None
     free: int | None = None
     forced: int | None = None
     duration: float | None = None
@@ -104,6 +107,8 @@ class Request:
             duration=(1.0, 3600.0, "s"),
             mess=(0.0, 100.0, ""),
         )
+        if self.theta_r is not None and self.friction is not None:
+            raise InputError("one of theta_r and Tr must be left out, got both")
         self._refuse_idle()
         self._refuse_plans()
         free, forced = self.runs
@@ -225,6 +230,9 @@ def make(request: Request) -> Experiment:
     drawn = preset.parameters(rng)
     given = {"w0": request.w0, "c_over_m": request.c_over_m, "friction": request.friction}
     parameters = dataclasses.replace(drawn, **{k: v for k, v in given.items() if v is not None})
+    if request.theta_r is not None:
+        friction = request.theta_r * parameters.w0**2
+        parameters = dataclasses.replace(parameters, friction=friction)
     sensor = _sensor(request, rng)
     plans = list(request.plans)
     if not plans:

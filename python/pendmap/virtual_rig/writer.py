@@ -64,15 +64,15 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
     full = folder.is_dir() and any(folder.iterdir())
     if full and not replace:
         raise InputError(
-            f"{folder}: is not empty: without --replace it must be a new or empty folder"
+            f"{folder}: is not empty: without --overwrite it must be a new or empty folder"
         )
     if full and not (truth.is_file() and all(_FILES.fullmatch(f.name) for f in folder.iterdir())):
         raise InputError(
             f"{folder}: is not an experiment of the virtual rig only, with its truth next to it: "
-            "--replace replaces nothing else"
+            "--overwrite replaces nothing else"
         )
     if truth.exists() and not replace:
-        raise InputError(f"{truth}: exists: without --replace it must be another folder")
+        raise InputError(f"{truth}: exists: without --overwrite it must be another folder")
     check_room(truth)
     return Places(folder, truth)
 

@@ -9,13 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 from pendmap import _core
 from pendmap.analysis.basin_tiles import TILE
 from pendmap.cli.planning import samples, sweep
 from pendmap.cli.planning.request import Request
-from pendmap.cli.show import write_json
+from pendmap.cli.text import say, write_json
 from pendmap.files.dataset import save
 from pendmap.formatting import counted, duration, size_of
 
@@ -130,7 +128,7 @@ def show_cost(
     if outputs.as_json:
         write_json(dataclasses.asdict(found))
     elif not outputs.quiet:
-        click.echo("\n".join(_lines(found, outputs, workers)))
+        say("\n".join(_lines(found, outputs, workers)))
 
 
 def _written(dataset: xr.Dataset, outputs: Outputs) -> int:

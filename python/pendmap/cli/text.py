@@ -1,0 +1,53 @@
+"""Text and JSON on stdout: 80 columns, tables with a bold header."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pendmap.formatting import columns, wrapped
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from pendmap.formatting import Readable
+
+
+def say(text: str) -> None:
+    """Write lines to stdout; those of more than 80 columns go on below, indented."""
+    click.echo(wrapped(text))
+
+
+def write_json(fields: dict[str, Any]) -> None:
+    """Write one JSON object to stdout."""
+    click.echo(json.dumps(plain(fields), allow_nan=False))
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with a bold header and aligned columns."""
+    parts = (part.partition("\n") for part in columns(head, rows).split("\n\n"))
+    return "\n\n".join(click.style(first, bold=True) + end + rest for first, end, rest in parts)
+
+
+def doubts_first(found: Readable, doubts: Collection[str]) -> Iterator[str]:
+    """Yield doubts, then the tables and lines of a result's text without them."""
+    yield from doubts
+    tables, lines = found.text_parts()
+    yield from (table(head, rows) for head, rows in tables if rows)
+    yield from (line for line in lines if line not in doubts)
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
+    """Convert numpy numbers to Python's, and numbers that are not finite to None."""
+    if isinstance(value, dict):
+        return {str(key): plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
