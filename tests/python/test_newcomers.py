@@ -159,10 +159,10 @@ COMMAND = '''
 
 import click
 
-from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import output_options
+from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.options import output_options
 from pendmap.cli.show import show
-from pendmap.cli.types import NUMBER
+from pendmap.cli.parse.types import NUMBER
 
 
 @click.command("swing")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pendmap
-from pendmap.formatting import with_error, written
+from pendmap.formatting import columns, with_error, wrapped, written
 
 sizes = st.floats(-12, 6).map(lambda power: 10.0**power)
 
@@ -43,3 +43,27 @@ def test_small_exponents_are_in_summaries() -> None:
     assert "0.0000" not in text
     for exponent in result["exponent"].values:
         assert f"exponent {exponent:.5g}" in result.attrs["summary"]
+
+
+@given(st.text(alphabet="ab -=%1,:\n", max_size=400))
+def test_text_is_broken_between_words_and_keeps_them(text: str) -> None:
+    said = wrapped(text, 30)
+    assert said.split() == text.split()
+    longest = max(map(len, text.split()), default=0) + 4
+    assert all(len(line) <= max(30, longest + 8) for line in said.split("\n"))
+    assert wrapped(said, 200) == said
+
+
+def test_a_number_and_its_unit_stay_together() -> None:
+    said = wrapped("Of the starts 45.4 % +- 0.1 % end here, and p = 1.7 stands", 20)
+    assert said.split("\n") == [
+        "Of the starts 45.4 %",
+        "  +- 0.1 % end here,",
+        "  and p = 1.7 stands",
+    ]
+
+
+def test_a_wide_table_goes_on_below_with_its_first_column() -> None:
+    said = columns(["name", "a", "b"], [["x", "1" * 10, "2" * 10]], 20)
+    assert said == f"name  a\nx     {'1' * 10}\n\nname  b\nx     {'2' * 10}\n"
+    assert columns(["name", "a"], [["x", "1"]]) == "name  a\nx     1\n"

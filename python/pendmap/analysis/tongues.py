@@ -221,8 +221,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     frequencies, looked, (found, undamped, upright) = _solved(
         bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
-    moved = bool(found[0].moved)
-    if moved:
+    if moved := bool(found[0].moved):
         undamped = [_NO_REST] * len(found)
     reach = 0.0 if moved else p_max
     asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
@@ -271,8 +270,7 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     moved = in_rounds(numerics.progress, _ROUNDS)
 
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        run = numerics.workers, moved
-        return _core.tongues(one, upright, at.tolist(), p_max, folds, *run)
+        return _core.tongues(one, upright, at.tolist(), p_max, folds, numerics.workers, moved)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
         found = solve(at, pendulum, upright=False, folds=folds)
@@ -292,8 +290,6 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
         again = partial(solve, one=pendulum, upright=False, folds=True)
         looked = critical_curves.fold_ends(frequencies, found, np.isin(frequencies, asked), again)
-    if numerics.progress is not None:
-        numerics.progress(1, 1)
     return frequencies, looked, (found, undamped, upright)
 
 

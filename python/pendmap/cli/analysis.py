@@ -8,10 +8,9 @@ import inspect
 from typing import TYPE_CHECKING, Any
 
 from pendmap import ANALYSES
-from pendmap.cli.groups import new_command
-from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import (
-    RESULTS,
+from pendmap.cli.parse.groups import new_command
+from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.options import (
     added,
     machine_options,
     output_options,
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
     import click
 
-    from pendmap.cli.options import Decorator
+    from pendmap.cli.parse.options import Decorator
 
 WRITES = """
 
@@ -66,7 +65,7 @@ def analysis_command(
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
         kept = (store_options, worker_options) if stored else ()
-        files = output_options(*RESULTS, stored=stored)
+        files = output_options(stored=stored)
         decorate = added(model, *options, *kept, machine_options, files)
         return new_command(name, *examples, text=text)(decorate(run))
 

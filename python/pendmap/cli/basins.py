@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import group
-from pendmap.cli.options import (
+from pendmap.cli.parse.groups import group
+from pendmap.cli.parse.options import (
     draws_option,
     flag,
     max_periods_option,
@@ -18,7 +18,7 @@ from pendmap.cli.options import (
     tol_option,
     window_options,
 )
-from pendmap.cli.types import whole
+from pendmap.cli.parse.types import whole
 from pendmap.errors import MOST_PERIODS
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from typing import Any
 import click
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import START
-from pendmap.cli.model_options import varied_model_options
-from pendmap.cli.options import option, search_options
-from pendmap.cli.types import NUMBER
+from pendmap.cli.parse.groups import START
+from pendmap.cli.parse.model_options import varied_model_options
+from pendmap.cli.parse.options import option, search_options
+from pendmap.cli.parse.types import NUMBER
 
 
 @analysis_command(

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.groups import argument, group, new_command
-from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import (
+from pendmap.cli.parse.groups import argument, group, new_command
+from pendmap.cli.parse.model_options import rig_from
+from pendmap.cli.parse.options import (
     option,
     output_options,
     reading_options,
     seed_option,
     threads_option,
 )
+from pendmap.cli.parse.types import NUMBER, whole
 from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.text import doubts_first
-from pendmap.cli.types import NUMBER, whole
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ _ENSEMBLE = group("Ensemble", "--members 1000 --spread 0.02")
 @seed_option("Draws them.")
 @threads_option
 @reading_options
-@output_options(".nc", recording=False)
+@output_options((".nc",), recording=False)
 def command(  # noqa: PLR0913 (an option each)
     *,
     model: Path,

@@ -9,12 +9,12 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.model_options import rig_from
-from pendmap.cli.options import option, output_options, reading_options
+from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.parse.model_options import rig_from
+from pendmap.cli.parse.options import option, output_options, reading_options
+from pendmap.cli.parse.types import EFFECT, FILE, REPORT, REPORTS, whole
 from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.text import table
-from pendmap.cli.types import EFFECT, FILE, REPORT, REPORTS, whole
 from pendmap.errors import instruction_set, named
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ _FIT = group("Candidates", "--max-effects 1 --without magnet")
     metavar="FILE|DIR",
     group=OUTPUT,
 )
-@output_options(".toml", *REPORTS, json="; alone, no file but the model")
+@output_options((".toml", *REPORTS), json="; alone, no file but the model")
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,

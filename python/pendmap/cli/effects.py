@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.groups import OUTPUT, argument, new_command
-from pendmap.cli.options import json_option, option, verbose_option
+from pendmap.cli.parse.groups import PRINTED, argument, new_command
+from pendmap.cli.parse.options import flag, option, verbose_option
+from pendmap.cli.parse.types import EFFECT, FILE
 from pendmap.cli.text import say, write_json
-from pendmap.cli.types import EFFECT, FILE
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
@@ -35,10 +35,10 @@ _NAMES = 23  # Width of the column of names
     FILE,
     "Show those of a file instead, its [[formula]]; they are checked.",
     metavar="FILE",
-    group=OUTPUT,
+    group=PRINTED,
 )
-@verbose_option("Also parameters and which data reveal each.")
-@json_option()
+@verbose_option("Also parameters and which data reveal each.", PRINTED)
+@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
 def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 

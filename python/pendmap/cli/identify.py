@@ -8,11 +8,11 @@ import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.groups import argument, group, new_command
-from pendmap.cli.options import option, output_options, reading_options, verbose_option
+from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.parse.options import option, output_options, reading_options, verbose_option
+from pendmap.cli.parse.types import EFFECT, METHOD
 from pendmap.cli.show import Outputs, Written, write_all
 from pendmap.cli.text import doubts_first
-from pendmap.cli.types import EFFECT, METHOD
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ _FIT = group("Fit", "--effect quadratic_drag")
     group=_FIT,
 )
 @reading_options
-@output_options(SUFFIX)
-@verbose_option("Also the tables of all methods, intervals, and what was noticed.")
+@output_options((SUFFIX,))
+@verbose_option("Also the tables of all methods, intervals, and what was noticed.", OUTPUT)
 def command(
     *,
     path: Path,

@@ -9,8 +9,8 @@ import platform
 
 import click
 
-from pendmap.cli.groups import new_command
-from pendmap.cli.options import json_option
+from pendmap.cli.parse.groups import PRINTED, new_command
+from pendmap.cli.parse.options import flag
 
 _DEPENDENCIES = (
     "numpy",
@@ -27,7 +27,7 @@ _DEPENDENCIES = (
 
 
 @new_command("info", "pendmap info --json")
-@json_option()
+@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""
     from pendmap import _core

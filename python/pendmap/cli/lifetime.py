@@ -5,9 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import group
-from pendmap.cli.options import draws_option, max_periods_option, option, seed_option, tol_option
-from pendmap.cli.types import whole
+from pendmap.cli.parse.groups import group
+from pendmap.cli.parse.options import (
+    draws_option,
+    max_periods_option,
+    option,
+    seed_option,
+    tol_option,
+)
+from pendmap.cli.parse.types import whole
 from pendmap.errors import MOST_PERIODS
 
 _STARTS = (100, 10_000_000)

@@ -5,9 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import ACCURACY
-from pendmap.cli.options import max_periods_option, option, seed_option, start_options, tol_option
-from pendmap.cli.types import NUMBER
+from pendmap.cli.parse.groups import ACCURACY
+from pendmap.cli.parse.options import (
+    max_periods_option,
+    option,
+    seed_option,
+    start_options,
+    tol_option,
+)
+from pendmap.cli.parse.types import NUMBER
 
 
 @analysis_command(

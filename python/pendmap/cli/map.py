@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import group
-from pendmap.cli.model_options import varied_model_options
-from pendmap.cli.options import draws_option, flag, search_options
+from pendmap.cli.parse.groups import group
+from pendmap.cli.parse.model_options import varied_model_options
+from pendmap.cli.parse.options import draws_option, flag, search_options
 
 if TYPE_CHECKING:
     from pendmap.cli.show import Outputs

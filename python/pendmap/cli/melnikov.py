@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pendmap.cli.groups import new_command
-from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import RESULTS, output_options, simd_option
+from pendmap.cli.parse.groups import new_command
+from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.options import output_options, simd_option
 from pendmap.cli.show import show
 
 
@@ -17,7 +17,7 @@ from pendmap.cli.show import show
 )
 @model_options
 @simd_option
-@output_options(*RESULTS)
+@output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Compute the amplitude at which homoclinic tangles begin, by Melnikov's criterion.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from pendmap.cli.groups import argument, new_command
-from pendmap.cli.options import machine_options, output_options, worker_options
+from pendmap.cli.parse.groups import argument, new_command
+from pendmap.cli.parse.options import machine_options, output_options, worker_options
 from pendmap.cli.show import Outputs, made_here, show
 from pendmap.cli.stored import workers
 
@@ -15,7 +15,7 @@ from pendmap.cli.stored import workers
 @argument("store", "STORE", str)
 @worker_options
 @machine_options
-@output_options()
+@output_options(())
 def command(
     *,
     store: str,

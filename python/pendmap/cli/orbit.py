@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import STARTS, group
-from pendmap.cli.options import draws_option, option, seed_option
-from pendmap.cli.types import AXIS, whole
+from pendmap.cli.parse.groups import STARTS, group
+from pendmap.cli.parse.options import draws_option, option, seed_option
+from pendmap.cli.parse.types import AXIS, whole
 from pendmap.errors import MOST_CELLS
 
 if TYPE_CHECKING:

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.groups import OUTPUT, argument, new_command
-from pendmap.cli.options import (
-    json_option,
+from pendmap.cli.parse.groups import PRINTED, argument, new_command
+from pendmap.cli.parse.options import (
     option,
     overwrite_option,
-    quiet_option,
+    printed_options,
     seed_option,
     simd_option,
 )
+from pendmap.cli.parse.types import PICTURES, default_file, output_file
 from pendmap.cli.show import free_name, keep_files, write_all
 from pendmap.cli.text import say, table, write_json
-from pendmap.cli.types import PICTURES, default_file, output_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -36,17 +35,16 @@ _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
     click.Path(path_type=Path, file_okay=False),
     "Folder for the files, made if it is not there.  [default: the current one]",
     metavar="DIR",
-    group=OUTPUT,
+    group=PRINTED,
 )
 @option(
     "--plot",
     output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
-    group=OUTPUT,
+    group=PRINTED,
 )
-@overwrite_option
-@json_option()
-@quiet_option
+@overwrite_option(PRINTED)
+@printed_options(PRINTED)
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.groups import argument, group, new_command
-from pendmap.cli.options import flag, option, output_options
+from pendmap.cli.parse.groups import argument, group, new_command
+from pendmap.cli.parse.options import flag, option, output_options
+from pendmap.cli.parse.types import OptionType
 from pendmap.cli.show import Outputs, write_all
-from pendmap.cli.types import OptionType
 from pendmap.errors import InputError, named
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ _LOOK = group("Look", "--layer settle --width 86 --no-title")
 @flag("--no-title", "No title and subtitle, for a figure with a caption.", group=_LOOK)
 @option("--dpi", click.IntRange(20, 1200), "Pixels an inch of a .png.", group=_LOOK)
 @option("--colormap", str, "Colours of the fields, by matplotlib's names.", group=_LOOK)
-@output_options(json="")
+@output_options((), json="")
 def command(  # noqa: PLR0913 (the options above)
     *,
     file: Path,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.options import flag, json_option, option, quiet_option
+from pendmap.cli.parse.groups import PRINTED, argument, group, new_command
+from pendmap.cli.parse.options import flag, option, printed_options
+from pendmap.cli.parse.types import EFFECT, FILE, NUMBER, PICTURES, output_file
 from pendmap.cli.show import keep_files, write_all
 from pendmap.cli.text import say, write_json
-from pendmap.cli.types import EFFECT, FILE, NUMBER, PICTURES, output_file
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -81,15 +81,14 @@ _SENSOR = group("Sensor", "--noise 0.2 --counts 1024")
 @option("--jitter", NUMBER, "Of the clock, s rms.", 0.0, group=_SENSOR)
 @option("--dropouts", NUMBER, "Share of samples lost.", 0.0, group=_SENSOR)
 @option("--outliers", NUMBER, "Share that is false.", 0.0, group=_SENSOR)
-@option("--out", FILE, "Folder to write.", metavar="DIR", group=OUTPUT)
-@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=OUTPUT)
+@option("--out", FILE, "Folder to write.", metavar="DIR", group=PRINTED)
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=PRINTED)
 @flag(
     "--overwrite --replace overwrite",
     "Replace an experiment or a figure that is there.",
-    group=OUTPUT,
+    group=PRINTED,
 )
-@json_option()
-@quiet_option
+@printed_options(PRINTED)
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,

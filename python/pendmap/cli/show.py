@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from pendmap.cli.options import RESULTS
+from pendmap.cli.parse.options import RESULTS
+from pendmap.cli.parse.types import PICTURES, REPORTS, Address, default_file
 from pendmap.cli.text import say, write_json
-from pendmap.cli.types import PICTURES, REPORTS, Address, default_file
 from pendmap.errors import InputError, NotWrittenError, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
 from pendmap.formatting import duration

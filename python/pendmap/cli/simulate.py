@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from pendmap.cli.groups import ACCURACY, OUTPUT, group, new_command
-from pendmap.cli.model_options import begin, model_options
-from pendmap.cli.options import RESULTS, flag, option, output_options, simd_option, start_options
+from pendmap.cli.parse.groups import ACCURACY, OUTPUT, group, new_command
+from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.options import flag, option, output_options, simd_option, start_options
+from pendmap.cli.parse.types import NUMBER, whole
 from pendmap.cli.show import show
-from pendmap.cli.types import NUMBER, whole
 from pendmap.errors import MOST_SAMPLES, named
 
 _ANALYSIS = group("Trajectory", "--until 500 --samples 128")
@@ -39,7 +39,7 @@ _VIEWER = "127.0.0.1:9876"
     group=OUTPUT,
 )
 @simd_option
-@output_options(*RESULTS)
+@output_options()
 def command(**given: Any) -> None:  # noqa: ANN401 (the options above)
     """Integrate one trajectory: time history, energy, phase plane, Poincaré section.
 

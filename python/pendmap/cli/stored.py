@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pendmap.cli.parse.types import Address
 from pendmap.cli.show import made_here, show
 from pendmap.cli.text import say, write_json
-from pendmap.cli.types import Address
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import group
-from pendmap.cli.model_options import varied_model_options
-from pendmap.cli.options import (
+from pendmap.cli.parse.groups import group
+from pendmap.cli.parse.model_options import varied_model_options
+from pendmap.cli.parse.options import (
     max_periods_option,
     option,
     seed_option,
@@ -16,7 +16,7 @@ from pendmap.cli.options import (
     tol_option,
     window_options,
 )
-from pendmap.cli.types import whole
+from pendmap.cli.parse.types import whole
 from pendmap.errors import MOST_PERIODS
 
 if TYPE_CHECKING:

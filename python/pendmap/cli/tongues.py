@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.groups import group
-from pendmap.cli.model_options import model_options
-from pendmap.cli.options import draws_option, option, seed_option
-from pendmap.cli.types import NUMBER, VALUES
+from pendmap.cli.parse.groups import group
+from pendmap.cli.parse.model_options import model_options
+from pendmap.cli.parse.options import draws_option, option, seed_option
+from pendmap.cli.parse.types import NUMBER, VALUES
 
 if TYPE_CHECKING:
     from pendmap.cli.show import Outputs

@@ -51,13 +51,13 @@ class ProgressBar:
         """
         if total <= 0:
             done, total = 0, 1
+        before, self._total = self._total, total
         if self._bar is None:
             self._bar = self._begun(total)
             self._ended.clear()
             threading.Thread(target=self._tick, args=[self._bar], daemon=True).start()
-        elif total != self._total or done < self._bar.n:
+        elif total != before or done < self._bar.n:
             self._bar.reset(total)
-        self._total = total
         self._bar.update(done - self._bar.n)
         if done in {0, total}:
             self._bar.refresh()
@@ -88,8 +88,9 @@ class ProgressBar:
 
     def _tick(self, bar: Any) -> None:  # noqa: ANN401 (of tqdm)
         """Let the time on the bar pass while nothing is reported."""
-        while bar.n < self._total and not self._ended.wait(_SECOND):
-            bar.refresh()
+        while not self._ended.wait(_SECOND):
+            if bar.n < self._total:
+                bar.refresh()
 
     def _begun(self, total: int) -> Any:  # noqa: ANN401 (of tqdm)
         import tqdm  # noqa: PLC0415 (when a bar is shown)
@@ -107,6 +108,7 @@ class ProgressBar:
             desc=f"{self._name} " if self._name else None,
             bar_format=_FORMAT,
             ncols=WIDTH,
+            nrows=24,
             mininterval=_OFTEN,
             miniters=1,
             leave=self._leave,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shlex
 import signal
 import subprocess
@@ -11,18 +12,23 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+import click
 import pytest
 
 import pendmap
 from conftest import COMMAND
 from interrupted import any_file, started, until
-from pendmap.cli.types import AXIS, NUMBER
+from pendmap.cli.main import command
+from pendmap.cli.parse.groups import EXAMPLE, Command
+from pendmap.cli.parse.types import AXIS, NUMBER
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from conftest import Run
 
+COMMANDS = command.list_commands(click.Context(command))
+FILES = ["basins.nc", "basins.png", "basins.rrd"]
 FIELDS = [
     "attractors",
     "undecided",
@@ -112,20 +118,119 @@ def test_figures_of_far_windows_take_no_longer(pendmap_command: Run, tmp_path: P
 @pytest.mark.parametrize("name", ["basins", "simulate"])
 def test_help_names_the_files_that_are_written(pendmap_command: Run, name: str) -> None:
     said = " ".join(pendmap_command(name, "--help").stdout.split())
-    assert "--json alone writes no file" in said
-    assert f"--view writes the recording it opens: {name}.rrd" in said
+    assert f"Writes {name}.nc, {name}.png and {name}.rrd if no output is named." in said
 
 
 def test_without_a_named_output_three_files_are_written(
     pendmap_command: Run, tmp_path: Path
 ) -> None:
-    for _ in range(2):  # the second run replaces the first one's files
-        run = pendmap_command("basins", "--p", 0.6, "--grid", 20)
-        assert run.returncode == 0, run.stderr
-        assert run.stderr == ""
-        names = sorted(p.name for p in tmp_path.iterdir())
-        assert names == ["basins.nc", "basins.png", "basins.rrd"]
-        assert "basins.nc, basins.png, basins.rrd" in run.stdout
+    run = pendmap_command("basins", "--p", 0.6, "--grid", 20)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == FILES
+    assert f"Written: {', '.join(FILES)}" in run.stdout
+
+
+def test_files_of_another_run_are_kept(pendmap_command: Run, tmp_path: Path) -> None:
+    for name in (FILES[0], FILES[2]):
+        (tmp_path / name).write_bytes(b"old")
+    words = ("basins", "--p", 0.6, "--grid", 20)
+    run = pendmap_command(*words)
+    assert (
+        "Written: basins-2.nc, basins-2.png, basins-2.rrd\nKept: basins.nc, basins.rrd"
+        in run.stdout
+    )
+    assert pendmap_command(*words, "--json", "--plot", "a.png").returncode == 0
+    for option, name in (("--out", "basins.nc"), ("--out", "basins.rrd"), ("--plot", "a.png")):
+        run = pendmap_command(*words, option, name)
+        assert run.returncode == 2
+        assert f"Invalid value for '{option}': '{name}': must be a new file" in run.stderr
+    assert (tmp_path / "basins.nc").read_bytes() == b"old"
+    assert pendmap_command(*words, "--overwrite").returncode == 0
+    assert pendmap.load(tmp_path / "basins.nc").sizes["theta"] == 20
+    assert len([*tmp_path.iterdir()]) == 7
+
+
+def test_a_suffix_says_what_is_written(pendmap_command: Run, tmp_path: Path) -> None:
+    words = ("melnikov", "--out", "m.nc", "--out", "m.svg", "--out", "m.rrd")
+    assert pendmap_command(*words).returncode == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.nc", "m.rrd", "m.svg"]
+    run = pendmap_command("plot", "m.nc", "--out", "n.rrd", "--out", "n.pdf")
+    assert "Written: n.pdf, n.rrd" in run.stdout
+    for two in (("a.nc", "b.nc"), ("a.png", "b.svg")):
+        run = pendmap_command("melnikov", "--out", two[0], "--out", two[1])
+        assert run.returncode == 2
+        assert f"one of {two[0]} and {two[1]} must be left out" in run.stderr
+    for option in ("--plot", "--rerun"):
+        name = {"--plot": "c.png", "--rerun": "c.rrd"}[option]
+        run = pendmap_command("melnikov", "--out", name, option, name)
+        assert run.returncode == 2
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_options_stand_in_groups_with_examples_that_they_have(name: str) -> None:
+    called = command.get_command(click.Context(command), name)
+    assert isinstance(called, Command)
+    assert called.examples
+    for group in called.option_groups:
+        said = (group.help or "").removeprefix(EXAMPLE)
+        words = shlex.split(said)
+        assert words, group.title
+        own = {option for one in called.params for option in one.opts}
+        assert {word.partition("=")[0] for word in words if word.startswith("--")} <= own, said
+    for line in called.examples:
+        words = shlex.split(line)
+        assert words[:2] == ["pendmap", name]
+        with called.make_context(name, words[2:], resilient_parsing=True) as context:
+            assert not context.args
+        known = {option for one in called.params for option in one.opts}
+        assert {w.partition("=")[0] for w in words if w.startswith("--")} <= known, line
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_help_fits_80_columns(name: str, pendmap_command: Run) -> None:
+    run = pendmap_command(*name.split(), "--help")
+    assert max(map(len, run.stdout.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    "words", [("basins", "--grid", 20), ("tongues", "--omega", 2), ("effects", "--verbose")]
+)
+def test_output_fits_80_columns(words: tuple[str, ...], pendmap_command: Run) -> None:
+    run = pendmap_command(*words)
+    assert max(map(len, run.stdout.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("typed", "found"),
+    [
+        ("identify --effect ma", "magnet"),
+        ("diagnose --without quad", "quadratic_drag"),
+        ("plot a.nc --layer set", "settle"),
+        ("basins --preset fig2", "fig2a"),
+        ("identify --method log", "log_decrement"),
+    ],
+)
+def test_a_shell_completes_names(typed: str, found: str, tmp_path: Path) -> None:
+    words = ["pendmap", *typed.split()]
+    shell = {"_PENDMAP_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(words)}
+    environment = os.environ | shell | {"COMP_CWORD": str(len(words) - 1)}
+    run = subprocess.run(
+        [str(COMMAND)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert f"plain,{found}" in run.stdout.split()
+
+
+def test_friction_is_given_with_or_without_dimensions(pendmap_command: Run, tmp_path: Path) -> None:
+    pendmap.save_model(pendmap.Rig(w0=2.0, c_over_m=0.1), tmp_path / "m.toml")
+    words = ("simulate", "--model", "m.toml", "--until", 20, "--json")
+    one, other = (pendmap_command(*words, *given) for given in (("--tr", 0.2), ("--theta-r", 0.05)))
+    assert one.stdout == other.stdout
+    assert pendmap_command(*words, "--tr", 0.2, "--theta-r", 0.05).returncode == 2
+    assert "--tr must have --model" in pendmap_command("simulate", "--tr", 0.2).stderr
+    rig = ("rig", "free_decay", "--duration", 5, "--w0", 2)
+    pendmap_command(*rig, "--tr", 0.2, "--out", "a")
+    pendmap_command(*rig, "--theta-r", 0.05, "--out", "b")
+    assert (tmp_path / "a/run_00.csv").read_bytes() == (tmp_path / "b/run_00.csv").read_bytes()
 
 
 def test_a_stored_map_is_drawn_again(pendmap_command: Run, tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_the_unexpected_end_of_a_file_is_no_interrupt(monkeypatch: pytest.Monkey
 def test_files_written_before_the_disk_is_full_are_kept(tmp_path: Path) -> None:
     files = ("--out", "m.nc", "--plot", "m.png", "--rerun", "m.rrd")
     (tmp_path / "m.png").write_bytes(b"old")
-    run = bounded((*SMALL, *files), tmp_path, 64 * 1024)
+    run = bounded((*SMALL, *files, "--overwrite"), tmp_path, 64 * 1024)
     assert run.returncode == 1
     assert run.stderr.endswith("written: m.nc\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.nc", "m.png"]
@@ -276,7 +276,7 @@ def test_an_old_zarr_is_kept_if_the_new_one_fails(tmp_path: Path) -> None:
     words = (*SMALL, "--out", "m.zarr")
     assert bounded(words, tmp_path, 10**9).returncode == 0
     before = pendmap.load(tmp_path / "m.zarr")
-    run = bounded((*SMALL[:-1], "150", "--out", "m.zarr"), tmp_path, 8192)
+    run = bounded((*SMALL[:-1], "150", "--out", "m.zarr", "--overwrite"), tmp_path, 8192)
     assert (run.returncode, len(run.stderr.splitlines())) == (1, 1)
     xr.testing.assert_identical(pendmap.load(tmp_path / "m.zarr"), before)
     told = "m.zarr.part: File too large; 0 of 1 tile are kept, --resume goes on"

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
 import pendmap
 from decays import decay, record
-from pendmap import InputError, Rig, Run
+from pendmap import InputError, Rig, Run, virtual_rig
 from pendmap.identification import Identification, IdentificationReport
 from pendmap.identification.report import as_json
 
@@ -72,7 +74,7 @@ def test_the_residual_is_the_reading_less_the_model_and_its_zero(
         assert residual.attrs["units"] == "rad"
         assert np.array_equal(residual.time, run.time)
         model = report.predict(run.time, run.name) + report.best["offset"]
-        assert residual.values == pytest.approx(run.theta - model, abs=1e-7)
+        assert residual.to_numpy() == pytest.approx(run.theta - model, abs=1e-7)
 
 
 def test_a_prediction_is_the_motion_of_the_fitted_model(report: IdentificationReport) -> None:
@@ -200,3 +202,56 @@ def test_the_function_gives_what_the_command_gives(
 
 def test_all_of_it_stands_at_the_top() -> None:
     assert {"identify", "diagnose", "compare", "view", "pendulum_of"} <= set(dir(pendmap))
+
+
+def test_a_comparison_is_a_table_and_a_file(tmp_path: Path) -> None:
+    found = pendmap.compare(Rig(**TRUE), [made("a"), made("b", 1.0, 2)])
+    table = found.to_dataframe()
+    assert table.index.names == ["run", "quantity"]
+    residual = table.xs("residual", level="quantity")
+    assert list(residual.index) == ["a", "b"]
+    assert residual.model.to_numpy() == pytest.approx(residual.record.to_numpy(), rel=0.1)
+    periods = table.loc["a"].filter(like="period", axis="index")
+    assert (periods.error_percent < 1).all()
+    again = pendmap.comparison.Comparison.load(found.save(tmp_path / "c.nc"))
+    assert str(again) == str(found)
+    pd.testing.assert_frame_equal(again.to_dataframe(), table)
+    stored = pendmap.load(tmp_path / "c.nc")
+    assert stored.attrs["kind"] == "comparison"
+    assert list(stored["run"].values) == list(table.index.get_level_values("run"))
+
+
+def test_a_forced_comparison_has_the_statistics_of_its_ensemble(tmp_path: Path) -> None:
+    request = virtual_rig.Request("forced", duration=15, forced=1)
+    where = virtual_rig.places(tmp_path / "lab", replace=False)
+    virtual_rig.write(virtual_rig.make(request), where)
+    ensemble = pendmap.comparison.Ensemble(members=40)
+    found = pendmap.compare(Rig(**TRUE), where.experiment, ensemble=ensemble)
+    table = found.to_dataframe().loc["run_00"]
+    for each in found.forced[0].statistics:
+        row = table.loc[each.name]
+        assert (row.record, row.model, row.low, row.high) == (
+            each.measured,
+            each.median,
+            *each.ci95,
+        )
+    again = pendmap.comparison.Comparison.load(found.save(tmp_path / "c.nc"))
+    pd.testing.assert_frame_equal(again.to_dataframe(), found.to_dataframe())
+
+
+def test_the_command_says_the_parameters_first(tmp_path: Path, pendmap_command: Command) -> None:
+    run = made()
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[run.time, run.theta], delimiter=",", header="t_s,theta_rad"
+    )
+    short = pendmap_command("identify", "a.csv", "--plot", "a.png")
+    first, second, *_ = short.stdout.splitlines()
+    assert re.fullmatch(
+        r"w0 = 6\.\d+\(\d+\) rad/s, c/m = 0\.\d+\(\d+\) 1/s, Tr = .* rad/s\^2", first
+    )
+    assert second.startswith("trajectory: ")
+    assert "log_decrement" not in short.stdout
+    long = pendmap_command("identify", "a.csv", "--plot", "b.png", "--verbose")
+    assert long.stdout.startswith(f"{first}\n")
+    assert "log_decrement" in long.stdout
+    assert max(map(len, long.stdout.splitlines())) <= 80

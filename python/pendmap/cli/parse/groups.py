@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 import cloup
 
-from pendmap.cli.types import FILE
+from pendmap.cli.parse.types import FILE
 from pendmap.formatting import WIDTH
 
 if TYPE_CHECKING:
@@ -24,13 +24,16 @@ EXAMPLE: Final = "Example: "
 
 
 MODEL: Final = group("Model", "--p 1.7 --theta-r 0.05")
-SI: Final = group("Model in SI", "--model rig.toml --stroke-mm 20 --frequency-hz 1.9")
+SI: Final = group("Model in SI", "--model rig.toml --tr 0.08")
 STARTS: Final = group("Starts", "--theta=-pi:pi:400 --velocity=-3:3:200")
 START: Final = group("Start", "--theta 2.5 --velocity 0")
-ACCURACY: Final = group("Accuracy", "--tol 1e-8 --seed 1")
-LONG: Final = group("Long runs", "--out map.zarr --resume --workers 8")
-MACHINE: Final = group("Machine", "--threads 4")
+ACCURACY: Final = group("Accuracy", "--tol 1e-8")
+RANDOM: Final = group("Random numbers", "--seed 1")
+LONG: Final = group("Long runs", "--out map.zarr --resume")
+WORKERS: Final = group("Workers", "--workers 8")
+MACHINE: Final = group("Machine", "--simd portable")
 OUTPUT: Final = group("Output", "--out map.nc --out map.pdf")
+PRINTED: Final = group("Output", "--json > result.json")
 RECORD: Final = group("Records", "--rate 100")
 
 

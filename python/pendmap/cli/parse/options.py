@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Any
 import click
 import cloup
 
-from pendmap.cli.groups import ACCURACY, LONG, MACHINE, OUTPUT, RECORD, START, STARTS
-from pendmap.cli.types import (
+from pendmap.cli.parse.groups import (
+    ACCURACY,
+    LONG,
+    MACHINE,
+    OUTPUT,
+    RANDOM,
+    RECORD,
+    START,
+    STARTS,
+    WORKERS,
+)
+from pendmap.cli.parse.types import (
     AXIS,
     INSTRUCTION_SET,
     NUMBER,
@@ -92,13 +102,6 @@ tol_option = option("--tol", NUMBER, "Error after 5 periods.", 1e-6, group=ACCUR
 threads_option = option(
     "--threads", whole(1, MOST_THREADS), "Threads.  [default: one a processor]", group=MACHINE
 )
-quiet_option = flag("--quiet", "No progress, no summary.", group=OUTPUT)
-overwrite_option = flag(
-    "--overwrite",
-    "Replace files that exist. Without it a default name gets a number, and a name that is given"
-    " is refused.",
-    group=OUTPUT,
-)
 rate_option = option(
     "--rate rate_hz",
     NUMBER,
@@ -108,25 +111,38 @@ rate_option = option(
 )
 
 
+def overwrite_option(group: cloup.OptionGroup) -> Decorator:
+    """Return the option --overwrite."""
+    text = (
+        "Replace files that exist. Without it a default name gets a number, and a name that is"
+        " given is refused."
+    )
+    return flag("--overwrite", text, group=group)
+
+
 def draws_option(group: cloup.OptionGroup) -> Decorator:
     """Return the option --draws."""
     text = "Number of models drawn from the [covariance] of --model: uncertainty of the result."
     return option("--draws", whole(2, MOST_DRAWS), text, group=group)
 
 
-def verbose_option(what: str) -> Decorator:
+def verbose_option(what: str, group: cloup.OptionGroup) -> Decorator:
     """Return the option --verbose with the help ``what``."""
-    return flag("--verbose", what, group=OUTPUT)
+    return flag("--verbose", what, group=group)
 
 
-def json_option(further: str = "") -> Decorator:
-    """Return the option --json, whose help ends with ``further``."""
-    return flag("--json as_json", f"One JSON object on stdout{further}.", group=OUTPUT)
+def printed_options(group: cloup.OptionGroup, further: str = "") -> Decorator:
+    """Return --json, whose help ends with ``further``, and --quiet."""
+    text = f"One JSON object on stdout{further}."
+    return added(
+        flag("--json as_json", text, group=group),
+        flag("--quiet", "No progress, no summary.", group=group),
+    )
 
 
 def seed_option(what: str) -> Decorator:
     """Return the option --seed with the help ``what``."""
-    return option("--seed", whole(0, MOST_SEED), what, 0, group=ACCURACY)
+    return option("--seed", whole(0, MOST_SEED), what, 0, group=RANDOM)
 
 
 def max_periods_option(what: str) -> Decorator:
@@ -207,20 +223,24 @@ worker_options = added(
         "--workers count",
         whole(1, MOST_WORKERS),
         "Processes of this machine that compute.",
-        group=LONG,
+        group=WORKERS,
     ),
     option(
         "--scheduler",
         TEXT,
         "Dask scheduler whose workers compute, like tcp://host:8786.",
-        group=LONG,
+        group=WORKERS,
     ),
 )
 """Options of who computes the tiles of a result."""
 
 
 def output_options(
-    *suffixes: str, recording: bool = True, stored: bool = False, json: str = "; alone, no files"
+    suffixes: tuple[str, ...] = RESULTS,
+    *,
+    recording: bool = True,
+    stored: bool = False,
+    json: str = "; alone, no files",
 ) -> Decorator:
     """Return --out, --plot, --rerun, --view, --overwrite, --json and --quiet.
 
@@ -241,4 +261,4 @@ def output_options(
         options.append(option("--rerun", output_file(".rrd"), text, group=OUTPUT))
         text = "Write the recording and open the viewer on it."
         options.append(flag("--view", text, group=OUTPUT))
-    return added(*options, overwrite_option, json_option(json), quiet_option)
+    return added(*options, overwrite_option(OUTPUT), printed_options(OUTPUT, json))

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.groups import MODEL, SI
-from pendmap.cli.options import added, option
+from pendmap.cli.parse.groups import MODEL, SI
+from pendmap.cli.parse.options import added, option
+from pendmap.cli.parse.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.cli.show import Outputs
-from pendmap.cli.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.quantities import check

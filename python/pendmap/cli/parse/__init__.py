@@ -1,0 +1,1 @@
+"""Options and arguments of commands: their types, groups, and what several share."""

@@ -1,0 +1,71 @@
+"""Progress as a bar, and progress of work whose rounds are not known."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from pendmap.analysis.numerics import in_rounds
+
+SHOWN = """
+import time
+import pendmap
+with pendmap.ProgressBar("basins") as bar:
+    for done in (0, 300, 1000, 2, 4):
+        bar(done, 1000 if done > 4 or not done else 4)
+        time.sleep(WAIT)
+    bar(0, 0)
+"""
+
+
+def in_terminal(code: str) -> str:
+    """Return what a program writes to a terminal."""
+    ours, theirs = os.openpty()
+    subprocess.run([sys.executable, "-c", code], stderr=theirs, check=True)
+    os.close(theirs)
+    said = b""
+    with contextlib.suppress(OSError):  # the end
+        while part := os.read(ours, 1 << 16):
+            said += part
+    return said.decode()
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no such terminals")
+def test_a_terminal_shows_the_share_done_and_the_time() -> None:
+    said = in_terminal(SHOWN.replace("WAIT", "0.15"))
+    shares = [int(share) for share in re.findall(r"basins +(\d+) %\|", said)]
+    assert shares[0] == 0
+    assert {30, 100} <= set(shares)
+    assert "passed" in said
+    assert max(map(len, said.split("\r"))) <= 82
+
+
+def test_a_file_has_no_bar() -> None:
+    code = SHOWN.replace("WAIT", "0")
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stderr == ""
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no such terminals")
+def test_the_time_passes_while_nothing_is_reported() -> None:
+    code = "bar = pendmap.ProgressBar()\nbar(1, 9)\ntime.sleep(3.5)\nbar.close()"
+    said = in_terminal(f"import pendmap, time\n{code}")
+    assert len(set(re.findall(r"(\d\d:\d\d) passed", said))) >= 3
+
+
+def test_progress_in_rounds_rises_with_each_and_never_falls() -> None:
+    seen: list[float] = []
+    report = in_rounds(lambda done, total: seen.append(done / total), 4)
+    assert report is not None
+    for total in (20, 13, 7, 7, 3):
+        for done in range(total + 1):
+            report(done, total)
+    assert seen == sorted(seen)
+    assert 0 <= seen[0] < seen[-1] < 1
+    assert seen[-1] == pytest.approx(6 / 10)
+    assert in_rounds(None, 4) is None
