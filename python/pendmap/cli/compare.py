@@ -15,7 +15,7 @@ from pendmap.cli.parse.options import (
 )
 from pendmap.cli.parse.types import NUMBER, whole
 from pendmap.cli.show import Outputs, write_all
-from pendmap.cli.text import doubts_first
+from pendmap.cli.text import first_of_all
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -80,5 +80,5 @@ def command(  # noqa: PLR0913 (an option each)
     written = write_all(outputs.files(comparison, comparison.save), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-    lines = doubts_first(comparison, doubts)
+    lines = first_of_all(comparison, doubts)
     outputs.finish(written, lambda: as_json(comparison) | more, lines)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import shlex
 import sys
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
 from pendmap.cli.parse.options import option, output_options, reading_options, verbose_option
 from pendmap.cli.parse.types import EFFECT, METHOD
 from pendmap.cli.show import Outputs, Written, write_all
-from pendmap.cli.text import doubts_first
+from pendmap.cli.text import first_of_all
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ def command(
     every other command, identify.png and identify.rrd if no output is named.
     """
     from pendmap.identification import identified_model, identify_experiment
-    from pendmap.identification.report import as_json, foremost, in_short
+    from pendmap.identification.report import as_json, in_short
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
@@ -78,10 +77,8 @@ def command(
 
     def finish(written: Written) -> None:
         more = {"model": written.name(outputs.out), "simd": instruction_set()}
-        lines = in_short(report)
-        if verbose:
-            doubts = [f"Warning: {text}" for text in foremost(report)]
-            lines = itertools.chain(lines, [""], doubts_first(report, doubts))
+        short = [*in_short(report)]
+        lines = first_of_all(report, [*short, ""]) if verbose else short
         outputs.finish(written, lambda: as_json(report) | more, lines)
 
     try:

@@ -32,12 +32,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n\n".join(click.style(first, bold=True) + end + rest for first, end, rest in parts)
 
 
-def doubts_first(found: Readable, doubts: Collection[str]) -> Iterator[str]:
-    """Yield doubts, then the tables and lines of a result's text without them."""
-    yield from doubts
+def first_of_all(found: Readable, first: Collection[str]) -> Iterator[str]:
+    """Yield lines, then the tables and the other lines of a result's text."""
+    yield from first
     tables, lines = found.text_parts()
     yield from (table(head, rows) for head, rows in tables if rows)
-    yield from (line for line in lines if line not in doubts)
+    yield from (line for line in lines if line not in first)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)

@@ -294,8 +294,9 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
 
 
 def in_short(report: IdentificationReport) -> Iterator[str]:
-    """Yield the line with the parameters, the data they are from, and what makes them doubtful."""
+    """Yield doubts about the records, the parameters in a line, and the data that they are from."""
     best = report.sound
+    yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
         known = {**best.estimates, **best.derived}
         names = [*_SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *_SHORT))]
@@ -309,8 +310,7 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     said = left_out(report.experiment, report.runs)
     if said:
         yield said
-    for text in (*foremost(report), *(best.warnings if best is not None else ())):
-        yield f"Warning: {text}"
+    yield from (f"Warning: {text}" for text in (() if best is None else best.warnings))
     yield from _drag(report)
 
 

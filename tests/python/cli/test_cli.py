@@ -13,13 +13,13 @@ import time
 from typing import TYPE_CHECKING
 
 import click
+import cloup
 import pytest
 
 import pendmap
 from conftest import COMMAND
 from interrupted import any_file, started, until
 from pendmap.cli.main import command
-from pendmap.cli.parse.groups import EXAMPLE, Command
 from pendmap.cli.parse.types import AXIS, NUMBER
 
 if TYPE_CHECKING:
@@ -169,10 +169,10 @@ def test_a_suffix_says_what_is_written(pendmap_command: Run, tmp_path: Path) -> 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_options_stand_in_groups_with_examples_that_they_have(name: str) -> None:
     called = command.get_command(click.Context(command), name)
-    assert isinstance(called, Command)
-    assert called.examples
+    assert isinstance(called, cloup.Command)
+    assert called.examples  # type: ignore[attr-defined]
     for group in called.option_groups:
-        said = (group.help or "").removeprefix(EXAMPLE)
+        said = (group.help or "").removeprefix("Example: ")
         words = shlex.split(said)
         assert words, group.title
         own = {option for one in called.params for option in one.opts}

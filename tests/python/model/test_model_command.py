@@ -48,9 +48,9 @@ def test_maps_from_the_command_are_in_rad_per_second(tmp_path: Path, pendmap_com
     stored = pendmap.load(tmp_path / "m.nc")
     assert stored.velocity_bounds.values[-1, 1] == pytest.approx(3 * 6.2)
     window = ("--theta=-1:1:5", "--velocity=-2:2:5")
-    run = pendmap_command("basins", "--model", "model.toml", *window, "--json", "--out", "m.nc")
+    run = pendmap_command("basins", "--model", "model.toml", *window, "--json", "--out", "n.nc")
     assert run.returncode == 0, run.stderr
-    assert pendmap.load(tmp_path / "m.nc").velocity_bounds.values[-1, 1] == 2.0
+    assert pendmap.load(tmp_path / "n.nc").velocity_bounds.values[-1, 1] == 2.0
 
 
 @pytest.mark.parametrize(

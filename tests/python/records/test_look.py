@@ -80,7 +80,7 @@ def test_a_folder_lists_each_run(pendmap_command: Run, tmp_path: Path) -> None:
 
 def test_text_and_json_have_equal_findings(pendmap_command: Run, tmp_path: Path) -> None:
     path = odd(tmp_path)
-    said = pendmap_command("look", path).stdout
+    said = " ".join(pendmap_command("look", path).stdout.split())
     for finding in pendmap.read_experiment(path).runs[0].findings:
         assert finding.text in said
         assert f"[{finding.what}]" in said

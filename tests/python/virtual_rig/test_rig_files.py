@@ -174,14 +174,14 @@ def test_an_experiment_is_replaced_only_on_request(rig: Run, tmp_path: Path) -> 
     before = {p: p.read_bytes() for p in (tmp_path / "lab").iterdir()}
     refused = rig(*words, "--seed", 2)
     assert refused.returncode == 2
-    assert "--replace" in refused.stderr
+    assert "--overwrite" in refused.stderr
     assert len(refused.stderr.strip().splitlines()) == 1
     assert {p: p.read_bytes() for p in (tmp_path / "lab").iterdir()} == before
-    assert rig(*words, "--seed", 2, "--replace").returncode == 0
+    assert rig(*words, "--seed", 2, "--overwrite").returncode == 0
     assert {p: p.read_bytes() for p in (tmp_path / "lab").iterdir()} != before
     (tmp_path / "home").mkdir()
     (tmp_path / "home" / "thesis.txt").write_text("text", encoding="utf-8")
-    kept = rig("hidden", "--out", "home", "--replace")
+    kept = rig("hidden", "--out", "home", "--overwrite")
     assert kept.returncode == 2
     assert "not an experiment" in kept.stderr
     assert (tmp_path / "home" / "thesis.txt").exists()
@@ -218,7 +218,7 @@ def test_an_interrupt_leaves_no_partial_file(tmp_path: Path, moment: str) -> Non
 def test_one_run_is_held_out_of_each_kind_with_three(rig: Run, tmp_path: Path) -> None:
     counts = {(5, 4): (1, 1), (3, 2): (1, 0), (2, 2): (0, 0), (0, 3): (0, 1)}
     for (free, forced), held in counts.items():
-        words = ("--free", free, "--forced", forced, "--duration", 1, "--replace")
+        words = ("--free", free, "--forced", forced, "--duration", 1, "--overwrite")
         assert rig("hidden", "--effect", "none", *words, "--out", "lab").returncode == 0
         runs = read_toml(tmp_path / "lab" / "experiment.toml")["run"]
         out = [run["kind"] for run in runs if run.get("hold_out", False)]
@@ -232,7 +232,7 @@ def test_records_are_drawn(rig: Run, tmp_path: Path) -> None:
     written = {"experiment": "lab", "truth": "lab.truth.toml", "plot": "runs.svg"}
     assert json.loads(run.stdout) == written
     assert (tmp_path / "runs.svg").read_bytes().startswith(b"<?xml")
-    assert "runs.png" in rig(*words, "--replace", "--plot", "runs.png").stdout
+    assert "runs.png" in rig(*words, "--overwrite", "--plot", "runs.png").stdout
     for name in ("runs.jpg", "no/runs.png"):
         refused = rig(*words[:-1], "other", "--plot", name)
         assert refused.returncode == 2
