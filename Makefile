@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all lanes wheel fuzz lint bench build-times clean develop
+.PHONY: demo test test-all lanes wheel notebooks fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -30,6 +30,9 @@ lanes: ## what the lanes compute, on each instruction set of SIMD
 
 wheel: $(VENV)/bin/maturin ## a wheel of this system, in target/wheels
 	$(BIN)/maturin build --release --locked
+
+notebooks: $(VENV)/.develop ## execute docs/notebooks in place
+	$(BIN)/python docs/notebooks/run.py
 
 SEED ?= 1
 COUNT ?= 1000

@@ -1,4 +1,4 @@
-"""Make the pictures of docs/gallery.md from its snippets: `python docs/pictures/gallery.py [WORD]`."""
+"""Make the pictures of docs/gallery.md: `python docs/pictures/gallery.py [WORD]`, from anywhere."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ def experiments(folder: Path) -> dict[str, Path]:
         "LAB": virtual_rig.Request("hidden", 3, drag, free=3, forced=3, duration=20.0),
     }
     for name, request in requests.items():
-        virtual_rig.write(virtual_rig.make(request), virtual_rig.places(folder / name, replace=True))
+        virtual_rig.write(
+            virtual_rig.make(request), virtual_rig.places(folder / name, replace=True)
+        )
     return {name: folder / name for name in requests}
 
 
