@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all lanes wheel man fuzz lint bench build-times clean develop
+.PHONY: demo test test-all lanes wheel man notebooks fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -33,6 +33,9 @@ wheel: $(VENV)/bin/maturin ## a wheel of this system, in target/wheels
 
 man: $(VENV)/.develop ## the man pages again, from the texts of --help
 	$(BIN)/python docs/man_pages.py
+
+notebooks: $(VENV)/.develop ## execute docs/notebooks in place
+	$(BIN)/python docs/notebooks/run.py
 
 SEED ?= 1
 COUNT ?= 1000

@@ -22,6 +22,8 @@ ROOT = Path(__file__).resolve().parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PATIENCE = 120.0
 """Upper bound on the processor time of a command, s."""
+OWN_TESTS = {"cells.md", "gallery.md"}
+"""Pages whose snippets docs/ tests run, in a folder with records."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -44,6 +46,7 @@ def commands(text: str = README) -> list[list[str]]:
 SNIPPETS = [
     pytest.param(code, id=f"{page.name} {k}", marks=marks(page))
     for page in PAGES
+    if page.name not in OWN_TESTS
     for k, code in enumerate(blocks("python", page.read_text(encoding="utf-8")))
 ]
 
