@@ -75,7 +75,7 @@ def command(  # noqa: PLR0913 (an option each)
     folder = out or Path()
     places = _places(keys, folder, plot, overwrite=overwrite)  # before anything is computed
     if _LONG in keys and not quiet:
-        click.echo(f"Figure {_LONG} takes about 2 minutes.", err=True)
+        click.echo(f"Figure {_LONG} takes some minutes.", err=True)
     written = write_all(_files(places, seed))
     if as_json:
         write_json({"files": written})

@@ -145,11 +145,6 @@ def test_scipy_follows_the_trajectory_to_its_tolerance(cell: Cell) -> None:
     assert float(cell.printed) < 1e-9
 
 
-@pytest.mark.xfail(
-    not hasattr(pendmap, "ProgressBar"),
-    reason="ProgressBar is not there yet: remove this mark with it",
-    strict=True,
-)
 def test_a_bar_follows_a_map_to_its_end(cell: Cell) -> None:
     names = cell("A bar while it computes")
     assert callable(names["bar"])
