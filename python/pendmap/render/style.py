@@ -84,11 +84,10 @@ def points(name: str) -> float:
 
 
 def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
-    """Return the width of a line of text in inches, by default in the font size of ticks."""
-    if not text.strip():
-        return 0.0
-    family = tuple(mpl.rcParams["font.family"])
-    return _width(typeset(text), size or points("xtick.labelsize"), family, bold=bold)
+    """Return the width of the widest line in inches, by default in the font size of ticks."""
+    family, size = tuple(mpl.rcParams["font.family"]), size or points("xtick.labelsize")
+    lines = (typeset(line) for line in text.split("\n") if line.strip())
+    return max((_width(line, size, family, bold=bold) for line in lines), default=0.0)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -100,7 +99,7 @@ def _width(text: str, size: float, family: tuple[str, ...], *, bold: bool) -> fl
 
 def width_of(title: str) -> float:
     """Return the width of the longest line of a panel's title, in inches."""
-    return max(inches(line, points("axes.titlesize")) for line in title.split("\n"))
+    return inches(title, points("axes.titlesize"))
 
 
 def folded(title: str, room: float) -> str:
