@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import shlex
@@ -19,10 +20,24 @@ if TYPE_CHECKING:
     from conftest import Run
 
 ROOT = Path(__file__).resolve().parents[3]
+SPEC = importlib.util.spec_from_file_location("outputs", ROOT / "docs" / "outputs.py")
+assert SPEC is not None
+assert SPEC.loader is not None
+outputs = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(outputs)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+RAW = "https://raw.githubusercontent.com/pendmap/pendmap/main/"
 PATIENCE = 120.0
 """Upper bound on the processor time of a command, s."""
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+GENERATED = {"_build", "effects", "commands.md"}
+PAGES = [
+    ROOT / "README.md",
+    *(
+        page
+        for page in sorted((ROOT / "docs").rglob("*.md"))
+        if not GENERATED & set(page.relative_to(ROOT / "docs").parts)
+    ),
+]
 
 
 def marks(page: Path) -> list[pytest.MarkDecorator]:
@@ -104,7 +119,7 @@ def test_every_command_runs(page: Path, places: list[int], tmp_path: Path) -> No
 
 
 def test_the_pages_contain_commands() -> None:
-    for name, least in {"README.md": 7, "diagnose.md": 5}.items():
+    for name, least in {"README.md": 2, "basins.md": 7, "diagnose.md": 5}.items():
         assert any(page.name == name and len(PROMISED[page]) >= least for page in PAGES)
 
 
@@ -129,7 +144,14 @@ def test_every_snippet_runs(code: str, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
 
 
-@pytest.mark.parametrize("text", blocks("toml"))
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(block, id=f"{page.name} {k}", marks=marks(page))
+        for page in PAGES
+        for k, block in enumerate(blocks("toml", page.read_text(encoding="utf-8")))
+    ],
+)
 def test_every_toml_block_is_a_valid_file_of_its_kind(
     text: str, tmp_path: Path, pendmap_command: Run
 ) -> None:
@@ -152,6 +174,22 @@ def test_every_toml_block_is_a_valid_file_of_its_kind(
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_has_a_target(page: Path) -> None:
-    for target in re.findall(r"\]\(<?([^)#>]+)>?\)", page.read_text(encoding="utf-8")):
-        if not target.startswith("http"):
+    written = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    generated = {"commands.md", "effects/index.md", "api/index.md"}
+    for target in re.findall(r"\]\(<?([^)#>]+)(?:#[^)>]*)?>?\)", written):
+        if target.startswith(RAW):
+            assert (ROOT / target.removeprefix(RAW)).exists(), target
+        elif not target.startswith("http") and target not in generated:
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, id=p.name, marks=marks(p)) for p in outputs.pages()]
+)
+def test_every_output_is_what_is_printed(page: Path) -> None:
+    said = outputs.comparable(page.read_text(encoding="utf-8"))
+    assert outputs.comparable(outputs.rewritten(page)) == said
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= 150
