@@ -174,7 +174,7 @@ def test_every_toml_block_is_a_valid_file_of_its_kind(
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_has_a_target(page: Path) -> None:
-    written = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    written = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     generated = {"commands.md", "effects/index.md", "api/index.md"}
     for target in re.findall(r"\]\(<?([^)#>]+)(?:#[^)>]*)?>?\)", written):
         if target.startswith(RAW):
