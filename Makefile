@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all lanes wheel docs outputs fuzz lint bench build-times clean develop
+.PHONY: demo test test-all lanes wheel docs outputs notebooks fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -36,6 +36,9 @@ docs: $(VENV)/.develop ## the manual, in docs/_build/html
 
 outputs: $(VENV)/.develop ## what the commands in README.md and the pages print, rewritten from real runs
 	$(BIN)/python docs/outputs.py
+
+notebooks: $(VENV)/.develop ## execute docs/notebooks in place
+	$(BIN)/python docs/notebooks/run.py
 
 SEED ?= 1
 COUNT ?= 1000

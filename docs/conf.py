@@ -29,7 +29,7 @@ extensions = [
     "sphinx_design",
     "sphinxcontrib.bibtex",
 ]
-exclude_patterns = ["_build", "_ext", "architecture", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints"]
 nitpicky = True
 # References to types of other packages, and the words of numpydoc for shapes: no page of ours.
 # `Run` and `Experiment` of records and of the virtual rig have the same short names.

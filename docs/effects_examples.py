@@ -19,7 +19,7 @@ LIMIT = 150.0
 
 
 def said(name: str) -> list[str] | None:
-    """Return the lines of verdict and names; ``None`` if a diagnosis takes longer than the limit."""
+    """Return the lines of verdict and names; ``None`` if a diagnosis takes too long."""
     words = [sys.executable, "-m", "pendmap"]
     with tempfile.TemporaryDirectory() as folder:
         rig = ["rig", "hidden", "--effect", name, "--seed", "1", "--out", "hidden"]

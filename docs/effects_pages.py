@@ -56,12 +56,10 @@ def records(name: str) -> list[tuple[np.ndarray, np.ndarray]]:
 def missing(
     plan: virtual_rig.RunPlan, time: np.ndarray, angle: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return the torque that a record needs beyond the model without the effect, and its states."""
+    """Return the torque that the model lacks along a record, with time, angle and velocity."""
     curve = make_interp_spline(time, angle, k=5)
     drive = {"p": plan.p, "Omega": plan.frequency, "phi": plan.phase} if plan.p else {}
-    rig = pendmap.Rig(
-        w0=RIG["w0"], c_over_m=RIG["c_over_m"], Tr=RIG["friction"], **drive
-    )
+    rig = pendmap.Rig(w0=RIG["w0"], c_over_m=RIG["c_over_m"], Tr=RIG["friction"], **drive)
     found = {"t": time, "theta": curve(time), "v": curve(time, 1)}
     found["torque"] = curve(time, 2) - rig.acceleration(time, found["theta"], found["v"])
     # A spline does not follow the jumps of the acceleration where the motion turns or sticks.
@@ -80,9 +78,7 @@ def draw(effect: EffectDefinition) -> None:
         colour = COLOURS[plan.kind]
         left.plot(time, 1e3 * (after - before), color=colour, lw=1.0, label=plan.kind)
         states = missing(plan, time, after)
-        right.plot(
-            states[across], states["torque"], ".", ms=2, color=colour, label=plan.kind, rasterized=True
-        )
+        right.plot(states[across], states["torque"], ".", ms=2, color=colour)
     left.set(xlabel=AXES["t"], ylabel="with less without (mrad)", title="Change of the record")
     right.set(xlabel=AXES[across], ylabel="torque (rad/s²)", title="Missing torque")
     left.legend(frameon=False)
@@ -96,11 +92,16 @@ def example(name: str, stored: dict[str, list[str] | None]) -> str:
         return ""
     lines = "\n".join(stored[name] or [])
     right = f"\n  {name}: " in f"\n{lines}"
-    note = "The name is the right one." if right else "The effect that was hidden is not named first."
-    if right and "Verdict: named" not in lines:
-        note = "The effect that was hidden is among the names, but these records do not settle it."
-    if not right and f"{name}" in lines:
+    if right and "Verdict: named" in lines:
+        note = "The name is the right one."
+    elif right:
+        note = "The effect that was hidden is among the names; these records do not settle it."
+    elif name in lines:
         note = "The effect that was hidden is in the class of indistinguishable names."
+    elif "Verdict: none" in lines:
+        note = "At this size the records do not show the effect that was hidden."
+    else:
+        note = "The effect that was hidden is not named."
     return f"""
 ## A hidden example
 
@@ -136,7 +137,7 @@ def page(effect: EffectDefinition, stored: dict[str, list[str] | None]) -> str:
 | revealed by | {effect.revealed_by} |
 | in maps | {MAPPABLE[effect.mappable]} |
 
-| parameter | role | unit in SI | values of interest, without dimensions | meaning |
+| parameter | role | unit in SI | of interest, without dimensions | meaning |
 |---|---|---|---|---|
 {rows}
 
@@ -148,16 +149,19 @@ In a model file without dimensions:
 
 ## Signature
 
-![Change of a free and a forced record by {effect.name}, and the torque that the model lacks]({effect.name}.png)
+![Change of two records by {effect.name}, and the missing torque]({effect.name}.png)
 
-Records of the virtual rig without noise. Left: the record with the effect less the record without it. Right: the torque that the
-model without the effect lacks along the record with it. The size of the effect is that of the hidden example of seed 1.
+Two records of the virtual rig, without noise. Left: the record with the effect less the record
+without it. Right: the torque that the model without the effect lacks along the record with it. The
+size of the effect is that of `pendmap rig hidden --effect {effect.name} --seed 1`.
 {example(effect.name, stored)}"""
 
 
 def index(effects: list[EffectDefinition]) -> str:
     """Return the page that lists all effects."""
-    rows = "\n".join(f"| [{e.name}]({e.name}.md) | {e.group} | `{e.formula.replace('|', chr(92) + '|')}` |" for e in effects)
+    rows = "\n".join(
+        f"| [{each.name}]({each.name}.md) | {each.group} | {each.revealed_by} |" for each in effects
+    )
     names = "\n".join(effect.name for effect in effects)
     return f"""# Effects
 
@@ -165,10 +169,10 @@ def index(effects: list[EffectDefinition]) -> str:
 pendmap effects magnet
 ```
 
-shows an effect and its entry in a model file. Formulas are terms on the right of `th'' = ...`; those of drives give the motion of the
-pivot, those of readings what the sensor shows.
+shows an effect and its entry in a model file. Formulas are terms on the right of `th'' = ...`;
+those of drives give the motion of the pivot, those of readings what the sensor shows.
 
-| effect | group | formula |
+| effect | group | revealed by |
 |---|---|---|
 {rows}
 

@@ -1,8 +1,9 @@
-"""Outputs in README.md and the pages of docs: ``python docs/outputs.py`` (``make outputs``) rewrites them.
+"""Outputs in README.md and the pages of docs: ``make outputs`` rewrites them.
 
-A ``console`` block has lines ``$ pendmap ...``, each followed by what it prints; a ``text`` block right
-after a ``python`` block is what that code prints. Blocks of one page run in one folder, in order. A
-comparison ignores how many seconds or minutes are stated, the number of threads and the instruction set.
+A ``console`` block has lines ``$ pendmap ...``, each followed by what it prints; a ``text`` block
+right after a ``python`` block is what that code prints. Blocks of one page run in one folder, in
+order. A comparison ignores how many seconds or minutes are stated, the number of threads and the
+instruction set.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ BLOCK = re.compile(
     r"|(?P<code>^```python\n(?P<python>[^`]*?)^```\n+```text\n)(?P<text>.*?)(?P<end>^```$)",
     re.MULTILINE | re.DOTALL,
 )
-MACHINE = re.compile(r"\d[\d.]*(?= ?(?:s|seconds?|minutes?|threads?)\b)|\((?:avx512|avx2|neon|sse|portable)\)")
+MACHINE = re.compile(
+    r"\d[\d.]*(?= ?(?:s|seconds?|minutes?|threads?)\b)|\((?:avx512|avx2|neon|sse|portable)\)"
+)
 
 
 def pages() -> list[Path]:
@@ -37,7 +40,7 @@ def pages() -> list[Path]:
 
 
 def printed(words: list[str], folder: Path) -> str:
-    """Return what a Python command prints on a terminal's two streams, in 80 columns."""
+    """Return what a Python command prints to stdout, in 80 columns."""
     place = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
     run = subprocess.run(
         [sys.executable, *words],

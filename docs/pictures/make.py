@@ -1,4 +1,4 @@
-"""Make the pictures of the README and the pages here: `python docs/pictures/make.py`, from anywhere."""
+"""Make the pictures of the README and the pages: ``python docs/pictures/make.py``."""
 
 from __future__ import annotations
 

@@ -30,11 +30,9 @@ def main() -> None:
     axis.annotate("", (-0.35, 0.55), (-0.35, -0.55), arrowprops=arrow)
     axis.text(-0.5, 0, r"$Y \cos \Omega t$", color=ORANGE, fontsize=14, ha="right", va="center")
     axis.add_patch(Arc((0, 0), 0.55, 0.55, theta1=20, theta2=160, color=ORANGE, lw=1.8))
-    axis.annotate(
-        "", (0.275, 0.02), (0.262, 0.09), arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 1.8}
-    )
+    axis.annotate("", (0.275, 0.02), (0.262, 0.09), arrowprops={**arrow, "arrowstyle": "->"})
     axis.text(0.42, 0.16, "damping $c$, friction $T_r$", color=ORANGE, fontsize=11, va="center")
-    axis.text(*(bob + (0.28, -0.02)), "$m$", color=BLUE, fontsize=15, va="center")
+    axis.text(bob[0] + 0.28, bob[1], "$m$", color=BLUE, fontsize=15, va="center")
     axis.annotate(
         "", (2.1, -1.5), (2.1, -0.7), arrowprops={"arrowstyle": "->", "color": GREY, "lw": 1.8}
     )

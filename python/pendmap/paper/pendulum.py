@@ -87,7 +87,7 @@ def _rod(font: float) -> list[Mark]:
         Areas([_arc((0.0, 0.0), 0.13)], colour=_WHITE, order=4.0),
         Line(*_arc((0.0, 0.0), 0.13).T, colour=_DARK, width=1.6, order=4.1),
         Areas([_arc((0.0, 0.0), 0.04), _arc(_END, BOB)], colour=_DARK, order=4.2),
-        _text(_END, "$m$", colour=_WHITE, size=font, order=5.0),
+        _text(_END, "m", colour=_WHITE, size=font, order=5.0),
         *_turn(radius, -math.pi / 2, THETA - math.pi / 2, _DARK, 1.3),
         _text((radius + 0.22) * middle, "θ", colour=_DARK, size=1.3 * font),
         *_arrow(move, _END + move, _HELP, both=True, thin=True),
@@ -107,7 +107,7 @@ def _forces(font: float) -> list[Mark]:
     above: dict[str, Any] = {"colour": _MOTION, "align": ("center", "bottom"), "size": font}
     return [
         *_arrow(_END - (0.0, BOB), _END - (0.0, BOB + 0.75), _FORCE),
-        _text(np.add(_END, (0.14, -BOB - 0.5)), "$m\\,g$", size=font, **pull),
+        _text(np.add(_END, (0.14, -BOB - 0.5)), "m g", size=font, **pull),
         *_arrow(start, start + 0.7 * _SIDE, _MOTION),
         _text(start + 0.78 * _SIDE + (0.0, 0.12), "dθ/dt > 0", **above),
         # Torque about the axle, opposite to the rotation.
