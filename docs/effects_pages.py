@@ -99,7 +99,7 @@ def example(name: str, stored: dict[str, list[str] | None]) -> str:
     elif name in lines:
         note = "The effect that was hidden is in the class of indistinguishable names."
     elif "Verdict: none" in lines:
-        note = "At this size the records do not show the effect that was hidden."
+        note = "The baseline explains the records: it has this term, or they do not show it."
     else:
         note = "The effect that was hidden is not named."
     return f"""

@@ -177,11 +177,10 @@ def test_every_toml_block_is_a_valid_file_of_its_kind(
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_has_a_target(page: Path) -> None:
-    written = re.sub(
-        r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
-    )
+    block = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
+    prose = block.sub("", page.read_text(encoding="utf-8"))
     generated = {"commands.md", "effects/index.md", "api/index.md"}
-    for target in re.findall(r"\]\(<?([^)#>]+)(?:#[^)>]*)?>?\)", written):
+    for target in re.findall(r"\]\(<?([^)#>]+)(?:#[^)>]*)?>?\)", prose):
         if target.startswith(RAW):
             assert (ROOT / target.removeprefix(RAW)).exists(), target
         elif not target.startswith("http") and target not in generated:
