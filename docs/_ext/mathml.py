@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
     from sphinx.writers.html5 import HTML5Translator
 
 LOGGER = logging.getLogger(__name__)
+PRIME = re.compile(r"<msup>(<mi>[^<]*</mi>)<mi>(&#x0203[2-4];)</mi></msup>")
+"""A prime is high already: as an exponent browsers raise it twice."""
+FUNCTION = re.compile(r"<mi>(?:arccos|arcsin|arctan|cosh|sinh|tanh|cos|sin|tan|exp|log|ln)</mi>")
+THIN = '<mspace width="0.17em"/>'
 
 
 def mathml(node: nodes.math | nodes.math_block) -> str:
@@ -21,7 +26,8 @@ def mathml(node: nodes.math | nodes.math_block) -> str:
     display = "block" if isinstance(node, nodes.math_block) else "inline"
     text = node.astext()
     try:
-        return str(convert(text, display=display))
+        written = PRIME.sub(r"<mrow>\1<mo>\2</mo></mrow>", convert(text, display=display))
+        return FUNCTION.sub(rf"{THIN}\g<0>{THIN}", written)
     except Exception as error:  # noqa: BLE001 (any error of the converter)
         LOGGER.warning("no MathML of %r: %r", text, error, location=node)
         return f"<code>{escape(text)}</code>"
