@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all lanes wheel man notebooks fuzz lint bench build-times clean develop
+.PHONY: demo test test-all lanes wheel man docs outputs notebooks fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -33,6 +33,12 @@ wheel: $(VENV)/bin/maturin ## a wheel of this system, in target/wheels
 
 man: $(VENV)/.develop ## the man pages again, from the texts of --help
 	$(BIN)/python docs/man_pages.py
+
+docs: $(VENV)/.develop ## the manual, in docs/_build/html
+	$(BIN)/python -m sphinx -W --keep-going -n -q docs docs/_build/html
+
+outputs: $(VENV)/.develop ## what the commands in README.md and the pages print, rewritten from real runs
+	$(BIN)/python docs/outputs.py
 
 notebooks: $(VENV)/.develop ## execute docs/notebooks in place
 	$(BIN)/python docs/notebooks/run.py
@@ -78,7 +84,7 @@ $(VENV)/.demo: $(VENV)/bin/maturin $(CORE)
 	touch $@
 
 $(VENV)/.develop: $(VENV)/bin/maturin $(CORE)
-	. $(BIN)/activate && maturin develop --release --locked --quiet --extras dev
+	. $(BIN)/activate && maturin develop --release --locked --quiet --extras dev,docs
 	touch $@ $(VENV)/.demo
 
 clean: ## remove what was built

@@ -185,13 +185,12 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         share of starts whose label changes nearby.
     adaptive : bool
         Whether to compute the cells at boundaries alone: those inside a block of cells get the
-        label of its rim if that has one (:mod:`pendmap.analysis.adaptive`). Filled cells are drawn
+        label of its rim if that has one. Filled cells are drawn
         at random and computed, which bounds the share of wrong labels. Where the boundary is
         fractal everywhere all cells are computed.
     draws : int, optional
         Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
-        the probability of each outcome in each cell, and the uncertainty due to the parameters
-        (:mod:`pendmap.analysis.draws.basins`).
+        the probability of each outcome in each cell, and the uncertainty due to the parameters.
     store : str or path, optional
         A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the map is
         computed in tiles of about 2^20 starts, and each is stored as it is done. The result reads
@@ -231,8 +230,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         ``computed``, how the label of a cell was found (settling time and net turns of a filled
         cell are missing), ``computed_share``, and ``label_error``, the estimated share of cells
         with a wrong label, between ``label_error_low`` and ``label_error_high`` with 95 %
-        confidence; ``mean_settle`` is an estimate too. With ``draws`` also the variables of
-        :func:`pendmap.analysis.draws.basins.basins_over`.
+        confidence; ``mean_settle`` is an estimate too. With ``draws`` also
+        ``probability``, ``certainty`` and ``label_entropy`` over the draws.
 
     Notes
     -----

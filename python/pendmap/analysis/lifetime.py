@@ -159,8 +159,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed : int
         Draws the starts, and the models of ``draws``.
     draws : int, optional
-        As for :func:`pendmap.basins`; adds the interval of the mean lifetime
-        (:func:`pendmap.analysis.lifetime.lifetime_over`).
+        As for :func:`pendmap.basins`; adds the interval of the mean lifetime.
     max_periods, tol, threads, store, resume, part, executor, mix, chunks, progress
         As for :func:`pendmap.basins`.
 

@@ -116,7 +116,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
     draws : int, optional
         As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
-        and are stable (:func:`pendmap.analysis.orbits.orbits_over`).
+        and are stable.
     threads, seed, progress
         As for :func:`pendmap.basins`.
 

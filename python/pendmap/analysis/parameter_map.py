@@ -160,8 +160,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
-        As for :func:`pendmap.basins`; adds the probability of each regime in each cell
-        (:func:`pendmap.analysis.parameter_map.regimes_over`).
+        As for :func:`pendmap.basins`; adds the probability of each regime in each cell.
     threads, store, resume, part, executor, mix, chunks, progress
         As for :func:`pendmap.basins`; tiles are blocks of 16 x 16 cells.
 

@@ -161,8 +161,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Whether to add frequencies where curves begin, end, turn or bend between two given ones, for
         figures.
     draws : int, optional
-        As for :func:`pendmap.basins`; adds the band of each critical amplitude
-        (:func:`pendmap.analysis.tongues.tongues_over`).
+        As for :func:`pendmap.basins`; adds the band of each critical amplitude.
     threads, seed, progress
         As for :func:`pendmap.basins`.
 
@@ -180,8 +179,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``inverted_p``, ``inverted_multiplier``, ``inverted_stable_above`` over ``inverted``; none,
         and ``inverted_rest`` is 0, where upright is no rest. Under a torque, when ``moved`` is 1,
         there are no folds and none without damping. Over ``curve`` and
-        ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by
-        (:mod:`pendmap.analysis.critical_curves`).
+        ``omega``: ``asymptotic`` and ``asymptotic_error``, relative to the exact curve nearest by.
 
     Raises
     ------

@@ -192,7 +192,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     Parameters
     ----------
     found : Discrepancy
-        From :func:`pendmap.diagnosis.diagnose`.
+        From :func:`pendmap.diagnose`.
     command : str
         The command line.
 

@@ -10,7 +10,7 @@ class Thresholds:
     """Decision thresholds of a diagnosis.
 
     ``benchmarks/blind/thresholds.py`` halves and doubles each of them and counts how many verdicts
-    change; the table is in ``docs/diagnose.md``.
+    change; the table is in ``docs/records/diagnose.md``.
 
     Examples
     --------

@@ -52,7 +52,7 @@ def diagnosis(found: Discrepancy) -> Document:
     Parameters
     ----------
     found : Discrepancy
-        From :func:`pendmap.diagnosis.diagnose`.
+        From :func:`pendmap.diagnose`.
 
     Returns
     -------

@@ -75,7 +75,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     Parameters
     ----------
     found : Discrepancy
-        Result of :func:`pendmap.diagnosis.diagnose`.
+        Result of :func:`pendmap.diagnose`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 

@@ -1,4 +1,4 @@
-"""Make the pictures of the README and the pages here: `python docs/pictures.py`, from anywhere."""
+"""Make the pictures of the README and the pages: ``python docs/pictures/make.py``."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HERE = Path(__file__).resolve().parent
+DOCS = HERE.parent
 SIZE = (6.4, 6.0)
 # Stick and slip under drive, then rest: a start of tests/truths.json.
 STICKING = Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2)
@@ -114,12 +115,15 @@ def identification() -> None:
 
 
 def diagnosis() -> None:
-    """The report of docs/diagnose.md: what is hidden is named, and the gap shrinks."""
+    """The report of docs/records/diagnose.md: what is hidden is named, and the gap shrinks."""
     with tempfile.TemporaryDirectory() as folder:
         request = virtual_rig.Request("hidden", seed=3, effects=("quadratic_drag",))
         places = virtual_rig.places(Path(folder) / "lab", replace=True)
         virtual_rig.write(virtual_rig.make(request), places)
         render.write_report(diagnose(read_experiment(places.experiment)), HERE / "lab.md")
+    page = (HERE / "lab.md").read_text(encoding="utf-8").replace("](<lab_", "](<../pictures/lab_")
+    (DOCS / "records" / "report.md").write_text(page, encoding="utf-8")
+    (HERE / "lab.md").unlink()
 
 
 def planes() -> None:
@@ -132,7 +136,7 @@ def planes() -> None:
 
 def in_axes() -> None:
     """The figure of the first snippet of figures.md."""
-    page = (HERE / "figures.md").read_text(encoding="utf-8")
+    page = (DOCS / "figures.md").read_text(encoding="utf-8")
     code = re.findall(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)[0]
     names: dict[str, Figure] = {}
     exec(code.replace('fig.savefig("four.pdf")', ""), names)  # noqa: S102 (our own page)
