@@ -21,6 +21,7 @@ from scipy.interpolate import make_interp_spline
 import pendmap
 from pendmap import virtual_rig
 from pendmap.files import toml_text
+from pendmap.formatting import wrapped
 
 if TYPE_CHECKING:
     from pendmap import EffectDefinition
@@ -91,6 +92,7 @@ def example(name: str, stored: dict[str, list[str] | None]) -> str:
     if stored.get(name) is None:
         return ""
     lines = "\n".join(stored[name] or [])
+    printed = wrapped(lines)
     right = f"\n  {name}: " in f"\n{lines}"
     if right and "Verdict: named" in lines:
         note = "The name is the right one."
@@ -108,7 +110,7 @@ def example(name: str, stored: dict[str, list[str] | None]) -> str:
 ```text
 $ pendmap rig hidden --effect {name} --seed 1 --out hidden
 $ pendmap diagnose hidden
-{lines}
+{printed}
 ```
 
 {note}

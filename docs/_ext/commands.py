@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
 from pendmap.cli.main import command
 
 HERE = Path(__file__).resolve().parents[1]
@@ -20,13 +18,13 @@ code is 0 if all was done, 1 if not, 2 for bad input and 130 after an interrupt.
 def page() -> str:
     """Return the page."""
     parts = [INTRODUCTION]
-    with click.Context(command, info_name="pendmap", max_content_width=80) as above:
+    with command.make_context("pendmap", [], resilient_parsing=True) as above:
         names = command.list_commands(above)
         for name in ["", *names]:
             called = command.get_command(above, name) if name else command
             if called is None:
                 continue
-            with click.Context(called, info_name=name, parent=above, max_content_width=80) as own:
+            with called.make_context(name, [], above, resilient_parsing=True) as own:
                 text = called.get_help(own if name else above)
             parts.append(f"## pendmap {name}".rstrip() + f"\n\n```text\n{text}\n```\n")
     return "\n".join(parts)
