@@ -159,7 +159,8 @@ COMMAND = '''
 
 import click
 
-from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.model_options import model_options
+from pendmap.cli.show import begin
 from pendmap.cli.parse.options import output_options
 from pendmap.cli.show import show
 from pendmap.cli.parse.types import NUMBER

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap import ANALYSES
 from pendmap.cli.parse.groups import new_command
-from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.model_options import model_options
 from pendmap.cli.parse.options import (
     added,
     machine_options,
@@ -17,7 +17,7 @@ from pendmap.cli.parse.options import (
     store_options,
     worker_options,
 )
-from pendmap.cli.show import show
+from pendmap.cli.show import begin, show
 from pendmap.cli.stored import Kept
 
 if TYPE_CHECKING:

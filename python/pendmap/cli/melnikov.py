@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from pendmap.cli.parse.groups import new_command
-from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.model_options import model_options
 from pendmap.cli.parse.options import output_options, simd_option
-from pendmap.cli.show import show
+from pendmap.cli.show import begin, show
 
 
 @new_command(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from pendmap.cli.parse.model_options import model_from
 from pendmap.cli.parse.options import RESULTS
 from pendmap.cli.parse.types import PICTURES, REPORTS, Address, default_file
 from pendmap.cli.text import say, write_json
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pendmap.analysis.result import Schema
+    from pendmap.model import Pendulum, Rig
 
     Write = Callable[[Path], Path | str]
 
@@ -247,6 +249,15 @@ def _report_files(report: Path) -> list[Path]:
     """Return the files of a report without its figures; a folder holds one of either kind."""
     in_folder = report.is_dir() or not report.suffix
     return [report / "report.html", report / "report.md"] if in_folder else [report]
+
+
+def begin(
+    given: dict[str, Any], name: str, *, going_on: bool = False
+) -> tuple[Pendulum | Rig, Outputs]:
+    """Remove the options of model and outputs from ``given``; refuse the model's file as output."""
+    file = given["model"]
+    model = model_from(given)
+    return model, Outputs.take(given, name, reads=[file], going_on=going_on)
 
 
 def free_name(

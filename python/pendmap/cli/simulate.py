@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from pendmap.cli.parse.groups import ACCURACY, OUTPUT, group, new_command
-from pendmap.cli.parse.model_options import begin, model_options
+from pendmap.cli.parse.model_options import model_options
 from pendmap.cli.parse.options import flag, option, output_options, simd_option, start_options
 from pendmap.cli.parse.types import NUMBER, whole
-from pendmap.cli.show import show
+from pendmap.cli.show import begin, show
 from pendmap.errors import MOST_SAMPLES, named
 
 _ANALYSIS = group("Trajectory", "--until 500 --samples 128")

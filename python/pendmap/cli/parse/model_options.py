@@ -12,7 +12,6 @@ import click
 from pendmap.cli.parse.groups import MODEL, SI
 from pendmap.cli.parse.options import added, option
 from pendmap.cli.parse.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
-from pendmap.cli.show import Outputs
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.quantities import check
@@ -127,15 +126,6 @@ def model_from(given: dict[str, Any]) -> Pendulum | Rig:
     bare = {name: value for name, value in typed.items() if name in _BARE}
     base = dataclasses.replace(PRESETS[preset] if preset else Pendulum(), **bare)
     return base if model is None else load_model(model, typed)
-
-
-def begin(
-    given: dict[str, Any], name: str, *, going_on: bool = False
-) -> tuple[Pendulum | Rig, Outputs]:
-    """Remove the options of model and outputs from ``given``; refuse the model's file as output."""
-    file = given["model"]
-    model = model_from(given)
-    return model, Outputs.take(given, name, reads=[file], going_on=going_on)
 
 
 def rig_from(path: Path) -> Rig:
