@@ -157,19 +157,18 @@ def swing(pendulum, largest=3.0):
 COMMAND = '''
 """``pendmap swing``: period against amplitude."""
 
-import click
-
+from pendmap.cli.parse.groups import group, new_command
 from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.show import begin
-from pendmap.cli.parse.options import output_options
-from pendmap.cli.show import show
+from pendmap.cli.parse.options import option, output_options
 from pendmap.cli.parse.types import NUMBER
+from pendmap.cli.show import begin, show
+
+ANALYSIS = group("Analysis", "--largest 2")
 
 
-@click.command("swing")
+@new_command("swing", "pendmap swing --largest 2")
 @model_options
-@click.option("--largest", type=NUMBER, default=3.0, help="Largest amplitude, rad.")
-@click.option("--quiet", is_flag=True, help="No summary.")
+@option("--largest", NUMBER, "Largest amplitude, rad.", 3.0, group=ANALYSIS)
 @output_options()
 def command(**given):
     """Compute the period of free swings against their amplitude."""
