@@ -272,17 +272,26 @@ def free_name(
 
 
 def keep_files(options: Mapping[Path | Address, str]) -> None:
-    """Refuse files that exist, named by their option."""
+    """Refuse files and stores that exist, named by their option."""
     for path, option in options.items():
-        files = [] if isinstance(path, Address) else [path]
-        if option == "--report" and files:
-            files = _report_files(files[0])
-        for file in files:
-            if file.exists():
-                raise click.UsageError(
-                    f"Invalid value for '{option}': {str(file)!r}: must be a new file, got one that"
-                    " exists: --overwrite replaces it"
-                )
+        if isinstance(path, Address):
+            there = [str(path)] if _complete(path) else []
+        else:
+            files = _report_files(path) if option == "--report" else [path]
+            there = [str(file) for file in files if file.exists()]
+        for name in there:
+            raise click.UsageError(
+                f"Invalid value for '{option}': {name!r}: must be a new file, got one that exists:"
+                " --overwrite replaces it"
+            )
+
+
+def _complete(address: Address) -> bool:
+    """Return whether there is a complete result at an address."""
+    from pendmap.engine import ZarrStore
+
+    mark = ZarrStore(address).mark()
+    return mark is not None and bool(mark["complete"])
 
 
 def keep_inputs(

@@ -79,6 +79,18 @@ def test_a_path_may_be_an_address(tmp_path: Path) -> None:
         tiled.CASES["basins"](store="s4://maps/map.zarr")
 
 
+def test_a_complete_store_is_replaced_only_on_request(pendmap_command: Run, tmp_path: Path) -> None:
+    for store in (f"file://{tmp_path}/a.zarr", "b.zarr"):
+        words = (*SMALL, "--out", store, "--quiet")
+        assert pendmap_command(*words).returncode == 0
+        refused = pendmap_command(*words)
+        assert refused.returncode == 2
+        assert f"{store!r}: must be a new file, got one that exists" in refused.stderr
+        for option in ("--resume", "--overwrite", "--dry-run"):
+            run = pendmap_command(*words, option)
+            assert run.returncode == 0, run.stderr
+
+
 def test_an_object_store_that_is_not_reached_is_told(
     bucket: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
