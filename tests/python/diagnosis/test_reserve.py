@@ -84,7 +84,7 @@ def waving() -> tuple[State, ScoredModel]:
     data = split_records(Experiment(Path("there"), tuple(runs)))
     base, core = fit_baseline(data)
     state = State(data, base, Thresholds(), 3, ())
-    return state, state.scored(search(state, core, lambda _: None))
+    return state, state.scored(search(state, core))
 
 
 def runs_of(state: State, fitted: FittedModel) -> RunByRun:

@@ -55,7 +55,7 @@ def dragged() -> tuple[State, FittedModel | None]:
 
 @pytest.fixture(scope="module")
 def best(dragged: tuple[State, FittedModel | None]) -> FittedModel:
-    return search(*dragged, lambda _: None)
+    return search(*dragged)
 
 
 def test_the_core_is_fitted_in_addition_to_the_given_model(
@@ -126,7 +126,7 @@ def test_a_fit_that_diverges_is_no_candidate(
     monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_model", lost)
     other = State(state.records, state.base, state.thresholds, 3, ())
     assert other.refit(state.base, [0]) is None
-    assert search(other, None, lambda _: None).chosen == ()
+    assert search(other, None).chosen == ()
 
 
 def test_an_error_of_a_fit_is_not_taken_for_divergence(
@@ -146,11 +146,11 @@ def test_no_effect_is_accepted_that_noise_explains() -> None:
     data = decay(drag=0.0)
     base, core = fit_baseline(data)
     state = State(data, base, Thresholds(), 3, ())
-    assert search(state, core, lambda _: None).chosen == ()
+    assert search(state, core).chosen == ()
     # Thresholds that accept everything accept the best candidate.
     lax = Thresholds(chance=2.0, alike=0.0, closes=0.0, loss=math.inf)
     state = State(data, base, lax, 1, CORE)
-    assert search(state, None, lambda _: None).chosen != ()
+    assert search(state, None).chosen != ()
 
 
 def test_a_model_that_loses_on_held_out_records_is_refused(
