@@ -56,7 +56,7 @@ def pages() -> dict[str, str]:
             called = command.get_command(whole, name)
             assert called is not None  # noqa: S101 (it is listed)
             with called.make_context(name, [], whole, **start) as context:
-                context.formatter_settings["width"] = WIDTH
+                context.formatter_settings = {**context.formatter_settings, "width": WIDTH}
                 made[f"pendmap-{name}.1"] = page(name, context)
     return made
 

@@ -168,7 +168,8 @@ def test_a_suffix_says_what_is_written(pendmap_command: Run, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_options_stand_in_groups_with_examples_that_they_have(name: str) -> None:
-    called = command.get_command(click.Context(command), name)
+    whole = click.Context(command, **command.context_settings)
+    called = command.get_command(whole, name)
     assert isinstance(called, cloup.Command)
     assert called.examples  # type: ignore[attr-defined]
     for group in called.option_groups:
@@ -180,7 +181,7 @@ def test_options_stand_in_groups_with_examples_that_they_have(name: str) -> None
     for line in called.examples:
         words = shlex.split(line)
         assert words[:2] == ["pendmap", name]
-        with called.make_context(name, words[2:], resilient_parsing=True) as context:
+        with called.make_context(name, words[2:], whole, resilient_parsing=True) as context:
             assert not context.args
         known = {option for one in called.params for option in one.opts}
         assert {w.partition("=")[0] for w in words if w.startswith("--")} <= known, line
