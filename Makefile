@@ -13,7 +13,8 @@ develop: $(VENV)/.develop ## set up everything for work on pendmap itself
 
 # The modules of tests/rust that ask for the instruction set themselves: what the lanes compute.
 LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -l '\bsimd()' tests/rust/*.rs)))
-PYTEST := $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
+# Tests run one beside the other: matrices in several threads would only wait for each other.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
 test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
 	cargo test --locked --quiet

@@ -144,12 +144,15 @@ def wrapped(text: str, width: int = WIDTH) -> str:
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
     """Return a table as text with aligned columns: header, rows, a final newline.
 
-    What is wider than ``width`` continues in further tables, which repeat the first column.
+    What is wider than ``width`` continues in further tables, which repeat the first column. A
+    column without an entry is left out.
     """
     lines = [head, *rows]
     wide = [max(len(line[k]) for line in lines) for k in range(len(head))]
     parts: list[list[int]] = [[0]]
     for k in range(1, len(head)):
+        if rows and not any(row[k] for row in rows):
+            continue
         if len(parts[-1]) > 1 and sum(wide[j] + 2 for j in parts[-1]) + wide[k] > width:
             parts.append([0])
         parts[-1].append(k)

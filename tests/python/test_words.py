@@ -67,3 +67,4 @@ def test_a_wide_table_goes_on_below_with_its_first_column() -> None:
     said = columns(["name", "a", "b"], [["x", "1" * 10, "2" * 10]], 20)
     assert said == f"name  a\nx     {'1' * 10}\n\nname  b\nx     {'2' * 10}\n"
     assert columns(["name", "a"], [["x", "1"]]) == "name  a\nx     1\n"
+    assert columns(["name", "none", "a"], [["x", "", "1"]]) == "name  a\nx     1\n"
