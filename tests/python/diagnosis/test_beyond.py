@@ -12,7 +12,7 @@ import pytest
 import pendmap.diagnosis
 from hidden import once
 from pendmap import InputError, _core, render, viewer
-from pendmap.cli.show import plain
+from pendmap.cli.text import plain
 from pendmap.diagnosis import Discrepancy, diagnosed_model, result, summary
 
 if TYPE_CHECKING:

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 SMALL = ("basins", "--p", "0.6", "--grid", "30")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def bucket() -> Iterator[str]:
-    """A bucket of a local S3 server."""
+    """A bucket of a local S3 server, one for all: fsspec keeps the connection to the first."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
