@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-all lanes wheel man docs outputs notebooks fuzz lint bench build-times clean develop
+.PHONY: demo test test-manual test-all lanes wheel man docs outputs notebooks fuzz lint bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -19,6 +19,9 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n logical --maxproc
 test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
 	cargo test --locked --quiet
 	$(PYTEST) -m 'not thorough'
+
+test-manual: $(VENV)/.develop ## set up everything, build the manual and run its commands, cells, notebooks and links
+	$(PYTEST) tests/python/docs
 
 test-all: $(VENV)/.develop ## set up everything and run all tests, those of the lanes on every instruction set
 	cargo test --locked --quiet
