@@ -5,10 +5,11 @@ from __future__ import annotations
 import abc
 import dataclasses
 import html
+import json
 import math
 import re
 import textwrap
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -172,6 +173,21 @@ def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
     body = "".join(line(row, "td") for row in rows)
     return f"<table><thead>{line(head, 'th')}</thead><tbody>{body}</tbody></table>"
+
+
+def json_text(fields: dict[str, Any]) -> str:
+    """Return one JSON object; numbers of numpy become Python's, those not finite become null."""
+
+    def plain(value: Any) -> Any:  # noqa: ANN401 (any part of the object)
+        if isinstance(value, dict):
+            return {str(key): plain(part) for key, part in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(part) for part in value]
+        if hasattr(value, "item"):
+            value = value.item()
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps(plain(fields), allow_nan=False)
 
 
 def interval(estimate: Estimate) -> str:

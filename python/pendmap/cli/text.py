@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.formatting import columns, wrapped
+from pendmap.formatting import columns, json_text, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -23,7 +21,7 @@ def say(text: str) -> None:
 
 def write_json(fields: dict[str, Any]) -> None:
     """Write one JSON object to stdout."""
-    click.echo(json.dumps(plain(fields), allow_nan=False))
+    click.echo(json_text(fields))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -38,16 +36,3 @@ def first_of_all(found: Readable, first: Collection[str]) -> Iterator[str]:
     tables, lines = found.text_parts()
     yield from (table(head, rows) for head, rows in tables if rows)
     yield from (line for line in lines if line not in first)
-
-
-def plain(value: Any) -> Any:  # noqa: ANN401 (any part of a JSON object)
-    """Convert numpy numbers to Python's, and numbers that are not finite to None."""
-    if isinstance(value, dict):
-        return {str(key): plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -12,8 +12,8 @@ import pytest
 import pendmap.diagnosis
 from hidden import once
 from pendmap import InputError, _core, render, viewer
-from pendmap.cli.text import plain
 from pendmap.diagnosis import Discrepancy, diagnosed_model, result, summary
+from pendmap.formatting import json_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -46,11 +46,11 @@ def lose(monkeypatch: pytest.MonkeyPatch, share: float, seed: int = 0) -> None:
 def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
     share: float, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = plain(summary.as_json(once("quadratic_drag")))
+    whole = json.loads(json_text(summary.as_json(once("quadratic_drag"))))
     assert whole["not_computed"] == {}
     found = anew()
     lose(monkeypatch, share, seed)
-    told = json.loads(json.dumps(plain(summary.as_json(found)), allow_nan=False))
+    told = json.loads(json_text(summary.as_json(found)))
     assert told.keys() == whole.keys()
     for name in ("verdict", "effects", "gap", "where", "ranking", "left"):
         assert told[name] == whole[name], name
