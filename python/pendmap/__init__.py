@@ -13,6 +13,7 @@ TYPE_CHECKING = False  # importing typing would take most of this file's import 
 if TYPE_CHECKING:
     from typing import Any
 
+    from pendmap import plot as plot
     from pendmap.analysis.basin_sweep import sweep as sweep
     from pendmap.analysis.basins import basins as basins
     from pendmap.analysis.basins import basins_of as basins_of
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
     from pendmap.records import Segment as Segment
     from pendmap.records import noise_floor as noise_floor
     from pendmap.records import read_experiment as read_experiment
-    from pendmap.render import plot as plot
     from pendmap.viewer import view as view
 
     __version__: str
@@ -167,9 +167,9 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
 
         return version("pendmap")
     if name == "plot":
-        import pendmap.render.plot
+        import pendmap.plot
 
-        return pendmap.render.plot
+        return pendmap.plot
     if name in _HOMES:
         import importlib
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import struct
 from pathlib import Path
@@ -80,10 +81,15 @@ def test_a_result_is_drawn_into_the_axes_given(name: str) -> None:
     assert {axes for axes in figure.axes if axes.has_data()} <= {right, *figure.axes[2:]}
 
 
+def test_it_is_a_module_that_lists_its_functions() -> None:
+    assert importlib.import_module("pendmap.plot") is pendmap.plot
+    assert {name for name in dir(plot) if not name.startswith("_")} == set(plot.__all__)
+
+
 def test_every_result_has_a_function() -> None:
     own = inspect.getmembers(plot, lambda one: inspect.getmodule(one) is plot)
     public = {name for name, one in own if inspect.isfunction(one)}
-    others = {"draw", "map", "diagnosis", "_draw"}
+    others = {"draw", "map", "diagnosis"}
     assert public == {*results(), *others}
     assert plot.map is plot.parameter_map
 

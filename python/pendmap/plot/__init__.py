@@ -31,6 +31,29 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport
     from pendmap.records import Experiment, Run
 
+__all__ = [
+    "Look",
+    "basins",
+    "bifurcation",
+    "comparison",
+    "diagnosis",
+    "draw",
+    "figure",
+    "identification",
+    "lifetime",
+    "lyapunov",
+    "map",
+    "melnikov",
+    "orbit",
+    "parameter_map",
+    "record",
+    "save",
+    "section",
+    "sweep",
+    "tongues",
+    "trajectory",
+]
+
 figure = figure_of
 save = _save
 
@@ -279,3 +302,7 @@ def diagnosis(
     torque), ``residual 0``, or one that the message on an unknown one lists.
     """
     return _draw("diagnosis", found, ax, layer, look)
+
+
+def __dir__() -> list[str]:
+    return __all__
