@@ -29,6 +29,8 @@ MINUS: Final = "\N{MINUS SIGN}"  # Minus sign of figures
 
 WIDTH: Final = 80  # Columns of a terminal
 
+_STYLE: Final = re.compile("\x1b\\[[0-9;]*m")  # Bold letters and colours of a terminal
+
 _GLUE: Final = "\N{NO-BREAK SPACE}"
 _GLUED: Final = re.compile(r"(?<=\d) (?=%|\+-)|(?<=\+-) |(?<= =) |(?<=\S) (?== )")
 
@@ -125,7 +127,7 @@ def wrapped(text: str, width: int = WIDTH) -> str:
 
     def lines(line: str) -> Iterator[str]:
         start = line[: len(line) - len(line.lstrip())]
-        if len(line) <= width:
+        if len(_STYLE.sub("", line)) <= width:
             yield line
             return
         whole = _GLUED.sub(_GLUE, line.strip())  # a number and its unit stay together

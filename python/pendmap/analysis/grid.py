@@ -83,8 +83,8 @@ class Grid:
     Parameters
     ----------
     theta : Axis, (low, high, count) or array_like, shape (N,)
-        Angle, rad. ``low`` and ``high`` are the outer ends of the cells; an array, or a list that
-        has not three numbers, holds their centres, ascending and evenly spaced.
+        Angle, rad. ``low`` and ``high`` are the outer ends of the cells; an array or a list holds
+        their centres, ascending and evenly spaced.
     velocity : Axis, (low, high, count) or array_like, shape (M,)
         Velocity ``d theta / d tau``, in rad/s for a :class:`pendmap.Rig`; likewise.
 
@@ -106,7 +106,7 @@ class Grid:
     def __post_init__(self) -> None:
         for name in ("theta", "velocity"):
             axis = getattr(self, name)
-            if isinstance(axis, tuple | list) and len(axis) == 3:  # noqa: PLR2004
+            if isinstance(axis, tuple) and len(axis) == 3:  # noqa: PLR2004
                 object.__setattr__(self, name, Axis(*axis))
             elif isinstance(axis, np.ndarray | Sequence) and not isinstance(axis, str):
                 object.__setattr__(self, name, Axis.around(name, axis))
@@ -198,7 +198,9 @@ def ascending(name: str, given: ArrayLike) -> Floats:
     except (TypeError, ValueError, OverflowError):
         values = np.zeros(0)
     if values.ndim != 1 or not (values.size and np.isfinite(values).all()):
-        raise InputError(f"{name} must be an array (N,) of numbers, got {short_repr(given)}")
+        raise InputError(
+            f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
+        )
     if not (np.diff(values) > 0).all():
         raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
     return values

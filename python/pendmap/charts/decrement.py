@@ -102,7 +102,7 @@ def part(report: IdentificationReport) -> Chart:
                 marks += _model(report.peaks, source, shift, (ends[0], up), absolute=absolute)
             if not absolute:
                 marks.append(ZERO)
-            panels.append(Panel(f"{title} {text}", title, across, up, marks))
+            panels.append(Panel(f"{up.name} {text}", title, across, up, marks))
     return Chart(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
 
 

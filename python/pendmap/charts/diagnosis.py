@@ -351,7 +351,7 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
             spots = np.full(x.size, place)
             cross: dict[str, Any] = {"marker": mark, "size": 4.5, "edge_width": 1.0}
             marks.append(Points(x, spots, colour=QUIET, name=said, **cross))
-    times = f"10$^{{{power}}}$ " if power else ""
+    times = f"$10^{{{power}}}$ " if power else ""
     unit = f"{times}{unit_of(shown, found.definition)}".strip()
     own = shown.rpartition(".")[2]
     claimed = "" if found.effects else " (not claimed)"

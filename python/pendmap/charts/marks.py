@@ -162,15 +162,13 @@ class Span(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Text(Mark):
-    """Text at a position, in shares of the panel if ``inside``; ``align``: horizontal, vertical."""
+    """Text at a position; ``align``: horizontal, vertical."""
 
     x: float
     y: float
     text: str
     _: dataclasses.KW_ONLY
-    inside: bool = False
     align: tuple[str, str] = ("center", "center")
-    boxed: bool = False
     size: float = 9.0
 
 

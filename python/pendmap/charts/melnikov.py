@@ -8,7 +8,7 @@ import numpy as np
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import INK, QUIET, Band, Dash, Line, Mark, Points, Text
+from pendmap.charts.marks import INK, Band, Dash, Line, Mark, Points
 from pendmap.files import facts
 
 if TYPE_CHECKING:
@@ -50,16 +50,13 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
             high = np.full_like(omega, top)
             marks.append(Band(omega, at[name], high, colour=colour, alpha=0.10))
     damped = np.nanmax(at.get("loop", p), initial=0.0) > 0
-    follows = "fractal boundaries of basins" if damped else "chaos; no basins without damping"
+    follows = "fractal boundaries of basins" if damped else "chaos, no basins without damping"
     star: dict[str, Any] = {"marker": "*", "size": 9.0, "clip": False, "order": 4.0}
-    marks += [
-        Points(*np.array(own).reshape(2, 1), name="this pendulum", path="own", **star),
-        Text(0.5, 0.93, f"manifolds cross: {follows}", inside=True, boxed=True, colour=QUIET),
-    ]
+    marks.append(Points(*np.array(own).reshape(2, 1), name="this pendulum", path="own", **star))
     x = (min(float(omega[0]), own[0]), max(float(omega[-1]), own[0]))
     across = Axis("ω = Ω/w0", x)
     up = Axis("p = YΩ²/g", (0.0, top))
-    panel = Panel("melnikov", "", across, up, marks)
+    panel = Panel("melnikov", f"above: manifolds cross, {follows}", across, up, marks)
     title = "Homoclinic threshold, Melnikov, first order"
     return Chart(
         title, names.parameters(a | {"omega": a["own_omega"]}), [[panel]], ratio=0.68

@@ -67,9 +67,8 @@ def command(  # noqa: PLR0913 (an option each)
     that it ends on. Writes compare.nc and compare.png if no output is named.
     """
     from pendmap.comparison import Ensemble, compare
-    from pendmap.comparison.experiment import as_json
+    from pendmap.comparison.experiment import as_json, in_short
     from pendmap.records import files_of, read_experiment
-    from pendmap.records.summary import doubt_lines
 
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
@@ -79,6 +78,5 @@ def command(  # noqa: PLR0913 (an option each)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = write_all(outputs.files(comparison, comparison.save), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
-    doubts = list(doubt_lines(experiment, *(one.run for one in comparison.every)))
-    lines = first_of_all(comparison, doubts)
+    lines = first_of_all(comparison, [*in_short(comparison), ""])
     outputs.finish(written, lambda: as_json(comparison) | more, lines)

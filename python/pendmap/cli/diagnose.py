@@ -108,7 +108,7 @@ def command(  # noqa: PLR0913 (an option each)
     with outputs.progress("write"):
         line = "pendmap " + shlex.join(sys.argv[1:])
         save = functools.partial(save_model, diagnosed_model(found, line))
-        files = outputs.files(found, save, "record_discrepancy")
+        files = outputs.files(found, save)
         written = write_all(files, keep=True)
     more = {"model": written.name(outputs.out), "simd": instruction_set()}
     lines = itertools.chain(as_text(found), ["", table(*ranking_table(found))])

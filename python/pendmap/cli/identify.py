@@ -88,6 +88,6 @@ def command(
         raise
     with outputs.progress("write"):
         save = functools.partial(save_model, model)
-        files = outputs.files(report, save, "record_identification")
+        files = outputs.files(report, save)
         written = write_all(files, keep=True)
     finish(written)

@@ -51,7 +51,7 @@ def command(*, as_json: bool) -> None:
         return
     click.echo(f"pendmap {facts['version']}")
     available = ", ".join(_core.simd_available())
-    click.echo(f"instruction set  {simd} (this processor has {available}; --simd selects one)")
+    click.echo(f"instruction set  {simd} (here: {available}; --simd selects one)")
     click.echo(f"threads          {facts['threads']}")
     click.echo(f"Python           {facts['python']}")
     for name, version in versions.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import difflib
 import errno
 import importlib
 import os
@@ -64,9 +65,13 @@ class _Commands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         return list(_COMMANDS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
-            return None
+            if ctx.resilient_parsing:  # a shell completes the name
+                return None
+            near = difflib.get_close_matches(cmd_name, _COMMANDS, n=1)
+            known = f"like {near[0]}" if near else "one of those that pendmap --help lists"
+            raise click.UsageError(f"command must be {known}, got {cmd_name!r}")
         module = importlib.import_module(f"pendmap.cli.{cmd_name}")
         loaded: click.Command = module.command
         return loaded

@@ -8,7 +8,7 @@ import click
 
 from pendmap.cli.parse.groups import argument, group, new_command
 from pendmap.cli.parse.options import flag, option, output_options
-from pendmap.cli.parse.types import OptionType
+from pendmap.cli.parse.types import NUMBER, OptionType
 from pendmap.cli.show import Outputs, write_all
 from pendmap.errors import InputError, named
 
@@ -47,7 +47,7 @@ _LOOK = group("Look", "--layer settle --width 86 --no-title")
 @option("--size", str, "Width x height in inches, like 8x4.", group=_LOOK)
 @option(
     "--width",
-    click.FloatRange(40, 500),
+    NUMBER,
     "Width in mm: 86 is a journal's column, 178 are two.",
     group=_LOOK,
 )
@@ -72,19 +72,21 @@ def command(  # noqa: PLR0913 (the options above)
     """
     if size and width:
         raise click.UsageError("only one of --size and --width must be given, got both")
+    if width is not None and not 40 <= width <= 500:  # noqa: PLR2004
+        raise click.UsageError(f"--width must be 40 to 500 mm, got {width:g}")
     look: dict[str, Any] = {"size": _size(size), "width": width, "title": not no_title}
     if not file.name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
     name = str(file.with_suffix(""))
     outputs = Outputs.take(given, name, reads=[file], default=["plot"])
 
-    from pendmap.files.dataset import load
+    from pendmap.files.saved import load
 
-    dataset = load(file)
+    result = load(file)
     look |= {"layer": layer, "dpi": dpi, "colormap": colormap}
     with named(str(file)):
         try:
-            written = write_all(outputs.files(dataset, None, look=look))
+            written = write_all(outputs.files(result, None, look=look))
         except (InputError, MemoryError):
             raise
         except Exception as error:

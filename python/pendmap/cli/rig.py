@@ -111,10 +111,9 @@ def command(  # noqa: PLR0913 (an option each)
     if listing:
         _list(virtual_rig.describe(), as_json=as_json)
         return
-    if name is None or out is None:
-        missing = "NAME (free_decay, forced or hidden)" if name is None else "--out DIR"
-        raise click.UsageError(f"{missing} is missing")
-    request = virtual_rig.Request(name, **given)
+    request = _request(name, given)
+    if out is None:
+        raise click.UsageError("--out DIR is missing")
     where = virtual_rig.places(out, replace=overwrite)
     if plot is not None and not overwrite:
         keep_files({plot: "--plot"})
@@ -166,6 +165,14 @@ def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
     subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
     title = f"Measured angle: {name}"
     return draw(of_runs(records, title=title, subtitle=subtitle), path)
+
+
+def _request(name: str | None, given: dict[str, Any]) -> virtual_rig.Request:
+    from pendmap import virtual_rig
+
+    if name is None:
+        raise click.UsageError("NAME (free_decay, forced or hidden) is missing")
+    return virtual_rig.Request(name, **given)
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:

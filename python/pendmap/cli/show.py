@@ -202,9 +202,8 @@ class Outputs:
 
     def files(
         self,
-        result: Any,  # noqa: ANN401 (a dataset or a report)
+        result: Any,  # noqa: ANN401 (a dataset, or what was found in records)
         save: Write | None,
-        record: str = "record",
         look: Mapping[str, Any] | None = None,
     ) -> Iterator[tuple[Write, Path]]:
         """Yield writer and path of each file; import matplotlib and Rerun only when needed.
@@ -216,7 +215,7 @@ class Outputs:
         for path, module, write in (
             (self.plot, "render", "draw"),
             (self.report, "render", "write_report"),
-            (self.rerun, "viewer", record),
+            (self.rerun, "viewer", "view"),
         ):
             if path is not None:
                 home = importlib.import_module(f"pendmap.{module}")

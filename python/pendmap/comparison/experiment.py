@@ -20,8 +20,8 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
+from pendmap.files.saved import Saved
 from pendmap.formatting import counted, percent
-from pendmap.identification.saved import Saved
 from pendmap.model import Rig
 from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
@@ -354,15 +354,15 @@ def _free_table(runs: Sequence[RunComparison]) -> Table:
 
 def _forced_table(runs: Sequence[ForcedComparison]) -> Table:
     """Return header and rows of the table of statistics of forced runs."""
-    head = ["forced run", "what", "record", "model: median", "95 % of its ensemble", "chance"]
+    head = ["forced run", "record", "model", "95 % of its ensemble", "p-value"]
     rows = []
     for one in runs:
-        for k, each in enumerate(one.statistics):
+        rows.append([_name(one.run), "", "", "", ""])
+        for each in one.statistics:
             low, high = each.ci95
             rows.append(
                 [
-                    "" if k else _name(one.run),
-                    each.name + (f" ({each.unit})" if each.unit else ""),
+                    f"  {each.name}" + (f" ({each.unit})" if each.unit else ""),
                     written(each, each.measured),
                     written(each, each.median),
                     f"{written(each, low)} to {written(each, high)}",
@@ -379,10 +379,19 @@ def written(of: Statistic, value: float, digits: int = 4) -> str:
     return f"{value:.0f}" if not of.unit or abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
+def in_short(comparison: Comparison) -> list[str]:
+    """Return the doubts about the records, and how many runs the model describes."""
+    every = comparison.every
+    others = [one.run.name for one in every if one.rms > FITS * one.sigma]
+    count = f"{len(every) - len(others)} of {counted(len(every), 'run')}"
+    said = f"The model describes {count} (residual up to {FITS:g} times the noise)"
+    said += f"; not {', '.join(others)}." if others else "."
+    return [*doubt_lines(comparison.experiment, *(one.run for one in every)), said]
+
+
 def _lines(comparison: Comparison) -> Iterator[str]:
-    """Yield the lines printed with the tables: doubts, table 1, quality of fit, findings."""
-    runs = [one.run for one in comparison.every]
-    yield from doubt_lines(comparison.experiment, *runs)
+    """Yield the lines printed with the tables: in short, table 1, quality of fit, findings."""
+    yield from in_short(comparison)
     for one in comparison.runs:
         for row in one.table.rows:
             unit = _UNITS[row.what]
@@ -393,26 +402,19 @@ def _lines(comparison: Comparison) -> Iterator[str]:
             yield f"{one.run.name}: {one.table.left_out}"
         for reason in one.table.lost.values():
             yield f"{one.run.name}: periods and peaks are not compared: {reason}"
-        if one.rms > FITS * one.sigma:
-            yield (
-                f"{one.run.name}: the residual is {one.rms / one.sigma:.3g} times the noise: "
-                "the model does not describe this run"
-            )
     for forced in comparison.forced:
         yield from _forced_lines(forced)
     for name, why in comparison.left_out:
         yield f"{name}: not compared: {why}"
-    yield from finding_lines(comparison.experiment, *runs)
+    yield from finding_lines(comparison.experiment, *(one.run for one in comparison.every))
 
 
 def _forced_lines(one: ForcedComparison) -> Iterator[str]:
     """Yield the lines on a run's residual, steady state and improbable statistics."""
     name = one.run.name
-    ratio = one.rms / one.sigma
-    missing = ": the model does not describe this run" if ratio > FITS else ""
     yield (
         f"{name}: in {counted(one.windows, 'window')} of up to three swings the residual is "
-        f"{one.rms:.3g} rad, {ratio:.3g} times the noise{missing}"
+        f"{one.rms:.3g} rad, {one.rms / one.sigma:.3g} times the noise"
     )
     if one.phase is not None:
         yield f"{name}: the drive's phase is not given: {one.phase.value:.4g} rad was fitted"

@@ -190,27 +190,7 @@ def _zarr_attributes(target: Path) -> object:
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a result back into memory.
-
-    Parameters
-    ----------
-    path : str or path
-        A file that :func:`save` wrote, or a store (``store=``) at a path or an address.
-
-    Raises
-    ------
-    InputError
-        If it is not a result of pendmap, of a later format, or not yet complete.
-    OSError
-        If it cannot be read.
-
-    Examples
-    --------
-    >>> import pendmap
-    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
-    >>> pendmap.load(path).attrs["kind"]
-    'melnikov'
-    """
+    """Return the dataset of a file or a store; raises as :func:`pendmap.load`."""
     source = os.fspath(path) if "://" in os.fspath(path) else Path(path)
     suffix = PurePath(source).suffix.lower()
     if isinstance(source, Path) and not source.exists():

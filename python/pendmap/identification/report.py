@@ -83,12 +83,19 @@ class IdentificationReport(FitResult):
     def __repr__(self) -> str:
         best = "no method gives a model" if self.sound is None else self.sound.short
         more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
+        if self.warnings:
+            more += f"; {counted(len(self.warnings), 'warning')}"
         return f"<IdentificationReport {self.run.name}: {best}{more}>"
 
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the tables and lines that ``pendmap identify`` prints."""
         tables = [methods_table(self), table1_table(self)]
         return tables, list(as_text(self))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt records, parameters and model, as ``pendmap identify`` prints them."""
+        return (*foremost(self), *(() if self.sound is None else self.sound.warnings))
 
     @property
     def parameters(self) -> Mapping[str, Estimate]:

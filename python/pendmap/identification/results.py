@@ -11,9 +11,9 @@ import pandas as pd
 import xarray as xr
 
 from pendmap.errors import InputError, short_repr
+from pendmap.files.saved import Saved
 from pendmap.formatting import estimate_text, html_table, interval, moment
 from pendmap.identification.motion import Motion, run_forward
-from pendmap.identification.saved import Saved
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:

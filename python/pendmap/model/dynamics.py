@@ -87,6 +87,10 @@ class Dynamics(abc.ABC):
     def rhs(self, t: float, y: ArrayLike) -> Floats:
         """Return ``[th', th'']`` of a state, for ``scipy.integrate.solve_ivp``.
 
+        Coulomb friction jumps where the velocity changes its sign: a general integrator takes ever
+        smaller steps there, and does not end once the pendulum sticks. :func:`pendmap.simulate`
+        passes such points exactly.
+
         Parameters
         ----------
         t : float

@@ -17,14 +17,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
+from matplotlib.axes import Axes
+
 from pendmap.charts import registry
-from pendmap.errors import InputError, short_repr
+from pendmap.errors import InputError, check_type, short_repr
 from pendmap.render import axes, drawing, figure_of
 from pendmap.render import draw as _save
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
     from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
@@ -130,6 +131,7 @@ def draw(
         from matplotlib import pyplot as plt  # noqa: PLC0415 (a display, only where it is needed)
 
         ax = plt.figure(layout="constrained").add_subplot()
+    check_type("ax", ax, Axes, "plt.gca()")
     title = look.get("title", True)
     axes.into(ax, chart, title=title is True, legend=look.get("legend"))
     if isinstance(title, str):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.transforms import Bbox, ScaledTranslation
 
 from pendmap.charts.chart import Chart, Sheet
 from pendmap.charts.marks import Image
@@ -41,14 +41,17 @@ def into(
     images = [mark for mark in panel.marks if isinstance(mark, Image)]
     short = {style.typeset(long): text for image in images for text, long in image.labels}
     texts = [short.get(text, text).replace("\n", ", ") for text in texts]
-    rows = -(-len(texts) // drawing.columns(texts, room[0]))
-    if not texts or legend is False or (legend is None and drawing.ROW * rows > room[1] / 2):
+    size = style.points("legend.fontsize")
+    texts = [style.broken(text, room[0] - drawing.HANDLE, size) for text in texts]
+    columns = drawing.columns(texts, room[0])
+    lines = sum(text.count("\n") + 1 for text in texts[::columns])
+    if not texts or legend is False or (legend is None and drawing.ROW * lines > room[1] / 2):
         return
-    down = -2.8 * style.points("font.size") / 72
-    axes.legend(
+    down = -3.4 * style.points("font.size") / 72
+    below = axes.legend(
         handles,
         texts,
-        ncols=drawing.columns(texts, room[0]),
+        ncols=columns,
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
         bbox_transform=axes.transAxes + ScaledTranslation(0.0, down, figure.dpi_scale_trans),
@@ -56,3 +59,11 @@ def into(
         frameon=False,
         handlelength=1.2,
     )
+    whole: Any = below.get_tightbbox
+
+    def as_wide_as_the_panel(renderer: Any = None) -> Bbox:  # noqa: ANN401 (of any backend)
+        # A layout leaves room below the panel, and does not narrow it.
+        box, panel = whole(renderer), axes.bbox
+        return Bbox.from_extents(panel.x0, box.y0, panel.x1, box.y1)
+
+    below.get_tightbbox = as_wide_as_the_panel  # type: ignore[method-assign]

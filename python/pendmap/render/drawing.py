@@ -36,6 +36,7 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 """Panel width in inches: several side by side, a single one, several stacked."""
 BESIDE, BAR, BELOW, ROW = 0.75, 0.75, 0.75, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a row of a legend."""
+HANDLE: Final = 0.55  # Room for the handle of a legend's entry, inches
 LEAST_SHEET: Final = 5.9  # Least width of a sheet whose charts are in one column, inches
 LEAST: Final = 0.5  # Least side of a panel, inches
 HEADING: Final = 0.32  # Height of the heading of a chart on a sheet, inches
@@ -73,7 +74,8 @@ def draw(
         if width is not None and width < LEAST_SHEET:
             raise InputError(
                 f"width of a sheet of several charts must be {round(25.4 * LEAST_SHEET)} mm or "
-                f"more, got {round(25.4 * width)}: a layer can be drawn alone"
+                f"more, got {round(25.4 * width)}; its layers have any width, as "
+                f"layer={chart.panels[0].name!r}"
             )
         if width is not None:
             column = [_in_width(one, width) for column in chart.columns for one in column]
@@ -415,7 +417,7 @@ def _dpi(part: FigureBase) -> float:
 
 def _entry(text: str) -> float:
     """Return the width of a legend entry with its handle, in inches."""
-    return style.inches(text, style.points("legend.fontsize")) + 0.55
+    return style.inches(text, style.points("legend.fontsize")) + HANDLE
 
 
 def columns(texts: Sequence[str], room: float) -> int:

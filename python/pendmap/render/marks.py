@@ -131,11 +131,8 @@ def _span(axes: Axes, mark: charts.Span) -> None:
 
 
 def _text(axes: Axes, mark: charts.Text) -> None:
-    look: dict[str, Any] = {"transform": axes.transAxes} if mark.inside else {}
-    if mark.boxed:
-        look["bbox"] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 2}
     across, up = mark.align
-    look |= {"color": mark.colour, "ha": across, "va": up, "fontsize": mark.size}
+    look: dict[str, Any] = {"color": mark.colour, "ha": across, "va": up, "fontsize": mark.size}
     axes.text(mark.x, mark.y, style.typeset(mark.text), **(look | _common(mark)))
 
 

@@ -50,14 +50,21 @@ SYMBOLS: Final = {
     "c/m": "$c/m$",
     "Tr": "$T_r$",
     "α²": "$α^2$",
-    **{letter: f"${letter}$" for letter in "θτγωΩφζ"},
+    "YΩ²/g": "$YΩ^2/g$",
+    "p/ω²": "$p/ω^2$",
+    "1/ω²": "$1/ω^2$",
+    "Y/l": "$Y/l$",
+    "δx": "$δx$",
+    **{letter: f"${letter}$" for letter in "θτγωΩφζλδ"},
     **{letter: f"${letter}$" for letter in "ptelEYfQ"},
 }
 """Symbols in the texts of charts, and their form in mathtext."""
 _FOUND: Final = re.compile(
     r"\$-?10\^\{-?\d+\}\$|"
     + "|".join(map(re.escape, dict.fromkeys(SYMBOLS.values())))
-    + r"|\$|(?<![\w$])(?:E / \(m g l\)|d²θ/dt²|dθ/dτ|dθ/dt|θr|w0|c/m|Tr|α²|[θτγωΩφζ])(?![\w$])"
+    + r"|\$|(?<![\w$])(?:"
+    + "|".join(re.escape(name) for name in SYMBOLS if name not in "ptelEYfQ")
+    + r")(?![\w$])"
     r"|(?<![^\s(,;|])[ptelEYfQ](?= (?:[=<>(−-]|and )|$)"
 )
 """Mathtext made here, a dollar sign of a name, or a symbol; a Latin letter only as a quantity."""
@@ -112,6 +119,12 @@ def folded(title: str, room: float) -> str:
         if room == 0.0 or width_of(lines) <= room + 0.15 or size == 0:
             break
     return lines
+
+
+def broken(text: str, room: float, size: float) -> str:
+    """Return a text in lines of at most ``room`` inches, broken between words."""
+    wide = inches(text, size)
+    return text if wide <= room else textwrap.fill(text, max(int(len(text) * room / wide), 12))
 
 
 def halves(text: str) -> list[str]:

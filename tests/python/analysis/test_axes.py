@@ -27,6 +27,7 @@ def test_an_array_has_the_centres_of_cells() -> None:
     grid = Grid(theta=np.linspace(-1, 1, 5), velocity=[0.5, 1.5, 2.5, 3.5])
     assert grid.theta == Axis(-1.25, 1.25, 5)
     assert grid.velocity.centres == pytest.approx([0.5, 1.5, 2.5, 3.5], abs=1e-15)
+    assert Grid(theta=[-1.0, 0.0, 1.0]).theta == Axis(-1.5, 1.5, 3)  # type: ignore[arg-type]
     result = pendmap.basins(Pendulum(p=0.6), grid)
     assert result.theta.values == pytest.approx(np.linspace(-1, 1, 5), abs=1e-15)
     for values in (np.geomspace(0.1, 1, 5), [1.0, 2.0, 4.0, 8.0], [1.0], np.array([])):

@@ -298,7 +298,7 @@ def test_two_parameters_may_have_any_values() -> None:
     ("ranges", "said"),
     [
         ({"p": [0.5, 0.4]}, "p must be ascending values"),
-        ({"p": []}, r"p must be an array \(N,\) of numbers"),
+        ({"p": []}, r"p must be an array \(N,\) of finite numbers"),
     ],
 )
 def test_other_values_are_refused(ranges: dict[str, list[float]], said: str) -> None:

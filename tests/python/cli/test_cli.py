@@ -21,6 +21,7 @@ from conftest import COMMAND
 from interrupted import any_file, started, until
 from pendmap.cli.main import command
 from pendmap.cli.parse.types import AXIS, NUMBER
+from pendmap.formatting import wrapped
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -185,6 +186,18 @@ def test_options_stand_in_groups_with_examples_that_they_have(name: str) -> None
             assert not context.args
         known = {option for one in called.params for option in one.opts}
         assert {w.partition("=")[0] for w in words if w.startswith("--")} <= known, line
+
+
+def test_a_bold_line_is_as_wide_as_its_letters() -> None:
+    bold = f"\x1b[1m{'a ' * 39}\x1b[0m"
+    assert wrapped(bold) == bold
+
+
+def test_an_unknown_command_is_answered_with_the_nearest(pendmap_command: Run) -> None:
+    run = pendmap_command("basin")
+    assert run.returncode == 2
+    assert run.stderr == "pendmap: command must be like basins, got 'basin'\n"
+    assert "--help" in pendmap_command("xyz").stderr
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])

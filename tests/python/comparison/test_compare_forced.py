@@ -149,7 +149,7 @@ def test_a_different_steady_state_is_reported(tmp_path: Path) -> None:
     said = str(comparison)
     assert "settles on rotation 1:+1; the model on" in said
     assert "not on the measured one" in said
-    assert "the model does not describe this run" in said
+    assert "The model describes 0 of 1 run" in said
 
 
 def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -> None:

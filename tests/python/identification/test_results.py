@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 import pendmap
@@ -103,6 +104,7 @@ def test_a_prediction_is_the_motion_of_the_fitted_model(report: IdentificationRe
 def test_what_is_loaded_has_the_same_numbers(report: IdentificationReport, tmp_path: Path) -> None:
     path = report.save(tmp_path / "identify.nc")
     again = IdentificationReport.load(path)
+    assert str(pendmap.load(path)) == str(report)
     assert json.dumps(as_json(again)) == json.dumps(as_json(report))
     assert str(again) == str(report)
     assert again._repr_html_() == report._repr_html_()
@@ -137,13 +139,13 @@ def test_a_report_without_a_model_is_shown_and_kept(tmp_path: Path) -> None:
 def test_a_damaged_file_is_refused_on_one_line(
     report: IdentificationReport, tmp_path: Path
 ) -> None:
-    dataset = pendmap.load(report.save(tmp_path / "identify.nc"))
+    dataset = xr.open_dataset(report.save(tmp_path / "identify.nc")).load()
     tree = dataset["content"].item()
     for old, new, complaint in (
         ("pendmap.records.experiment:Run", "os:system", "'os:system' is no class of pendmap"),
         ("pendmap.records.experiment:Run", "pendmap.files.atomic:os", "cannot be read as"),
         ('"lab_time_s"', '"lab"', "Run lacks lab_time_s: another version of pendmap wrote it"),
-        ("{", "", "cannot be read as IdentificationReport"),
+        ("{", "", "cannot be read as identification"),
     ):
         bad = dataset.assign(content=((), tree.replace(old, new)))
         with pytest.raises(InputError, match=complaint) as error:
@@ -216,7 +218,8 @@ def test_a_comparison_is_a_table_and_a_file(tmp_path: Path) -> None:
     again = pendmap.comparison.Comparison.load(found.save(tmp_path / "c.nc"))
     assert str(again) == str(found)
     pd.testing.assert_frame_equal(again.to_dataframe(), table)
-    stored = pendmap.load(tmp_path / "c.nc")
+    assert str(pendmap.load(tmp_path / "c.nc")) == str(found)
+    stored = xr.open_dataset(tmp_path / "c.nc")
     assert stored.attrs["kind"] == "comparison"
     assert list(stored["run"].values) == list(table.index.get_level_values("run"))
 
@@ -237,6 +240,30 @@ def test_a_forced_comparison_has_the_statistics_of_its_ensemble(tmp_path: Path) 
         )
     again = pendmap.comparison.Comparison.load(found.save(tmp_path / "c.nc"))
     pd.testing.assert_frame_equal(again.to_dataframe(), found.to_dataframe())
+
+
+def test_a_stored_comparison_is_drawn_again(tmp_path: Path, pendmap_command: Command) -> None:
+    found = pendmap.compare(Rig(**TRUE), made("a"))
+    assert "The model describes 1 of 1 run (residual up to 1.1 times the noise)." in str(found)
+    found.save(tmp_path / "c.nc")
+    run = pendmap_command("plot", "c.nc", "--layer", "residual", "--out", "c.png")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "c.png").stat().st_size > 10_000
+    run = pendmap_command("plot", "c.nc", "--out", "c.rrd")
+    assert "result must be a dataset, an identification, a diagnosis" in run.stderr
+
+
+def test_what_is_unphysical_is_said() -> None:
+    run = made()
+    growing = dataclasses.replace(run, theta=run.theta * np.exp(0.2 * run.time / run.time[-1]))
+    found = pendmap.identify(growing)
+    negative = [n for n in ("c_over_m", "Tr") if found.parameters[n].value < 0]
+    assert negative
+    for name in negative:
+        assert getattr(found.model, name) == 0.0
+        assert any(name in text and "0 in its place" in text for text in found.warnings)
+    assert f"{len(found.warnings)} warning" in repr(found)
+    assert "warning" not in repr(pendmap.identify(run))
 
 
 def test_the_command_says_the_parameters_first(tmp_path: Path, pendmap_command: Command) -> None:

@@ -36,7 +36,7 @@ def example(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) ->
         marks.Level(0.5, path="level", dash=marks.DASHED),
         marks.Span((2.0, 3.0), colour="#eeeeee", name="a span"),
         marks.Areas([np.array([(1, -1), (2, -1), (2, 0)])], colour="#cccccc", name="an area"),
-        marks.Text(0.5, 0.9, "words", inside=True),
+        marks.Text(50.0, 0.9, "words"),
     )
     bins = marks.Steps(np.array([1.0, 10.0, 100.0]), np.array([0.5, 1.0]), path="bins")
     classes = marks.Image(

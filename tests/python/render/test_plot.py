@@ -114,6 +114,24 @@ def test_title_and_legend_are_optional() -> None:
     assert plot.basins(few, axes).get_legend() is None  # it would be higher than half the panel
 
 
+def test_a_legend_does_not_narrow_its_column() -> None:
+    found = pendmap.orbit(Pendulum(p=0.6), 2)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(5.0, 2.6), layout="constrained")
+    for axes in (left, right):
+        plot.orbit(found, axes)
+    figure.draw_without_rendering()
+    for axes in (left, right):
+        legend = axes.get_legend()
+        assert axes.get_window_extent().width > 0.33 * figure.bbox.width
+        assert legend.get_window_extent().width < 1.2 * axes.get_window_extent().width
+        assert legend.get_window_extent().y0 >= 0.0
+
+
+def test_powers_of_ten_are_raised() -> None:
+    assert style.typeset("q ($10^{-6}$ 1/rad)") == "q ($10^{-6}$ 1/rad)"
+    assert style.typeset("ln |δx|, p = YΩ²/g") == "ln |$δx$|, $p$ = $YΩ^2/g$"
+
+
 def test_the_accessor_is_the_function() -> None:
     run = pendmap.simulate(Pendulum(), 1.0, 0.0, 20.0)
     _, axes = plt.subplots()

@@ -32,7 +32,7 @@ RANDOM: Final = group("Random numbers", "--seed 1")
 LONG: Final = group("Long runs", "--out map.zarr --resume")
 WORKERS: Final = group("Workers", "--workers 8")
 MACHINE: Final = group("Machine", "--simd portable")
-OUTPUT: Final = group("Output", "--out map.nc --out map.pdf")
+OUTPUT: Final = group("Output", "--out figure.pdf --overwrite")
 PRINTED: Final = group("Output", "--json > result.json")
 RECORD: Final = group("Records", "--rate 100")
 

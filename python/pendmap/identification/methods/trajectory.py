@@ -136,6 +136,8 @@ def _warnings(
             low, high = estimates[name].ci95 or (-math.inf, math.inf)
             reaches = low <= 0 <= high
             why = "its interval reaches 0" if reaches else "an effect is missing in the model"
+            if name in {"c_over_m", "Tr"}:
+                why += "; the model has 0 in its place"
             found.append(f"{name} is {estimates[name].value:.3g}, which is unphysical: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray as xr
 
-from pendmap.errors import InputError, short_repr
-from pendmap.files.dataset import FORMAT_VERSION, load, made_by, save
+from pendmap.errors import InputError
+from pendmap.files import dataset as files
 from pendmap.files.tree import Packed, unpacked
 from pendmap.formatting import Readable
 
@@ -65,12 +65,12 @@ class Saved(Readable):
             data[name] = ([f"{name}_{k}" for k in range(values.ndim)], values)
         attributes = {
             "kind": self.KIND,
-            "format_version": FORMAT_VERSION,
+            "format_version": files.FORMAT_VERSION,
             "title": repr(self),
             "pendmap_version": importlib.metadata.version("pendmap"),
         }
-        with made_by(f"{type(self).__name__}.save"):
-            return save(xr.Dataset(data, attrs=attributes), path)
+        with files.made_by(f"{type(self).__name__}.save"):
+            return files.save(xr.Dataset(data, attrs=attributes), path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -83,15 +83,48 @@ class Saved(Readable):
         OSError
             If it cannot be read.
         """
-        where, dataset = os.fspath(path), load(path)
-        kind = dataset.attrs["kind"]
-        if kind != cls.KIND:
-            raise InputError(f"{where}: kind must be {cls.KIND}, got {kind}")
-        try:
-            arrays = {str(name): each.to_numpy() for name, each in dataset.variables.items()}
-            found = unpacked(json.loads(dataset["content"].item()), arrays)
-        except Exception as error:  # a damaged file may raise any error
-            raise InputError(f"{where}: cannot be read as {cls.__name__}: {error}") from error
+        found = load(path)
         if not isinstance(found, cls):
-            raise InputError(f"{where}: must hold {cls.__name__}, got {short_repr(found)}")
+            given = found.KIND if isinstance(found, Saved) else found.attrs["kind"]
+            raise InputError(f"{os.fspath(path)}: kind must be {cls.KIND}, got {given}")
         return found
+
+
+def load(path: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a dataset, or any other result)
+    """Read a result back into memory.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that :func:`pendmap.save` or a result's own ``save`` wrote, or a store (``store=``)
+        at a path or an address.
+
+    Returns
+    -------
+    xarray.Dataset, IdentificationReport, Discrepancy or Comparison
+        The result as it was, with the same numbers.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, of a later format, or not yet complete; for a result of
+        records, also if another version of pendmap wrote it in another form.
+    OSError
+        If it cannot be read.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
+    >>> pendmap.load(path).attrs["kind"]
+    'melnikov'
+    """
+    dataset = files.load(path)
+    kind = dataset.attrs["kind"]
+    if kind in files.KINDS or "content" not in dataset:
+        return dataset
+    try:
+        arrays = {str(name): each.to_numpy() for name, each in dataset.variables.items()}
+        return unpacked(json.loads(dataset["content"].item()), arrays)
+    except Exception as error:  # a damaged file may raise any error
+        raise InputError(f"{os.fspath(path)}: cannot be read as {kind}: {error}") from error
