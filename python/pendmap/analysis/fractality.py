@@ -318,7 +318,7 @@ class BasinEntropy:
 
     @property
     def is_fractal(self) -> bool:
-        """Whether the log 2 criterion says that the boundary is fractal; see `passes_log2`."""
+        """Whether ``boundary`` exceeds ``ln 2`` by two standard errors: the boundary is fractal."""
         return passes_log2(self.boundary, self.boundary_stderr)
 
 

@@ -205,7 +205,7 @@ def _made(chart: Chart, size: Ends, dpi: float) -> tuple[Figure, Ends]:
         at = (0.06 + LINE * (len(chart.notes) - k)) / size[1]
         figure.text(LEFT / size[0], at, style.typeset(line), fontsize=8.5, va="top")
     drawn = fill(figure, chart)
-    above = LINE * len(chart.notes) / size[1]
+    above = (LINE * len(chart.notes) + 0.08) / size[1] if chart.notes else 0.0
     where: dict[str, Any] = {"bbox_to_anchor": (0.0, above, 1.0, 1.0)} if above else {}
     _legend(figure, _all_marks(chart), size[0], loc="outside lower left", borderpad=0.1, **where)
     fits = settle(figure, [*itertools.chain(*drawn)])
