@@ -212,7 +212,8 @@ def _growth(dataset: xr.Dataset, x: Floats, every: list[Branch]) -> list[Mark]:
     marks: list[Mark] = [Level(0.0, colour=QUIET)]
     for k, one in enumerate(every):
         at = x, dataset["exponent"].values[:, k]
-        look: dict[str, Any] = {"colour": one.colour, "order": 2.0 if one.name else 1.0}
+        colour, order = palette.on_white(one.colour), 2.0 if one.name else 1.0
+        look: dict[str, Any] = {"colour": colour, "order": order}
         marks.append(Line(*at, width=0.8, **look))
         marks.append(Points(*at, size=2.2, path=f"{one.id}/exponent", **look))
     return marks

@@ -125,7 +125,7 @@ def _survival(dataset: xr.Dataset) -> Panel:
     every = curves(dataset)
     marks: list[Mark] = []
     for k, one in enumerate(every):
-        colour = palette.colour(one.name, one.kind) if one.name else INK
+        colour = palette.on_white(palette.colour(one.name, one.kind)) if one.name else INK
         said = f"those that {typeset(one.name)} captures" if one.name else "all starts"
         look: dict[str, Any] = {"name": said, "path": str(k), "colour": colour}
         look |= {"width": 1.3 if one.name else 1.8, "dash": _DASHES[k % 4]}

@@ -183,6 +183,7 @@ def _attractor(dataset: xr.Dataset) -> Panel:
     points = plane.points(dataset)
     at = plane.copies(dataset, points, *theta)
     size = 2.0 if kind.endswith("chaos") else 7.0
-    spots = Points(*at.T, colour=palette.colour(name, kind), size=size, path="points")
+    colour = palette.on_white(palette.colour(name, kind))
+    spots = Points(*at.T, colour=colour, size=size, path="points")
     across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
     return Panel("attractor", "attractor, once a period", across, up, [spots])

@@ -82,9 +82,10 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
     found: list[Kind] = []
     rare: dict[str, list[str]] = {}
     for name, here in presence.items():
-        family = name.split()[0]
-        if name in frequent or family not in _OTHERS:
-            found.append(Kind(name, palette.colour(_named(name)), (name,), here))
+        family, colour = name.split()[0], palette.colour(_named(name))
+        like = _OTHERS[family][1] if family in _OTHERS else ""
+        if not like or (name in frequent and colour != palette.colour(like)):
+            found.append(Kind(name, colour, (name,), here))
         else:
             rare.setdefault(family, []).append(name)
     for family, members in rare.items():
