@@ -22,7 +22,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        raise InputError(f"{os.fspath(path)}: must be a TOML file, it is no text") from None
+        raise InputError(f"{os.fspath(path)}: not a TOML file: it is no text") from None
     except (ValueError, RecursionError) as error:  # too many digits are a ValueError
         raise InputError(f"{os.fspath(path)}: not a TOML file: {error}") from None
 
