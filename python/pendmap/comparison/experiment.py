@@ -141,12 +141,12 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     ----------
     model : Rig
         Model in SI units, from :func:`pendmap.load_model`.
-    records : path, Experiment, Run, or a sequence of these
+    records : path, DataFrame, Experiment, Run, or a sequence of these
         As for :func:`pendmap.identify`; forced runs too.
     ensemble : Ensemble, optional
         Number and spread of the initial states for a forced run.
     rate_hz : float, optional
-        Sampling rate, Hz, of files without a column of times.
+        Sampling rate, Hz, of records without a column of times.
     threads : int, optional
         Number of threads; by default one per processor.
     progress : callable, optional

@@ -59,7 +59,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    records : path, Experiment, Run, or a sequence of these
+    records : path, DataFrame, Experiment, Run, or a sequence of these
         As for :func:`pendmap.identify`; forced runs too.
     model : Rig, optional
         The baseline; by default viscous damping and Coulomb friction.
@@ -73,7 +73,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     thresholds : Thresholds, optional
         Thresholds of all decisions.
     rate_hz : float, optional
-        Sampling rate, Hz, of files without a column of times.
+        Sampling rate, Hz, of records without a column of times.
     progress : callable, optional
         Called with the number of steps done and the number of all steps.
 

@@ -75,9 +75,9 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    records : path, Experiment, Run, or a sequence of these
-        Free decays of one rig: files and folders as for :func:`pendmap.read_experiment`, or what
-        it returns.
+    records : path, DataFrame, Experiment, Run, or a sequence of these
+        Free decays of one rig: files, folders and DataFrames as for
+        :func:`pendmap.read_experiment`, or what it returns.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
@@ -85,7 +85,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     effects : sequence of Effect or str
         Further effects, or their names, whose sizes the trajectory method fits.
     rate_hz : float, optional
-        Sampling rate, Hz, of files without a column of times.
+        Sampling rate, Hz, of records without a column of times.
     progress : callable, optional
         Called with the numbers of steps done and in all: one for each method, the peaks and the
         table.
@@ -110,20 +110,20 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     Examples
     --------
     >>> import numpy as np
+    >>> import pandas as pd
     >>> import pendmap
     >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
-    >>> decay = pendmap.simulate(rig, theta=2.0, velocity=0.0, t_eval=np.arange(0, 30, 0.02))
-    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
-    >>> every = np.ones(angle.size, bool)
-    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
-    >>> report = pendmap.identify(run)
+    >>> time = np.arange(0, 30, 0.02)
+    >>> decay = pendmap.simulate(rig, theta=2.0, velocity=0.0, t_eval=time)
+    >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, time.size)
+    >>> report = pendmap.identify(pd.DataFrame({"t_s": time, "theta_rad": angle}))
     >>> report.to_dataframe().loc[["w0", "c_over_m", "Tr"], "value"].round(2).to_dict()
     {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08}
     >>> report.predict([0.0, 0.2]).round(2)
     array([2.  , 1.28])
     >>> float(report.correlation.loc["c_over_m", "Tr"].round(2))
     -0.98
-    >>> round(float(report.residual["a"].std()), 4)
+    >>> round(float(report.residual["DataFrame"].std()), 4)
     0.001
     >>> again = pendmap.identification.IdentificationReport.load(report.save("identify.nc"))
     >>> again.model == report.model

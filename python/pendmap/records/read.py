@@ -7,7 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from pendmap.errors import InputError, check_number, short_repr
 from pendmap.formatting import counted, listed
@@ -27,20 +27,24 @@ from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.rod_sensors import gyroscope_of
-from pendmap.records.tables import read_table
+from pendmap.records.tables import is_frame, read_table, table_of
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from pendmap.records.tables import Table
     from pendmap.records.work import Work
 
-    Records = Experiment | Run | str | os.PathLike[str]
+    Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
 
 
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
 _FORMS: Final = (
-    "paths, an Experiment like pendmap.read_experiment('folder'), Runs or a list of them"
+    "paths, DataFrames with columns like t_s and theta_rad, an Experiment like"
+    " pendmap.read_experiment('folder'), Runs or a list of them"
 )
+FRAME: Final = "DataFrame"  # Name of a record that has no file
 _SHOWN: Final = 3  # Names of records in the name of several together
 LEAST_RATE: Final = 1e-3  # Least sampling rate, Hz
 MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
@@ -61,22 +65,25 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     ]
 
 
-def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = None) -> Experiment:
+def read_experiment(
+    path: str | os.PathLike[str] | pd.DataFrame, *, rate_hz: float | None = None
+) -> Experiment:
     """Read a record or a folder of records, and report its faults.
 
-    A file (CSV, other text, Parquet, Excel) with a time and an angle is an experiment of one free
-    decay. A folder is an experiment with an ``experiment.toml``; without it each file is a free
-    decay. Each free release of a file is one run, named ``decay 1/3``. Nothing is written.
-    Each fault is a finding under a stable key. Data are corrected only where the correction is
-    unambiguous: wrapped turns are unwrapped, milliseconds become seconds. ``Run.trusted`` marks the
-    samples for fitting.
+    A file (CSV, other text, Parquet, Excel) or a DataFrame with a time and an angle is an
+    experiment of one free decay. A folder is an experiment with an ``experiment.toml``; without it
+    each file is a free decay. Each free release of a file is one run, named ``decay 1/3``. Nothing
+    is written. Each fault is a finding under a stable key. Data are corrected only where the
+    correction is unambiguous: wrapped turns are unwrapped, milliseconds become seconds.
+    ``Run.trusted`` marks the samples for fitting.
 
     Parameters
     ----------
-    path : str or path
-        File or folder.
+    path : str, path or pandas.DataFrame
+        File or folder; or the columns themselves, named as in a file, such as ``t_s`` and
+        ``theta_rad``. An index of dates, or one with a name, is a column too.
     rate_hz : float, optional
-        Sampling rate, Hz, of files without a column of times: ``t = k / rate_hz``. It overrides
+        Sampling rate, Hz, of records without a column of times: ``t = k / rate_hz``. It overrides
         ``rate_hz`` of [columns].
 
     Returns
@@ -102,14 +109,21 @@ def read_experiment(path: str | os.PathLike[str], *, rate_hz: float | None = Non
     >>> pendmap.read_experiment("run.csv").runs[0].theta.size
     2000
     """
-    place = Path(path)
     rate = None if rate_hz is None else check_number("rate_hz", rate_hz)
     if rate is not None and not LEAST_RATE <= rate <= MOST_RATE:
         raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
-    planned = _planned(place)
-    planned = dataclasses.replace(planned, rate_hz=rate or planned.rate_hz)
-    runs, findings = _every(place, planned)
-    digests = {run.file: run.sha256 for run in runs}
+    if isinstance(path, str | os.PathLike):
+        place = Path(path)
+        planned = _planned(place)
+        planned = dataclasses.replace(planned, rate_hz=rate or planned.rate_hz)
+        runs, findings = _every(place, planned)
+    else:
+        if not is_frame(path):
+            raise InputError(f"path must be a path or a DataFrame, got {short_repr(path)}")
+        place, planned = Path(FRAME), Description(rate_hz=rate)
+        tables = {FRAME: (table_of(path, FRAME), "")}
+        runs, findings = _runs(place, RunPlan(FRAME), planned, tables, FRAME)
+    digests = {run.file: run.sha256 for run in runs if run.sha256}
     checked, together = checked_together(runs)
     return Experiment(place, checked, planned.known, (*findings, *together), digests)
 
@@ -119,13 +133,13 @@ def experiment_of(
 ) -> Experiment:
     """Return records in any of their forms as one experiment.
 
-    Records are paths as :func:`read_experiment` takes them, experiments, runs, or a sequence of
-    these, which are runs of one rig: copies among them are used once, runs of one name are
-    numbered, and what is known of the rig must agree. ``rate_hz`` is that of the files.
+    Records are what :func:`read_experiment` takes, experiments, runs, or a sequence of these, which
+    are runs of one rig: copies among them are used once, runs of one name are numbered, and what is
+    known of the rig must agree. ``rate_hz`` is that of files and DataFrames.
     """
-    one = isinstance(records, Experiment | Run | str | os.PathLike)
-    every = [records] if one else list(records) if isinstance(records, Sequence) else []
-    parts = [_experiment(part, rate_hz) for part in every]
+    if isinstance(records, str) or not isinstance(records, Sequence):
+        records = [records]
+    parts = [_experiment(part, rate_hz) for part in records]
     if not parts:
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
     if len(parts) == 1:
@@ -151,16 +165,16 @@ def experiment_of(
 
 def _experiment(records: object, rate_hz: float | None) -> Experiment:
     """Return one form of records as an experiment."""
-    if isinstance(records, str | os.PathLike):
+    if isinstance(records, str | os.PathLike) or is_frame(records):
         return read_experiment(records, rate_hz=rate_hz)
-    if rate_hz is not None:
-        raise InputError("rate_hz must be left out where no file is read")
-    if isinstance(records, Run):
-        digests = {records.file: records.sha256} if records.sha256 else {}
-        return Experiment(Path(records.file or records.name), (records,), sha256=digests)
-    if not isinstance(records, Experiment):
+    if not isinstance(records, Run | Experiment):
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
-    return records
+    if rate_hz is not None:
+        raise InputError("rate_hz must be left out where no file or DataFrame is read")
+    if isinstance(records, Experiment):
+        return records
+    digests = {records.file: records.sha256} if records.sha256 else {}
+    return Experiment(Path(records.file or records.name), (records,), sha256=digests)
 
 
 def _planned(place: Path) -> Description:

@@ -75,6 +75,10 @@ class Table:
     # Index of each row among the lines that are not empty; unreadable lines leave gaps.
     order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
+    def __post_init__(self) -> None:
+        """Mark readings that are infinite or too large as missing."""
+        self.values[~(np.abs(self.values) <= LARGEST_READING)] = np.nan
+
 
 def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     """Return the numbers of a file and its SHA-256; raise InputError if there are none."""
@@ -94,30 +98,21 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
         text, findings = decoded(data, where)
         table = parsed(text, reader, where)
         table = dataclasses.replace(table, findings=(*findings, *table.findings))
-    table.values[np.abs(table.values) > LARGEST_READING] = np.nan  # noqa: PD011 (no data frame)
     return table, digest
 
 
 def _parquet(data: bytes, where: str) -> Table:
     """Return the table of a Parquet file."""
     try:
-        names, columns = _columns(data, where)
+        return table_of(_frame(data, where), where)
     except InputError:
         raise
     except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
         raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
-    if not columns or columns[0].size == 0:
-        raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
-    values = np.column_stack(columns)
-    values[~np.isfinite(values)] = np.nan
-    order = np.arange(values.shape[0])
-    return Table(names, values, order + 1, order=order)
 
 
-def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
-    """Return names and numbers of a Parquet file's columns, if its declared size is allowed."""
-    import pandas as pd
-
+def _frame(data: bytes, where: str) -> pd.DataFrame:
+    """Return a Parquet file's columns, if its declared size is allowed."""
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -139,13 +134,33 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
     # would crash the process, too.
     flat = [field.name for field in fields if not pa.types.is_nested(field.type)]
     whole = parquet.ParquetFile(io.BytesIO(data), read_dictionary=texts, pre_buffer=False)
-    frame = whole.read(columns=flat, use_threads=False).to_pandas()
-    frame = frame.reset_index() if frame.index.name else frame
+    return whole.read(columns=flat, use_threads=False).to_pandas()
+
+
+def is_frame(records: object) -> bool:
+    """Return whether records are a DataFrame."""
+    import pandas as pd
+
+    return isinstance(records, pd.DataFrame)
+
+
+def table_of(frame: pd.DataFrame, where: str) -> Table:
+    """Return the numbers of a DataFrame; an index of times, or one with a name, is a column too."""
+    import pandas as pd
+
+    index = frame.index
+    if isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex):
+        index = index.rename("t_s")
+    if index.name is not None and index.name not in frame.columns:
+        frame = frame.set_axis(index).reset_index()
+    refuse_large(where, columns=frame.shape[1], size=8 * frame.size)
+    if frame.size == 0:
+        raise InputError(f"{where}: must have rows of numbers, it is empty")
     columns = []
     for k in range(frame.shape[1]):
         column = frame.iloc[:, k]
         if pd.api.types.is_datetime64_any_dtype(column):
-            column = (column - column.iloc[0]).dt.total_seconds() if len(column) else column
+            column = (column - column.iloc[0]).dt.total_seconds()
         elif pd.api.types.is_timedelta64_dtype(column):
             column = column.dt.total_seconds()
         elif isinstance(column.dtype, pd.CategoricalDtype):
@@ -153,8 +168,10 @@ def _columns(data: bytes, where: str) -> tuple[tuple[str, ...], list[Floats]]:
             column = pd.Series(np.append(known.to_numpy(dtype=float), np.nan)[column.cat.codes])
         else:
             column = pd.to_numeric(column, errors="coerce")
-        columns.append(column.to_numpy(dtype=float))
-    return tuple(map(str, frame.columns)), columns
+        columns.append(column.to_numpy(dtype=float, na_value=np.nan))
+    values = np.column_stack(columns)
+    order = np.arange(values.shape[0])
+    return Table(tuple(map(str, frame.columns)), values, order + 1, order=order)
 
 
 def read_workbook(data: bytes, reader: Reader, where: str) -> Table:

@@ -21,7 +21,7 @@ TIME = np.arange(50) / 10
 @pytest.mark.parametrize(
     ("call", "given", "complaint"),
     [
-        (identify_experiment, (3,), "records must be paths, an Experiment like .*, got 3"),
+        (identify_experiment, (3,), "records must be paths, DataFrames .*, got 3"),
         (identify_experiment, ([],), r"records must be paths, .*, got \[\]"),
         (compare, ("model.toml", THERE), "model must be a Rig, like .*, got 'model.toml'"),
         (compare, (Pendulum(), THERE), "model must be a Rig"),

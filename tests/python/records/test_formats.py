@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import hashlib
 import math
+import re
 import zipfile
 from typing import TYPE_CHECKING, Any
 
@@ -131,6 +132,48 @@ def test_parquet_equals_text(tmp_path: Path) -> None:
     (run,) = pendmap.read_experiment(tmp_path / "a.parquet").runs
     same(run, within=1e-12)
     assert run.sha256 == hashlib.sha256((tmp_path / "a.parquet").read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("indexed", ["t_s", "time", None])
+def test_a_data_frame_is_read_as_its_file(tmp_path: Path, indexed: str | None) -> None:
+    time, theta = clean()
+    frame = pd.DataFrame({"t_s": time, "theta_rad": theta})
+    frame.loc[100, "theta_rad"] = np.inf
+    frame.loc[200, "theta_rad"] += 3.0
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    (written,) = pendmap.read_experiment(tmp_path / "a.csv").runs
+    if indexed == "t_s":
+        frame = frame.set_index("t_s")
+    elif indexed == "time":
+        dates = pd.Timestamp("2026-05-01") + pd.to_timedelta(time, unit="s")
+        frame = frame.drop(columns="t_s").set_axis(dates)
+    whole = frame.copy()
+    (run,) = pendmap.read_experiment(frame).runs
+    pd.testing.assert_frame_equal(frame, whole)
+    np.testing.assert_allclose(run.time, written.time, atol=1e-8)
+    np.testing.assert_array_equal(run.theta, written.theta)
+    np.testing.assert_array_equal(run.trusted, written.trusted)
+    assert {"outliers"} <= found(run).keys() == found(written).keys()
+
+
+def test_a_data_frame_without_times_has_a_rate() -> None:
+    time, theta = clean()
+    frame = pd.DataFrame({"theta_deg": np.degrees(theta)})
+    (run,) = pendmap.read_experiment(frame, rate_hz=1 / (time[1] - time[0])).runs
+    same(run)
+
+
+@pytest.mark.parametrize(
+    ("records", "says"),
+    [
+        (pd.DataFrame(), "DataFrame: must have rows of numbers, it is empty"),
+        (pd.DataFrame({"t_s": [0.0, 0.1]}), "DataFrame: no column of angles"),
+        (np.zeros((9, 2)), "path must be a path or a DataFrame, got array"),
+    ],
+)
+def test_a_data_frame_that_is_no_record_is_refused(records: Any, says: str) -> None:  # noqa: ANN401
+    with pytest.raises(pendmap.InputError, match=re.escape(says)):
+        pendmap.read_experiment(records)
 
 
 def test_every_key_of_a_description(tmp_path: Path) -> None:
