@@ -306,12 +306,14 @@ def _block(
     """Draw one chart of a sheet with its heading and its own legend below it."""
     wide = figure.bbox.width / _dpi(figure)
     named = _all_marks(chart) if own else []
-    heading = HEADING if chart.title else 0.05
+    title = style.broken(chart.title, wide - 2 * LEFT, 10.5, bold=True)
+    more = LINE * title.count("\n")
+    heading = HEADING + more if title else 0.05
     above = heading + _rows(named, wide)
     parts: Any = figure.subfigures(2, 1, height_ratios=(above, max(high - above, 0.1)))
     head, body = parts
     words: dict[str, Any] = {"fontsize": 10.5, "weight": "bold", "va": "center"}
-    head.text(LEFT / wide, 1 - 0.17 / above, style.typeset(chart.title), **words)
+    head.text(LEFT / wide, 1 - (0.17 + more / 2) / above, style.typeset(title), **words)
     _legend(head, named, wide, loc="upper left", bbox_to_anchor=(0.0, 1 - heading / above))
     return fill(body, chart, letters)
 

@@ -121,9 +121,9 @@ def folded(title: str, room: float) -> str:
     return lines
 
 
-def broken(text: str, room: float, size: float) -> str:
+def broken(text: str, room: float, size: float, *, bold: bool = False) -> str:
     """Return a text in lines of at most ``room`` inches, broken between words."""
-    wide = inches(text, size)
+    wide = inches(text, size, bold=bold)
     return text if wide <= room else textwrap.fill(text, max(int(len(text) * room / wide), 12))
 
 

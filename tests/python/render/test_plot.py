@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from matplotlib.text import Text
 
 import motions
 import pendmap
@@ -19,12 +21,12 @@ import synthetic
 from decays import decay, record
 from drawn import plain
 from pendmap import InputError, Pendulum, plot
-from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet
 from pendmap.charts.marks import Image, Points
 from pendmap.comparison import compare
 from pendmap.identification import identify_experiment
 from pendmap.records import Experiment, Run
-from pendmap.render import regions, style
+from pendmap.render import drawing, regions, style
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -178,6 +180,20 @@ def test_a_figure_has_the_width_of_a_column(given: Any, width: float, tmp_path: 
     for axes in panels:
         assert axes.xaxis.label.get_fontsize() == (8.0 if width == 86 else 9.0)
         assert axes.get_window_extent().width / figure.dpi > 1.2
+
+
+def test_the_heading_of_a_part_of_a_sheet_is_never_cut() -> None:
+    axis = Axis("", (0.0, 1.0))
+    words = "run_05, held out: rms 9.19 mrad, 2.77 times the noise of 3.31 mrad, in 17 windows"
+    part = Chart(words, "", [[Panel("a", "", axis, axis, [])]], size=(6.5, 3.0))
+    figure = drawing.draw(Sheet("", "", [[part, replace(part, title="short")]]), width=6.0)
+    figure.canvas.draw()
+    boxes = {text.get_text(): text.get_window_extent() for text in figure.findobj(Text)}
+    (broken,) = (name for name in boxes if name.replace("\n", " ") == words)
+    assert broken.count("\n") == 1
+    for name in (broken, "short"):
+        assert 0 < boxes[name].x0 < boxes[name].x1 < figure.bbox.width
+        assert boxes[name].y1 < figure.bbox.height
 
 
 def test_the_style_is_that_of_the_files() -> None:
