@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
 from pendmap.cli.parse.model_options import rig_from
-from pendmap.cli.parse.options import option, output_options, reading_options
+from pendmap.cli.parse.options import RESULTS, option, output_options, reading_options
 from pendmap.cli.parse.types import EFFECT, FILE, REPORT, REPORTS, whole
 from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.text import table
@@ -54,7 +54,7 @@ _FIT = group("Candidates", "--max-effects 1 --without magnet")
     metavar="FILE|DIR",
     group=OUTPUT,
 )
-@output_options((".toml", *REPORTS), json="; alone, no file but the model")
+@output_options((".toml", RESULTS[0], *REPORTS), json="; alone, no file but the model")
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
@@ -71,7 +71,7 @@ def command(  # noqa: PLR0913 (an option each)
     the library is scored; the verdict is none, named, partial, ambiguous or unknown. The model with
     the effects found is written to diagnose.toml, for --model of every other command; where no
     output is named, a figure, a report and a recording too: diagnose.png, diagnose.html and
-    diagnose.rrd.
+    diagnose.rrd. A .nc has all of the result, for plot and pendmap.load.
     """
     # The matrices are tall and narrow: threads would cost more than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -8,7 +8,13 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.parse.options import option, output_options, reading_options, verbose_option
+from pendmap.cli.parse.options import (
+    RESULTS,
+    option,
+    output_options,
+    reading_options,
+    verbose_option,
+)
 from pendmap.cli.parse.types import EFFECT, METHOD
 from pendmap.cli.show import Outputs, Written, write_all
 from pendmap.cli.text import first_of_all
@@ -44,7 +50,7 @@ _FIT = group("Fit", "--effect quadratic_drag")
     group=_FIT,
 )
 @reading_options
-@output_options((SUFFIX,))
+@output_options((SUFFIX, RESULTS[0]))
 @verbose_option("Also the tables of all methods, intervals, and what was noticed.", OUTPUT)
 def command(
     *,
@@ -60,7 +66,8 @@ def command(
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. The default
     method fits a trajectory to the whole record; --verbose lists the paper's method and others too.
     In brackets: standard errors in the last digits. Writes identify.toml, a model for --model of
-    every other command, identify.png and identify.rrd if no output is named.
+    every other command, identify.png and identify.rrd if no output is named; a .nc has all of the
+    result, for plot and pendmap.load.
     """
     from pendmap.identification import identified_model, identify_experiment
     from pendmap.identification.report import as_json, in_short

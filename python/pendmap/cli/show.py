@@ -86,6 +86,7 @@ class Outputs:
     """Output files and options of a command."""
 
     out: Path | None = None
+    whole: Path | None = None  # the whole result, where `out` is a model
     plot: Path | None = None
     report: Path | None = None
     rerun: Path | None = None
@@ -116,9 +117,10 @@ class Outputs:
         fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
         taken: dict[str, Any] = {field: given.pop(field) for field in fields} | {"out": None}
         options = {taken[f]: f"--{f}" for f in ("plot", "report", "rerun") if taken.get(f)}
+        known = _FIELDS if suffix in RESULTS else {**_FIELDS, RESULTS[0]: "whole"}
         for path in named_files:
             field = (
-                "address" if isinstance(path, Address) else _FIELDS.get(path.suffix.lower(), "out")
+                "address" if isinstance(path, Address) else known.get(path.suffix.lower(), "out")
             )
             other = next((taken[f] for f in _SAME.get(field, [field]) if taken.get(f)), None)
             if other is not None:
@@ -212,6 +214,8 @@ class Outputs:
         """
         if self.out is not None and save is not None:
             yield save, self.out
+        if self.whole is not None:
+            yield result.save, self.whole
         for path, module, write in (
             (self.plot, "render", "draw"),
             (self.report, "render", "write_report"),
@@ -303,7 +307,7 @@ def keep_inputs(
         return any(output.samefile(place) for place in places)
 
     read = [path for path in inputs if path is not None and path.exists()]
-    for named_file in (outputs.out, outputs.plot, outputs.rerun, outputs.report):
+    for named_file in (outputs.out, outputs.whole, outputs.plot, outputs.rerun, outputs.report):
         if named_file is None:
             continue
         files = _report_files(named_file) if named_file is outputs.report else [named_file]

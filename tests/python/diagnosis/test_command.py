@@ -77,13 +77,16 @@ def test_json_and_a_model_that_every_command_takes(
     assert content["provenance"]["verdict"] == "named"
     assert content["provenance"]["records"][0]["sha256"]
     assert Rig.from_toml(path).effects[0].name == "quadratic_drag"
-    again = pendmap_command("simulate", "--model", found["model"], "--until", "5", "--json")
-    assert again.returncode == 0, again.stderr
+    moved = pendmap_command("simulate", "--model", found["model"], "--until", "5", "--json")
+    assert moved.returncode == 0, moved.stderr
     # A diagnosis of the same records with the new model names nothing.
     more = pendmap_command(
-        "diagnose", hidden, "--model", found["model"], "--json", "--out", "b.toml"
+        *("diagnose", hidden, "--model", found["model"], "--json"),
+        *("--out", "b.toml", "--out", "b.nc"),
     )
-    assert json.loads(more.stdout)["verdict"] == "none"
+    again = pendmap.load(tmp_path / "b.nc")
+    assert json.loads(more.stdout)["verdict"] == again.verdict == "none"
+    assert again.model.effects == Rig.from_toml(tmp_path / "b.toml").effects
 
 
 @pytest.mark.thorough

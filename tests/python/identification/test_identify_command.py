@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import pendmap
 from conftest import COMMAND
 from decays import decay, record
 from pendmap.formatting import estimate_text
@@ -72,6 +73,20 @@ def test_from_a_record_to_its_basins(
     assert {row["what"] for row in one["table1"]} == {"period", "peak"}
 
 
+def test_the_whole_result_is_written_and_drawn(
+    tmp_path: Path, decay_file: Path, pendmap_command: Run
+) -> None:
+    written = pendmap_command("identify", decay_file, "--out", "all.nc", "--out", "model.toml")
+    assert written.stdout.rstrip().endswith("Written: model.toml, all.nc"), written.stderr
+    report = pendmap.load(tmp_path / "all.nc")
+    kept = pendmap.Rig.from_toml(tmp_path / "model.toml")
+    assert (report.model.w0, report.model.Tr) == (kept.w0, kept.Tr)
+    words = ("plot", "all.nc", "--layer", "peaks", "--width", 86, "--out", "peaks.png")
+    drawn = pendmap_command(*words)
+    assert drawn.returncode == 0, drawn.stderr
+    assert (tmp_path / "peaks.png").stat().st_size > 5000
+
+
 def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("identify", decay_file, "--json")
     assert run.returncode == 0, run.stderr
@@ -121,7 +136,9 @@ def test_drag_is_tried_where_the_residual_exceeds_the_noise(
         (("identify", "decay.csv", "--method", "best"), "must be one of trajectory"),
         (("identify", "decay.csv", "--effect", "quadratic"), "perhaps quadratic_drag"),
         (("identify", "decay.csv", "--effect", "drive_phase"), "acts on the drive: it must be"),
-        (("identify", "decay.csv", "--out", "model.nc"), "suffix must be .toml"),
+        (("identify", "decay.csv", "--out", "model.csv"), "suffix must be .toml or .nc or"),
+        (("identify", "decay.csv", "--out", "a.nc", "--out", "b.nc"), "one of a.nc and b.nc must"),
+        (("identify", "decay.toml", "--out", "decay.toml", "--out", "decay.nc"), "is an input"),
         (("identify", "forced"), "no run is free"),
         (("compare", "absent.toml", "decay.csv"), "absent.toml: No such file"),
         (
