@@ -16,13 +16,19 @@ import pendmap
 STORE = Path(__file__).resolve().parent / "effects_examples.json"
 LIMIT = 150.0
 """Upper bound on the time of one diagnosis, s."""
+BASELINE = ("viscous_damping", "coulomb_friction")
+LARGER = " --size 5"
+"""Added where an effect of the usual size is not found."""
 
 
-def said(name: str) -> list[str] | None:
-    """Return the lines of verdict and names; ``None`` if a diagnosis takes too long."""
+def said(effect: str) -> list[str] | None:
+    """Return the lines of verdict and names; ``None`` if a diagnosis takes too long.
+
+    ``effect`` is its name, with further options of ``pendmap rig``.
+    """
     words = [sys.executable, "-m", "pendmap"]
     with tempfile.TemporaryDirectory() as folder:
-        rig = ["rig", "hidden", "--effect", name, "--seed", "1", "--out", "hidden"]
+        rig = ["rig", "hidden", "--effect", *effect.split(), "--seed", "1", "--out", "hidden"]
         subprocess.run([*words, *rig], cwd=folder, check=True, capture_output=True)
         try:
             found = subprocess.run(
@@ -42,9 +48,13 @@ def main() -> None:
     """Add what the file lacks."""
     stored = json.loads(STORE.read_text(encoding="utf-8")) if STORE.exists() else {}
     for effect in pendmap.effects():
-        if effect.name not in stored:
-            stored[effect.name] = said(effect.name)
-            STORE.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        for words in (effect.name, effect.name + LARGER):
+            if words not in stored:
+                stored[words] = said(words)
+                STORE.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+            missed = "Verdict: none" in "\n".join(stored[words] or [])
+            if not missed or effect.name in BASELINE:
+                break
 
 
 if __name__ == "__main__":

@@ -87,11 +87,16 @@ def draw(effect: EffectDefinition) -> None:
     plt.close(figure)
 
 
-def example(name: str, stored: dict[str, list[str] | None]) -> str:
-    """Return the section of the hidden example."""
-    if stored.get(name) is None:
-        return ""
-    lines = "\n".join(stored[name] or [])
+def examples(name: str, stored: dict[str, list[str] | None]) -> str:
+    """Return the section of the hidden example; of a larger effect, too, if it was not found."""
+    mine = {words: found for words, found in stored.items() if words.split()[0] == name and found}
+    parts = [_example(words, found, last=words == [*mine][-1]) for words, found in mine.items()]
+    return "\n## A hidden example\n" + "".join(parts) if parts else ""
+
+
+def _example(words: str, found: list[str], *, last: bool) -> str:
+    """Return commands, what they print, and whether it is right."""
+    name, lines = words.split(maxsplit=1)[0], "\n".join(found)
     printed = wrapped(lines)
     right = f"\n  {name}: " in f"\n{lines}"
     if right and "Verdict: named" in lines:
@@ -100,15 +105,15 @@ def example(name: str, stored: dict[str, list[str] | None]) -> str:
         note = "The effect that was hidden is among the names; these records do not settle it."
     elif name in lines:
         note = "The effect that was hidden is in the class of indistinguishable names."
+    elif "Verdict: none" in lines and last:
+        note = "The baseline has this term."
     elif "Verdict: none" in lines:
-        note = "The baseline explains the records: it has this term, or they do not show it."
+        note = "These records do not show an effect of this size, but one that is larger:"
     else:
         note = "The effect that was hidden is not named."
     return f"""
-## A hidden example
-
 ```text
-$ pendmap rig hidden --effect {name} --seed 1 --out hidden
+$ pendmap rig hidden --effect {words} --seed 1 --out hidden
 $ pendmap diagnose hidden
 {printed}
 ```
@@ -156,7 +161,7 @@ In a model file without dimensions:
 Two records of the virtual rig, without noise. Left: the record with the effect less the record
 without it. Right: the torque that the model without the effect lacks along the record with it. The
 size of the effect is that of `pendmap rig hidden --effect {effect.name} --seed 1`.
-{example(effect.name, stored)}"""
+{examples(effect.name, stored)}"""
 
 
 def index(effects: list[EffectDefinition]) -> str:
