@@ -322,7 +322,7 @@ class BasinEntropy:
         return passes_log2(self.boundary, self.boundary_stderr)
 
 
-def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
+def basin_entropy(labels: npt.ArrayLike | xr.Dataset) -> BasinEntropy:
     """Compute basin entropy and boundary basin entropy of labels on a grid.
 
     In a box of 5 x 5 cells ``S_i = -sum p ln p``, ``p`` the shares of the labels in it. Basin
@@ -336,10 +336,10 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
 
     Parameters
     ----------
-    labels : array_like of int, shape (M, N)
-        Numbers of attractors from 1; 0 and below where the end is not known. Those cells are left
-        out, as are cells beyond the last whole box; below 5 cells a side the whole side is a box.
-        Attractors that are mirror images of one another count as two.
+    labels : array_like of int, shape (M, N), or xarray.Dataset
+        A basin map; or numbers of attractors from 1; 0 and below where the end is not known. Those
+        cells are left out, as are cells beyond the last whole box; below 5 cells a side the whole
+        side is a box. Attractors that are mirror images of one another count as two.
 
     Returns
     -------
@@ -364,6 +364,10 @@ def basin_entropy(labels: npt.ArrayLike) -> BasinEntropy:
     >>> round(pendmap.basin_entropy(labels).value, 2)
     0.67
     """
+    if isinstance(labels, xr.Dataset):
+        if "label" not in labels:
+            raise InputError("this dataset has no labels: it must be a map of pendmap.basins")
+        labels = labels["label"]
     cells = _numbered(labels)
     texture = _core.TextureSum(cells.shape[1], cells.shape[0])
     texture.add(np.ascontiguousarray(cells).ravel())

@@ -109,7 +109,8 @@ def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)
     units = Units.of(facts(dataset))
     below = Axis(symbol, ends)
     bare = Axis("", ends, ticks=()) if layer is None else below
-    entropies, exponents = _entropies(dataset, x), _growth(dataset, x, every)
+    entropies = _entropies(dataset, x)
+    exponents = _growth(dataset, x, every, named=layer is not None)
     known = dataset["exponent"].values
     rates = plane.padded(np.append(known[np.isfinite(known)], 0.0))
     axes = {
@@ -207,14 +208,14 @@ def _error(x: Floats, value: Floats, error: Floats, colour: str) -> list[Mark]:
     return [Line(*at, width=0.7, colour=colour), dots]
 
 
-def _growth(dataset: xr.Dataset, x: Floats, every: list[Branch]) -> list[Mark]:
-    """Return the largest Lyapunov exponent of each attractor."""
+def _growth(dataset: xr.Dataset, x: Floats, every: list[Branch], *, named: bool) -> list[Mark]:
+    """Return the largest Lyapunov exponent of each attractor, for the legend if ``named``."""
     marks: list[Mark] = [Level(0.0, colour=QUIET)]
     for k, one in enumerate(every):
         at = x, dataset["exponent"].values[:, k]
         colour, order = palette.on_white(one.colour), 2.0 if one.name else 1.0
         look: dict[str, Any] = {"colour": colour, "order": order}
-        marks.append(Line(*at, width=0.8, **look))
+        marks.append(Line(*at, width=0.8, name=one.name if named else "", **look))
         marks.append(Points(*at, size=2.2, path=f"{one.id}/exponent", **look))
     return marks
 
@@ -232,13 +233,15 @@ def _plane(  # noqa: PLR0913, PLR0917 (parts of a chart)
     layer: str | None,
     cells: int,
 ) -> Chart:
-    """Return the chart over two parameters: the first one upward, as the rows of the arrays."""
+    """Return the chart over two parameters, the first one to the right."""
     shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
     if layer is not None and layer not in (*LAYERS, *shares):
         known = ", ".join([*LAYERS, *shares])
         raise InputError(f"layer must be one of this sweep: {known}, got {layer!r}")
-    up, across = (plane.outer_edges(dataset, one) for one in varied_names(dataset))
-    sides = Axis(symbols[1], across), Axis(symbols[0], up)
+    first, second = varied_names(dataset)
+    dataset = dataset.transpose(second, first, ...)
+    across, up = (plane.outer_edges(dataset, one) for one in (first, second))
+    sides = Axis(symbols[0], across), Axis(symbols[1], up)
     panels = []
     for one in [layer] if layer else LAYERS:
         text, image = _image(dataset, one, shares.get(one), across, up, cells)

@@ -57,8 +57,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     units = Units.of(facts(dataset))
     listed = legend.entries(dataset)
     chaos = [entry for entry in listed if entry.chaotic and len(entry.points)]
-    if "labels" not in shown and not finite_time(dataset):
-        listed = [entry for entry in listed if entry.id < 1 or entry.chaotic]
+    if "labels" not in shown and (layer or not finite_time(dataset)):
+        own = not finite_time(dataset)  # else chaos is shown by the panel of its attractor alone
+        listed = [entry for entry in listed if entry.id < 1 or (entry.chaotic and own)]
     panels = []
     for one in shown:
         small = len(shown) > 1 and one == "labels" and not reliable(dataset)
@@ -68,12 +69,12 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
             marks += _attractors(dataset, listed, theta, velocity)
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
-        title = what(dataset, one)
-        if shown == ("labels",) and not reliable(dataset):
-            title = f"{title}; {warning(dataset)}"
+        alone = shown == ("labels",) and not reliable(dataset)
         sides = names.phase_plane(theta, velocity, units)
         share = SMALL if small else 1.0
-        panels.append(Panel(one, title, *sides, marks, share=share, note=alarm if small else ()))
+        look: dict[str, Any] = {"share": share, "note": alarm if small else ()}
+        look["warning"] = warning(dataset) if alone else ""
+        panels.append(Panel(one, what(dataset, one), *sides, marks, **look))
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
     low, high = (units.bare(bound, VELOCITY) for bound in velocity)

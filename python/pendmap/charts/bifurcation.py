@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
+    from pendmap.charts.marks import Floats
 
 MOST: Final = 16  # Greatest number of families that a legend names; all others are grey
-_LAYERS: Final = ("theta", "velocity")
+_POINTS: Final = ("theta", "velocity")  # What the points of a diagram show
+_BELOW: Final = ("sweeps", "exponent")
+_CELLS: Final = 1200  # Most pixels along a strip
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
 _STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
@@ -48,9 +51,11 @@ class Family:
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return angles and velocities of the points, the sweeps, and the exponents."""
     del cells
-    shown = layer or _LAYERS[0]
-    if shown not in _LAYERS:
-        raise InputError(f"layer must be one of {', '.join(_LAYERS)} in a diagram, got {shown!r}")
+    shown = layer or _POINTS[0]
+    if shown not in (*_POINTS, *_BELOW):
+        layers = ", ".join([*_POINTS, *_BELOW])
+        raise InputError(f"layer must be one of {layers} in a diagram, got {shown!r}")
+    alone = shown in _BELOW
     own = str(dataset.attrs["varied"])
     name = names.symbol(own, str(dataset[own].attrs.get("units", "1")))
     ends = plane.outer_edges(dataset, own)
@@ -62,9 +67,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     growth = plane.padded(np.append(known[np.isfinite(known)], 0.0))
     bare, rate = Axis("", ends, ticks=()), Axis(f"exponent {names.per_time(units)}", growth)
     exponents: list[Mark] = [Level(0.0, colour=QUIET)]
-    exponents += [
-        _dots(one, one.exponents, 1.6, f"{k}/points") for k, one in reversed([*enumerate(every)])
-    ]
+    for k, one in reversed([*enumerate(every)]):
+        called = _said(every, k) if alone else ""
+        exponents.append(_dots(dataset, one, one.exponents, 1.6, f"{k}/points", called))
     angle, speed = Axis(names.ANGLE, theta, "angle"), Axis(names.speed(units), speeds)
     panels = [
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
@@ -77,7 +82,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     return Chart(
         f"Bifurcations over {name.split(' (')[0]}",
         f"{fixed};   {count} values, {starts} starts each",
-        [[panels[_LAYERS.index(shown)]], [panels[2]], [panels[3]]],
+        [[panels[0 if alone else _POINTS.index(shown)]], [panels[2]], [panels[3]]],
         recorded=panels,
         heights=_HEIGHTS,
         size=_SIZE,
@@ -85,19 +90,20 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         tabs=True,
         remark="The two lines above the angles: on which attractor the sweep up (lower) and the"
         " sweep down (upper) are.",
-    )
+    ).only(shown if alone else None)
 
 
-def _dots(
-    one: Family, at: npt.NDArray[np.float64], size: float, path: str, name: str = ""
+def _dots(  # noqa: PLR0913, PLR0917 (what points are, and their look)
+    dataset: xr.Dataset, one: Family, at: Floats, size: float, path: str, name: str = ""
 ) -> Points:
-    dense = "chaos" in one.name
-    return Points(*at.T, colour=one.colour, size=size, path=path, name=name, dense=dense)
+    chaos = "chaos" in one.name
+    cells = plane.edges(dataset, str(dataset.attrs["varied"])) if chaos else None
+    return Points(*at.T, colour=one.colour, size=size, path=path, name=name, cells=cells)
 
 
 def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     """Return the stroboscopic points; points of orbits are larger than those of chaos."""
-    column = 1 + _LAYERS.index(which)
+    column = 1 + _POINTS.index(which)
     values = dataset[str(dataset.attrs["varied"])].values
     # A single point must be visible.
     size = min(3.0, max(1.3, 200.0 / values.size))
@@ -108,13 +114,13 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     for k, one in reversed([*enumerate(every)]):
         of = 0.45 if "chaos" in one.name else size
         points = one.points[:, [0, column]]
-        drawn.append(_dots(one, points, of, f"{k}/points", _said(every, k)))
+        drawn.append(_dots(dataset, one, points, of, f"{k}/points", _said(every, k)))
     low, high = plane.angles(dataset, dataset["point_theta"].values)
     for name, height in _SWEEPS if which == "theta" else ():
         for k, one in enumerate(every):
             on = values[getattr(one, name)]
             at = np.stack([on, np.full(on.size, high + height * (high - low))], axis=1)
-            drawn.append(_dots(one, at, 2.0, f"{k}/{name}"))
+            drawn.append(_dots(dataset, one, at, 2.0, f"{k}/{name}"))
     return drawn
 
 
@@ -128,7 +134,8 @@ def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float])
     if (strip == 0).any():
         classes[0] = ("sweep on none", "#ffffff")
     texts = [("" if name == "sweep on none" else name, name) for name, _ in classes]
-    image = Image(strip, ends, (-1.0, 1.0), classes=classes, labels=texts)
+    shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), _CELLS)]
+    image = Image(shown, ends, (-1.0, 1.0), classes=classes, labels=texts)
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
 
 

@@ -47,7 +47,7 @@ class Panel:
 
     ``name`` is the name a user types; ``root`` is the path in a recording, by default the name.
     ``share`` is the size relative to the others of its row; a ``note``, pairs of text and colour,
-    is written below a smaller one. ``bare`` panels have no frame.
+    is written below a smaller one, a ``warning`` in the panel. ``bare`` panels have no frame.
     """
 
     name: str
@@ -59,6 +59,7 @@ class Panel:
     root: str = ""
     share: float = 1.0
     note: Sequence[tuple[str, str]] = ()
+    warning: str = ""
     bare: bool = False
 
     @property

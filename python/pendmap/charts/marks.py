@@ -55,7 +55,7 @@ class Line(Mark):
 class Points(Mark):
     """Separate points; ``fill`` and ``edge`` default to ``colour``.
 
-    A figure may show many ``dense`` points as their density.
+    A figure may show many points as their density in columns, if edges of ``cells`` are given.
     """
 
     x: Floats
@@ -68,7 +68,7 @@ class Points(Mark):
     edge_width: float = 0.0
     halo: str = ""
     clip: bool = True
-    dense: bool = False
+    cells: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class Colours:
     """
 
     name: str
-    map: str
+    map: Any  # name of a colour map of matplotlib, or the map
     low: float
     high: float
     scale: Literal["linear", "log", "centred", "counts"] = "linear"

@@ -68,11 +68,11 @@ def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[
     wide, else the narrowest has eight. Cells are selected before conversion, so that a large map is
     never copied whole.
     """
-    cells = {str(d): _cells(edges(dataset, str(d)), limit) for d in array.dims}
-    return np.asarray(array.isel(cells).values)
+    shown = {str(d): cells(edges(dataset, str(d)), limit) for d in array.dims}
+    return np.asarray(array.isel(shown).values)
 
 
-def _cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
+def cells(bounds: Floats, limit: int) -> npt.NDArray[np.intp] | slice:
     """Return the index of the cell of each pixel between these edges."""
     count, whole = bounds.size - 1, float(bounds[-1] - bounds[0])
     widths = np.diff(bounds)

@@ -22,12 +22,14 @@ _LAYERS = {
     "a map": "kinds exponent attractors period winding undecided",
     "a map over draws": "certainty",
     "a trajectory": "history energy phase section",
-    "a bifurcation diagram": "theta velocity",
+    "a bifurcation diagram": "theta velocity sweeps exponent",
+    "a sweep": "fraction entropy uncertainty exponent",
+    "a sweep over two": "entropy boundary uncertainty attractors main undecided",
     "critical curves": "omega-p e-alpha2",
 }
 """Names of layers, by what has them."""
 _SHOWN = "; ".join(f"{', '.join(names.split())} of {what}" for what, names in _LAYERS.items())
-_LAYER = OptionType("name", str, lambda: " ".join(_LAYERS.values()).split())
+_LAYER = OptionType("name", str, lambda: [*dict.fromkeys(" ".join(_LAYERS.values()).split())])
 _LOOK = group("Look", "--layer settle --width 86 --no-title")
 
 

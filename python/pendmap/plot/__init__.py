@@ -26,7 +26,9 @@ from pendmap.render import draw as _save
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.colors import Colormap
 
+    from pendmap.charts.chart import Chart, Sheet
     from pendmap.comparison import Comparison
     from pendmap.diagnosis import Discrepancy
     from pendmap.identification import IdentificationReport
@@ -39,6 +41,7 @@ __all__ = [
     "comparison",
     "diagnosis",
     "draw",
+    "entries",
     "figure",
     "identification",
     "lifetime",
@@ -72,13 +75,13 @@ class Look(TypedDict, total=False):
     """Options of all functions.
 
     ``title`` is False for none, or a text; ``legend`` is True or False, by default a legend higher
-    than half the panel is left out; ``colormap`` is the name of a matplotlib colour map for layers
-    of numbers.
+    than half the panel is left out; ``colormap`` is a matplotlib colour map, or the name of one,
+    for layers of numbers.
     """
 
     title: bool | str
     legend: bool
-    colormap: str
+    colormap: str | Colormap
 
 
 def draw(
@@ -101,7 +104,7 @@ def draw(
         The part; an unknown one is answered with those of the result.
     **look
         ``title``, False or a text; ``legend``, True or False, without which one higher than half
-        the panel is left out; ``colormap``, a name of matplotlib.
+        the panel is left out; ``colormap``, one of matplotlib or its name.
 
     Returns
     -------
@@ -120,11 +123,10 @@ def draw(
     >>> pendmap.plot.draw(run, layer="phase").get_xlabel()
     '$θ$ (rad)'
     """
-    if layer is None:
-        layer = _FIRST.get(type(result).__name__)
-        if layer == "history" and len(getattr(result, "runs", [])) > 1:
-            layer = "0"
-    chart = registry.of_result(result, layer=layer)
+    chart = _chart(result, layer)
+    for name in look.keys() - Look.__annotations__.keys():
+        known = ", ".join(Look.__annotations__)
+        raise InputError(f"{name}: options must be among layer, {known}, or set on the Axes")
     if "colormap" in look:
         chart = drawing.in_colours(chart, look["colormap"])
     if ax is None:
@@ -132,11 +134,44 @@ def draw(
 
         ax = plt.figure(layout="constrained").add_subplot()
     check_type("ax", ax, Axes, "plt.gca()")
-    title = look.get("title", True)
-    axes.into(ax, chart, title=title is True, legend=look.get("legend"))
+    title, legend = look.get("title", True), look.get("legend")
+    if legend is not None:
+        check_type("legend", legend, bool, "False")
+    axes.into(ax, chart, title=title is True, legend=legend)
     if isinstance(title, str):
         ax.set_title(title)
     return ax
+
+
+def entries(result: Any, *, layer: str | None = None) -> tuple[list[Any], list[str]]:  # noqa: ANN401
+    """Return the handles and the texts of a part's legend, for a legend of one's own.
+
+    ``result`` and ``layer`` are those of :func:`draw`.
+
+    >>> import matplotlib.pyplot as plt
+    >>> import pendmap
+    >>> fig, axes = plt.subplots(1, 2, layout="constrained")
+    >>> map_ = pendmap.basins(pendmap.Pendulum(p=0.6), 40)
+    >>> for ax, layer in zip(axes, ("labels", "settle")):
+    ...     ax = pendmap.plot.basins(map_, ax, layer=layer, legend=False)
+    >>> handles, texts = pendmap.plot.entries(map_)
+    >>> legend = fig.legend(handles, texts, loc="outside lower center", ncols=3)
+    >>> texts[-1]
+    'rotation 1:+1, 8.4 %'
+    >>> plt.close(fig)
+    """
+    return axes.entries(axes.first(_chart(result, layer)))
+
+
+def _chart(result: Any, layer: str | None) -> Chart | Sheet:  # noqa: ANN401 (as of draw)
+    """Return the chart of one part of a result, by default of the leading one."""
+    if layer is None:
+        layer = _FIRST.get(type(result).__name__)
+        if layer == "history" and len(getattr(result, "runs", [])) > 1:
+            layer = "0"
+    chart = registry.of_result(result, layer=layer)
+    # Alone a part has no names that the other parts explain.
+    return chart if layer else registry.of_result(result, layer=chart.panels[0].name)
 
 
 def _draw(kind: str, result: Any, ax: Axes | None, layer: str | None, look: Look) -> Axes:  # noqa: ANN401
@@ -163,7 +198,9 @@ def sweep(
 ) -> Axes:
     """Draw basins along one or two parameters.
 
-    ``layer``: ``fractions`` (by default), the others by :func:`draw`'s message.
+    ``layer`` along one parameter: ``fraction`` (by default), ``entropy``, ``uncertainty``,
+    ``exponent``; over two: ``entropy`` (by default), ``boundary``, ``uncertainty``,
+    ``attractors``, ``main``, ``share K``, ``undecided``.
     """
     return _draw("basin_sweep", dataset, ax, layer, look)
 

@@ -21,6 +21,7 @@ from pendmap.render.style import SUFFIXES
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
     from pendmap.diagnosis import Discrepancy
@@ -39,7 +40,7 @@ def figure_of(  # noqa: PLR0913 (all of these a user may choose)
     width: float | None = None,
     title: bool = True,
     dpi: float = 200.0,
-    colormap: str | None = None,
+    colormap: str | Colormap | None = None,
 ) -> Figure:
     """Return the figure of a result, or of a chart; arguments are those of :func:`draw`."""
     if width is not None and not (size is None and MOST_NARROW <= width <= MOST_WIDE):
@@ -70,7 +71,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     width: float | None = None,
     title: bool = True,
     dpi: float | None = None,
-    colormap: str | None = None,
+    colormap: str | Colormap | None = None,
 ) -> Path:
     """Draw a result into a file.
 
@@ -113,7 +114,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         False: no title and subtitle, for a figure with a caption.
     dpi : float, optional
         Pixels per inch, 200 by default.
-    colormap : str, optional
+    colormap : str or Colormap, optional
         Name of a matplotlib colour map for the map's scalar layers.
 
     Returns
@@ -133,7 +134,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 
     Examples
     --------
-    >>> render.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
+    >>> pendmap.plot.save(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
     """
 
     def make(dpi: float) -> Figure:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure, FigureBase, SubFigure
 
     from pendmap.charts.chart import Panel
@@ -125,7 +126,7 @@ def _refuse(size: Ends, least: Ends) -> None:
         )
 
 
-def in_colours(chart: Chart | Sheet, colormap: str) -> Chart:
+def in_colours(chart: Chart | Sheet, colormap: str | Colormap) -> Chart:
     """Return a chart with another colour map in its images of numbers."""
     style.colour_map(colormap)
     if isinstance(chart, Sheet) or not any(_scales(panel) for panel in chart.panels):
@@ -322,6 +323,8 @@ def panel_into(axes: Axes, panel: Panel) -> None:
     """Draw the marks of a panel into axes, and set their limits, ticks and names."""
     for mark in panel.marks:
         marks.draw(axes, mark)
+    if panel.warning:
+        _warn(axes, panel.warning)
     words = axes.texts if panel.bare else []
     for artist in (*axes.lines, *axes.collections, *axes.images, *words):
         artist.set_in_layout(False)
@@ -330,6 +333,24 @@ def panel_into(axes: Axes, panel: Panel) -> None:
         ticks.scale(axes, which, bare)
     if panel.bare:
         axes.set_axis_off()
+
+
+def _warn(axes: Axes, warning: str) -> None:
+    """Write a warning into the upper left corner of a panel."""
+    size = style.points("legend.fontsize")
+    axes.annotate(
+        style.broken(warning, inches_of(axes)[0] - 0.4, size, bold=True),
+        (0.0, 1.0),
+        (4.0, -4.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        va="top",
+        color=ALARM,
+        size=size,
+        weight="bold",
+        bbox={"boxstyle": "square,pad=0.25", "fc": "white", "ec": ALARM, "alpha": 0.85},
+        zorder=9.0,
+    ).set_in_layout(False)
 
 
 def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:

@@ -73,28 +73,26 @@ def _points(axes: Axes, mark: charts.Points) -> None:
     if not np.size(mark.x):
         return  # it appears in the legend alone
     many = np.size(mark.x) > MANY
-    if many and mark.dense:
-        _density(axes, mark)
+    if many and mark.cells is not None:
+        _density(axes, mark, mark.cells)
         return
     axes.plot(mark.x, mark.y, clip_on=mark.clip, rasterized=many, **_spots(mark))
 
 
-def _density(axes: Axes, mark: charts.Points) -> None:
+def _density(axes: Axes, mark: charts.Points, cells: charts.Floats) -> None:
     """Draw the number of points in each pixel, on a logarithmic scale from pale to full colour."""
     known = np.isfinite(mark.x) & np.isfinite(mark.y)
     x, y = mark.x[known], mark.y[known]
-    distinct = np.unique(x)
-    step = float(np.median(np.diff(distinct))) if distinct.size > 1 else 1.0
-    across = min(round((distinct[-1] - distinct[0]) / step) + 1, _CELLS)
-    rows = int(np.clip(x.size / distinct.size, 50, _CELLS // 3))
-    ends = (distinct[0] - step / 2, distinct[-1] + step / 2), (float(y.min()), float(y.max()))
-    counts = np.histogram2d(x, y, (across, rows), ends)[0].T
+    every = np.linspace(0, cells.size - 1, min(cells.size, _CELLS + 1))
+    across = cells[every.round().astype(int)]
+    rows = int(np.clip(x.size / np.unique(x).size, 50, _CELLS // 3))
+    up = np.linspace(float(y.min()), float(y.max()), rows + 1)
+    counts = np.histogram2d(x, y, (across, up))[0].T
     shares = np.log1p(counts) / np.log1p(np.quantile(counts[counts > 0], 0.98))
     shades = np.empty((*counts.shape, 4))
     shades[..., :3] = to_rgb(mark.colour)
     shades[..., 3] = np.where(counts > 0, np.clip(shares, _PALEST, 1.0), 0.0)
-    where: dict[str, Any] = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
-    axes.imshow(shades, extent=(*ends[0], *ends[1]), **(where | _common(mark)))
+    axes.pcolormesh(across, up, shades, rasterized=True, **_common(mark))
 
 
 def _band(axes: Axes, mark: charts.Band) -> None:

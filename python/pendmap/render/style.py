@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
+from matplotlib.colors import Colormap
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
-    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
@@ -36,6 +36,8 @@ IN_COLUMN: Final[dict[Any, Any]] = {
 }
 
 MOST, PIXELS = 100.0, 20000  # Largest side of a figure, inches and pixels
+
+FEWEST = 12  # Letters of a line below which a text is not broken
 
 DPI = (20, 1200)  # Least and greatest pixels per inch
 
@@ -123,8 +125,11 @@ def folded(title: str, room: float) -> str:
 
 def broken(text: str, room: float, size: float, *, bold: bool = False) -> str:
     """Return a text in lines of at most ``room`` inches, broken between words."""
-    wide = inches(text, size, bold=bold)
-    return text if wide <= room else textwrap.fill(text, max(int(len(text) * room / wide), 12))
+    letters, lines = len(text), text
+    while inches(lines, size, bold=bold) > room and letters > FEWEST:
+        letters -= 1
+        lines = textwrap.fill(text, letters)
+    return lines
 
 
 def halves(text: str) -> list[str]:
@@ -139,9 +144,11 @@ def longest(lines: Sequence[str]) -> float:
     return max(inches(line, points("font.size")) for line in lines)
 
 
-def colour_map(name: str) -> Colormap:
-    """Return a copy of a matplotlib colour map; raise InputError for an unknown name."""
-    if name not in mpl.colormaps:
+def colour_map(name: str | Colormap) -> Colormap:
+    """Return a copy of a colour map, or of matplotlib's; raise InputError for an unknown name."""
+    if isinstance(name, Colormap):
+        return name.copy()
+    if not isinstance(name, str) or name not in mpl.colormaps:
         known = "viridis, cividis, magma, inferno, plasma, RdBu_r, PuOr"
         raise InputError(f"no colour map {name!r}; there are for example {known}")
     return mpl.colormaps[name].copy()
