@@ -259,8 +259,8 @@ def refuse_too_large(dataset: xr.Dataset) -> None:
 
 
 def settles(dataset: xr.Dataset) -> bool:
-    """Return whether any start settles on an attractor."""
-    return int(dataset["settle_periods"].max()) >= 0
+    """Return whether any start settles on an attractor; a map of a sweep has no settle times."""
+    return "settle_periods" not in dataset or int(dataset["settle_periods"].max()) >= 0
 
 
 def warning(dataset: xr.Dataset) -> str:

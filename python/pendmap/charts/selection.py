@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.adaptive import Tally
+from pendmap.analysis.basins import RELIABLE
 from pendmap.charts import plane
 from pendmap.errors import InputError
 from pendmap.files import facts, with_facts
@@ -44,7 +45,7 @@ _OVER: dict[str, dict[str, tuple[str, ...]]] = {
 
 _CELLS = {
     "basin_sweep": ("label",),
-    "basins": ("label", "settle_periods", "net_turns"),
+    "basins": ("label",),
     "bifurcation": ("up", "down"),
     "parameter_map": ("regime", "exponent"),
 }
@@ -69,8 +70,10 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
     """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise.
 
     Axes rise and dimensions have a fixed order. For a selection, shares, tables and summary are
-    recomputed, or marked as those of the whole. A whole result is unchanged.
+    recomputed, or marked as those of the whole. A whole result is unchanged. One map of a sweep is
+    a basin map.
     """
+    dataset = member(dataset)
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:
         raise InputError("a list of starts is no map: only basins on a grid can be drawn")
@@ -95,6 +98,29 @@ def shown(dataset: xr.Dataset) -> xr.Dataset:
     dataset = dataset.transpose(*_TABLES, *axes, *_COLUMNS, ..., missing_dims="ignore")
     count = _COUNTED.get(kind)
     return dataset if count is None else count(dataset)
+
+
+def member(dataset: xr.Dataset) -> xr.Dataset:
+    """Return one map of a sweep, selected by its parameters, as a basin map; else the dataset."""
+    varied = str(dataset.attrs.get("varied")).split()
+    sweep = dataset.attrs.get("kind") == "basin_sweep"
+    if not sweep or any(name not in dataset.coords or dataset[name].ndim for name in varied):
+        return dataset
+    here = np.ones(dataset.sizes["point"], bool)
+    for name in varied:
+        here &= dataset[f"point_{name}"].values == float(dataset[name])
+    part: xr.Dataset = dataset.isel(attractor=dataset["exists"].values.astype(bool), point=here)
+    at = ", ".join(f"{name} = {float(dataset[name]):.6g}" for name in varied)
+    told = f"One map of a sweep, {at}. The text below describes the whole sweep."
+    part.attrs = dataset.attrs | {
+        "kind": "basins",
+        "layers": "labels",
+        "summary": f"{told}\n{dataset.attrs['summary']}",
+    }
+    # Not every map of a sweep is checked.
+    reliable = not float(part["unreliable"]) > RELIABLE
+    one: xr.Dataset = with_facts(part, labels_reliable=int(reliable))
+    return one
 
 
 def _listed(dimensions: Iterable[Hashable]) -> str:

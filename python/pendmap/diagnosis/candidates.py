@@ -132,9 +132,14 @@ class Candidate:
             bare |= {self.size: size or FAINT, self.phase: 0.0}
         return Effect(self.name, bare, formula=self.formula).given(units)
 
+    def shape_in(self, units: Units) -> dict[str, float]:
+        """Return its shape in these units."""
+        given = self.effect(units).parameters if self.shape else {}
+        return {name: given[name] for name in self.shape}
+
     @property
     def title(self) -> str:
-        """Name with the shape."""
+        """Name with the shape, nondimensional: different for each candidate."""
         shape = ", ".join(f"{name} = {value:.3g}" for name, value in self.shape.items())
         return f"{self.name} ({shape})" if shape else self.name
 

@@ -116,10 +116,9 @@ class FittedModel:
         return {name: value for name, value in start.items() if name not in names}
 
     def shape_of(self, candidate: Candidate) -> dict[str, float]:
-        """Return the fitted shape of an effect, nondimensional."""
-        model = self.fit.model
-        bare = {e.name: e.bare(model.units).parameters for e in model.effects}
-        return {name: bare[candidate.name][name] for name in candidate.shape}
+        """Return the fitted shape of an effect, SI."""
+        fitted = {effect.name: effect.parameters for effect in self.fit.model.effects}
+        return {name: fitted[candidate.name][name] for name in candidate.shape}
 
     @property
     def adapted(self) -> int:

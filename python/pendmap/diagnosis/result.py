@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
+    from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.functions import FunctionScore
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel
@@ -257,16 +258,22 @@ class Discrepancy(FitResult):
         return compare_cycles(self.data, self.base.fits, self.best.fits, self.reasons)
 
 
+def shape_text(found: Discrepancy, candidate: Candidate) -> str:
+    """Return the shape of a candidate in SI, with units."""
+    shape = candidate.shape_in(found.base.fitted.fit.model.units)
+    return ", ".join(
+        f"{name} = {value:.3g} {unit_of(f'{candidate.name}.{name}', found.definition)}".rstrip()
+        for name, value in shape.items()
+    )
+
+
 def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the table of candidates at the baseline."""
     refitted = {a.effects[0]: a for a in reversed(found.attempts) if a.stage == 0}
     rows = []
-    for row in ranking(found)[:RANKED]:
+    for k, row in zip(found.scores.best()[:RANKED], ranking(found), strict=False):
         name, tried = row["name"], refitted.get(row["name"])
-        shape = ", ".join(
-            f"{own} = {value:.3g} {unit_of(f'{name}.{own}', found.definition)}".rstrip()
-            for own, value in row["shape"].items()
-        )
+        shape = shape_text(found, found.scores.scores[k].candidate)
         gains = (None, None) if tried is None else (tried.bic_gain, tried.held_out_gain)
         said = ["" if gain is None else f"{gain:.1f}" for gain in gains]
         rows.append([name, shape, f"{row['score']:.1f}", *said])
@@ -385,7 +392,7 @@ def ranking(found: Discrepancy) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": score.candidate.name,
-                "shape": dict(score.candidate.shape),
+                "shape": score.candidate.shape_in(found.base.fitted.fit.model.units),
                 "score": score.gain / level,
                 "size": next(iter(score.start.values()), None),
             }

@@ -54,7 +54,7 @@ class Attempt:
     """Candidates that were fitted, and whether they were accepted."""
 
     effects: tuple[str, ...]
-    shape: dict[str, float]  # Shape of the first effect, nondimensional
+    shape: dict[str, float]  # Shape of the first effect, SI
     score: float  # Gain promised by the score, in independent readings
     # Fall of the cost: sum of squares in independent readings with Schwarz's penalty.
     bic_gain: float

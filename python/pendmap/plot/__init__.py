@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from matplotlib.axes import Axes
 
 from pendmap.charts import registry
+from pendmap.charts.selection import member
 from pendmap.errors import InputError, check_type, short_repr
 from pendmap.render import axes, drawing, figure_of
 from pendmap.render import draw as _save
@@ -176,6 +177,8 @@ def _chart(result: Any, layer: str | None) -> Chart | Sheet:  # noqa: ANN401 (as
 
 def _draw(kind: str, result: Any, ax: Axes | None, layer: str | None, look: Look) -> Axes:  # noqa: ANN401
     own = registry.RESULTS.get(type(result).__name__)
+    if kind == "basins" and hasattr(result, "coords"):
+        result = member(result)
     given = own or getattr(result, "attrs", {}).get("kind") or short_repr(result)
     if given != kind:
         raise InputError(f"plot.{kind} draws results of kind {kind}, got {given}")
@@ -185,7 +188,7 @@ def _draw(kind: str, result: Any, ax: Axes | None, layer: str | None, look: Look
 def basins(
     dataset: xr.Dataset, ax: Axes | None = None, *, layer: str | None = None, **look: Unpack[Look]
 ) -> Axes:
-    """Draw a basin map.
+    """Draw a basin map, or one map of a sweep, like ``swept.sel(p=0.6)``.
 
     ``layer``: ``labels`` (by default; fractal maps: ``settle``, without attractors: ``turns``),
     ``settle``, ``turns``, ``exponent``; over draws ``probability`` and ``entropy``.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pendmap.comparison.replay import LOST, effect_strength
-from pendmap.diagnosis.result import ranking_table, zeroed
+from pendmap.diagnosis.result import ranking_table, shape_text, zeroed
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
 from pendmap.report.document import Document, Picture, bullets, code, plain, table
@@ -259,7 +259,9 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[str]:
     head = ("instead", "gain", "behind", "share", "separation", "why not")
     rows = [
         (
-            code(other.candidate.title),
+            " ".join(
+                [code(other.candidate.name), plain(shape_text(found, other.candidate))]
+            ).strip(),
             gained(other.gain),
             gained(other.behind),
             number(other.separation, 2),

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.next_experiment.limits import DETECTION_PROBABILITY, MARGIN
+from pendmap.diagnosis.result import shape_text
 from pendmap.formatting import counted
 from pendmap.identification.report import left_out
 from pendmap.model.labels import unit_of
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.diagnosis import Discrepancy
-    from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.next_experiment.limits import Limit
     from pendmap.diagnosis.next_experiment.power import Outlook
 
@@ -157,17 +157,13 @@ def exclusions(found: Discrepancy) -> Iterator[str]:
 
 def _limit(found: Discrepancy, effect: str, limit: Limit) -> tuple[str, ...]:
     """Return the row of an effect in the table of detection limits."""
-
-    def said(candidate: Candidate) -> str:
-        return ", ".join(f"{name} = {number(value)}" for name, value in candidate.shape.items())
-
     definition, size = found.definition(effect), limit.size
     parameter = definition.parameters[0].name
     if not math.isfinite(size):
         return code(effect), code(parameter), "undetectable in these records", "", "", ""
     unit = unit_of(f"{effect}.{parameter}", found.definition)
-    unseen = " or ".join(map(said, limit.unseen))
-    shape = said(limit.candidate) + (f"; undetectable with {unseen}" if unseen else "")
+    shape, *unseen = (plain(shape_text(found, c)) for c in (limit.candidate, *limit.unseen))
+    shape += f"; undetectable with {' or '.join(unseen)}" if unseen else ""
     row = code(effect), code(parameter), plain(f"{number(size, 2)} {unit}".rstrip()), shape
     if definition.group in {"drive", "reading"} or unit != unit_of("Tr"):
         return (*row, "", "")

@@ -38,7 +38,7 @@ impl Law for PowerLawDrag {
                 power: Power::Of(0),
                 range: [0.5, 4.0],
                 typical: [1.1, 3.0],
-                meaning: "power of the velocity",
+                meaning: "power of the velocity; linear where |v| < 1e-6",
             },
         ]),
         revealed_by: "large amplitudes and rotation, against small ones",
