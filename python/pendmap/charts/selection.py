@@ -110,11 +110,14 @@ def member(dataset: xr.Dataset) -> xr.Dataset:
     for name in varied:
         here &= dataset[f"point_{name}"].values == float(dataset[name])
     part: xr.Dataset = dataset.isel(attractor=dataset["exists"].values.astype(bool), point=here)
+    shows = str(part["plane"].attrs["flag_meanings"]).split()[int(part["plane"])]
+    part = part.drop_vars("plane")
     at = ", ".join(f"{name} = {float(dataset[name]):.6g}" for name in varied)
     told = f"One map of a sweep, {at}. The text below describes the whole sweep."
     part.attrs = dataset.attrs | {
         "kind": "basins",
         "layers": "labels",
+        "plane": shows,
         "summary": f"{told}\n{dataset.attrs['summary']}",
     }
     # Not every map of a sweep is checked.

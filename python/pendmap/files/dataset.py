@@ -24,6 +24,8 @@ from pendmap.files import check_regular, whole_file, whole_folder
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
+    from pendmap.files.saved import Saved
+
 MARK: Final = "pendmap"
 """Attribute of a Zarr store that a run began: the request, and whether it is complete."""
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
@@ -43,7 +45,7 @@ _UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
 _ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
 
 
-def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+def save(dataset: xr.Dataset | Saved, path: str | os.PathLike[str]) -> Path:
     """Write a result by the CF conventions 1.11; the file is complete or absent.
 
     The attribute ``history`` is added, unless the result has one: UTC time (or that of the
@@ -51,8 +53,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        A result of pendmap.
+    dataset : xarray.Dataset or other result
+        A result of pendmap, of records too.
     path : str or path
         Its suffix chooses the format: .nc (NetCDF 4) or .zarr.
 
@@ -77,6 +79,8 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     'melnikov.nc'
     """
     target = Path(path)
+    if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
+        return dataset.save(target)
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(

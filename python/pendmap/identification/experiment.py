@@ -25,6 +25,7 @@ from pendmap.identification.methods.trajectory import (
     JointFit,
     fit_together,
     identification_of,
+    physical,
 )
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.readings import as_fit_run
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 
 MISSES: Final = 1.2  # Residual over noise above which quadratic drag is tried
+CLOSED: Final = 0.5  # Greatest share of the squared gap that quadratic drag may leave
 
 
 def decay_of(experiment: Experiment) -> Run:
@@ -174,17 +176,21 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
-    """Return a fit with positive quadratic drag if the fit without it is poor, or None."""
+    """Return a fit with quadratic drag if the fit without it is poor and this closes its gap.
+
+    The squared residual beyond the noise must be at most half of that without it.
+    """
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
     if joint.fit.rms < MISSES * noise:
         return None
     try:
-        found = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
+        found = physical(fit_together(joint.runs, start=joint.fit.model, effects=[DRAG]))
     except FitDiverged:
         return None
     drag = next(effect for effect in found.fit.model.effects if effect.name == DRAG)
     opposes = min(drag.values) > 0
-    return found if opposes and found.fit.rms < joint.fit.rms else None
+    gap, left = (one.fit.rms**2 - noise**2 for one in (joint, found))
+    return found if opposes and left < CLOSED * gap else None
 
 
 def _best(
@@ -196,7 +202,7 @@ def _best(
     if experiment.w0 is not None:
         known["w0"] = experiment.w0
     try:
-        joint = fit_together(runs, start=start, known=known, effects=effects)
+        joint = physical(fit_together(runs, start=start, known=known, effects=effects))
     except TooShortError as error:
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
     except FitDiverged as error:

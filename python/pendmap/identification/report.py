@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
-from pendmap.identification.methods.trajectory import OFFSET
+from pendmap.identification.methods.trajectory import OFFSET, identification_of
 from pendmap.identification.parameters import SENSOR
 from pendmap.identification.readings import as_fit_run
 from pendmap.identification.results import FitResult, Followed
@@ -267,12 +267,12 @@ def _drag(report: IdentificationReport) -> Iterator[str]:
     """Yield the line on the gain by quadratic drag, if it was fitted."""
     if report.with_drag is None or report.joint is None:
         return
-    drag = report.with_drag.fit
+    drag = identification_of(report.with_drag)
     name = next(n for n in drag.estimates if n.startswith(DRAG))
     yield (
         f"With {DRAG} ({name.partition('.')[2]} = {estimate_text(drag.estimates[name])}) the "
-        f"residual is {drag.rms:.3g} rad, {report.joint.fit.rms:.3g} without: --effect {DRAG} "
-        "fits it, diagnose looks for more"
+        f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
+        f"--effect {DRAG} fits it, diagnose looks for more"
     )
 
 
@@ -317,6 +317,7 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     said = left_out(report.experiment, report.runs)
     if said:
         yield said
+    yield from finding_lines(report.experiment, *report.runs, changes=True)
     yield from (f"Warning: {text}" for text in (() if best is None else best.warnings))
     yield from _drag(report)
 

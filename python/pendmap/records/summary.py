@@ -157,10 +157,11 @@ def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
     return bool(doubt_keys(experiment, *runs) & UNIT_FINDINGS)
 
 
-def finding_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
-    """Yield a line for each finding that is not in :func:`doubts`."""
+def finding_lines(experiment: Experiment, *runs: Run, changes: bool = False) -> Iterator[str]:
+    """Yield a line for each finding that is not in :func:`doubts`, or for changes of data alone."""
     for where, found in experiment.findings_of(runs):
-        if not _doubted(found):
+        changed = found.mended or found.what == "file-left-out"
+        if not _doubted(found) and (changed or not changes):
             yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
 
 

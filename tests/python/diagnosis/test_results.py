@@ -13,6 +13,8 @@ import pendmap
 from pendmap import Effect, InputError, Rig, Run
 from pendmap.comparison import Comparison
 from pendmap.diagnosis import Discrepancy, diagnosed_model
+from pendmap.diagnosis.candidates import Candidate
+from pendmap.diagnosis.result import shape_text
 from pendmap.diagnosis.summary import as_json
 
 if TYPE_CHECKING:
@@ -59,6 +61,18 @@ def test_parameters_are_those_of_the_model_file(found: Discrepancy) -> None:
     ranking = found.ranking
     assert ranking.score.is_monotonic_decreasing
     assert "quadratic_drag" in ranking.index[:6]
+
+
+def test_shapes_of_candidates_are_in_si(found: Discrepancy) -> None:
+    w0 = found.base.fitted.fit.model.w0
+    for k in found.scores.best():
+        candidate = found.scores.scores[k].candidate
+        for name, value in found.ranking["shape"][candidate.name].items():
+            entry = candidate.definition[name]
+            assert value == pytest.approx(candidate.shape[name] * w0**entry.power_of_w0)
+    said = shape_text(found, Candidate("base_sway", {"ws": 1.5}))
+    assert said == f"ws = {1.5 * w0:.3g} rad/s"
+    assert shape_text(found, Candidate("impulses", {"t0": 30.0})) == f"t0 = {30 / w0:.3g} s"
 
 
 def test_an_effect_that_is_named_with_the_other_sign_has_its_correlations(

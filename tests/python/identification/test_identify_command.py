@@ -87,6 +87,18 @@ def test_the_whole_result_is_written_and_drawn(
     assert (tmp_path / "peaks.png").stat().st_size > 5000
 
 
+def test_corrections_of_a_record_are_said(tmp_path: Path, pendmap_command: Run) -> None:
+    time, angle = record(decay(), seconds=60, seed=3)
+    rows = np.column_stack((1000 * time, angle))
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    run = pendmap_command("identify", "a.csv", "--json", "--verbose")
+    said = pendmap_command("identify", "a.csv", "--out", "a.toml").stdout
+    assert "a: mended: " in said
+    assert said.count("mended: ") == sum(
+        "milliseconds" in f for f in json.loads(run.stdout)["findings"]
+    )
+
+
 def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("identify", decay_file, "--json")
     assert run.returncode == 0, run.stderr

@@ -181,7 +181,9 @@ def test_records_are_taken_in_all_their_forms(tmp_path: Path, report: Identifica
     other = dataclasses.replace(read[1], known={"gravity": 9.8})
     with pytest.raises(InputError, match=r"gravity must be one for all records, got 9.7 and 9.8"):
         pendmap.identify([dataclasses.replace(read[0], known={"gravity": 9.7}), other])
-    with pytest.raises(InputError, match="rate_hz must be left out where no file is read"):
+    with pytest.raises(
+        InputError, match="rate_hz must be left out where no file or DataFrame is read"
+    ):
         pendmap.identify(read, rate_hz=100.0)
     with pytest.raises(FileNotFoundError):
         pendmap.compare(Rig(w0=6.2), tmp_path / "nothing.csv")
@@ -253,15 +255,24 @@ def test_a_stored_comparison_is_drawn_again(tmp_path: Path, pendmap_command: Com
     assert "result must be a dataset, an identification, a diagnosis" in run.stderr
 
 
-def test_what_is_unphysical_is_said() -> None:
+def test_what_is_unphysical_is_held_at_0(tmp_path: Path) -> None:
     run = made()
     growing = dataclasses.replace(run, theta=run.theta * np.exp(0.2 * run.time / run.time[-1]))
     found = pendmap.identify(growing)
-    negative = [n for n in ("c_over_m", "Tr") if found.parameters[n].value < 0]
+    assert found.joint is not None
+    negative = found.joint.negative
     assert negative
-    for name in negative:
-        assert getattr(found.model, name) == 0.0
-        assert any(name in text and "0 in its place" in text for text in found.warnings)
+    for name, free in negative.items():
+        assert free.value < 0
+        assert getattr(found.model, name) == found.parameters[name].value == 0.0
+        said = f"{name} is {free.value:.3g}, which is unphysical: an effect is missing"
+        assert any(text.startswith(said) and "held at 0" in text for text in found.warnings)
+    # The others are fitted again: the model is the one whose residual is told.
+    (one,) = pendmap.compare(found.model, growing).runs
+    assert one.rms == pytest.approx(found.joint.fit.rms, rel=1e-3)
+    again = IdentificationReport.load(pendmap.save(found, tmp_path / "a.nc"))
+    assert again.joint is not None
+    assert again.joint.negative == negative
     assert f"{len(found.warnings)} warning" in repr(found)
     assert "warning" not in repr(pendmap.identify(run))
 

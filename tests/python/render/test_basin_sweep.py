@@ -59,12 +59,13 @@ def test_attractors_of_equal_names_have_different_colours() -> None:
 def test_layers_over_two_parameters(layer: str) -> None:
     chart = basin_sweep.chart(shown(PLANE), layer=layer)
     (image,) = (mark for mark in chart.panels[0].marks if isinstance(mark, Image))
-    assert image.values.shape == (3, 4)
+    assert image.values.shape == (4, 3)
+    assert [side.name for side in (chart.panels[0].x, chart.panels[0].y)] == ["p", "ω"]
     name = basin_sweep.LAYERS.get(layer, ("fraction", "", ""))[0]
     if name in ("basin_entropy", "attractors", "undecided"):
-        np.testing.assert_allclose(image.values, PLANE[name].values)
+        np.testing.assert_allclose(image.values, PLANE[name].values.T)
     if layer == "share 1":
-        np.testing.assert_allclose(image.values, PLANE.fraction.values[..., 0])
+        np.testing.assert_allclose(image.values, PLANE.fraction.values[..., 0].T)
 
 
 def test_an_unknown_layer_is_refused() -> None:
@@ -72,8 +73,21 @@ def test_an_unknown_layer_is_refused() -> None:
         basin_sweep.chart(shown(PLANE), layer="hue")
     with pytest.raises(InputError, match="no layer 'hue' in this figure; it has fraction"):
         basin_sweep.chart(shown(LINE), layer="hue")
-    with pytest.raises(InputError, match="p must be a range here"):
-        shown(LINE.isel(p=0))
+    with pytest.raises(InputError, match="omega must be a range here"):
+        shown(PLANE.isel(omega=0))
+
+
+def test_one_map_of_a_sweep_is_drawn_as_a_basin_map(tmp_path: Path) -> None:
+    one = PLANE.sel(p=0.6, omega=2.2, method="nearest")
+    axes = pendmap.plot.basins(one)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$θ$ (rad)", "$dθ/dτ$")
+    shades = axes.images[0].get_array()
+    for label in np.unique(one.label):
+        assert len(np.unique(shades[one.label.values == label], axis=0)) == 1
+    assert len(np.unique(shades.reshape(-1, 3), axis=0)) == len(np.unique(one.label))
+    back = recorded(one, tmp_path)
+    assert "One map of a sweep, p = 0.6, omega = 2.2." in back.one("/summary", "TextDocument:text")
+    pendmap.plot.save(LINE.isel(p=3), tmp_path / "one.png")
 
 
 @pytest.mark.usefixtures("strict_recordings")

@@ -26,7 +26,7 @@ from pendmap.charts.marks import Image, Points
 from pendmap.comparison import compare
 from pendmap.identification import identify_experiment
 from pendmap.records import Experiment, Run
-from pendmap.render import drawing, regions, style
+from pendmap.render import drawing, marks, regions, style
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -91,7 +91,7 @@ def test_it_is_a_module_that_lists_its_functions() -> None:
 def test_every_result_has_a_function() -> None:
     own = inspect.getmembers(plot, lambda one: inspect.getmodule(one) is plot)
     public = {name for name, one in own if inspect.isfunction(one)}
-    others = {"draw", "map", "diagnosis"}
+    others = {"draw", "entries", "map", "diagnosis"}
     assert public == {*results(), *others}
     assert plot.map is plot.parameter_map
 
@@ -129,6 +129,61 @@ def test_a_legend_does_not_narrow_its_column() -> None:
         assert legend.get_window_extent().y0 >= 0.0
 
 
+def test_a_second_result_grows_in_the_same_axes() -> None:
+    long, far = motions.swing(periods=8, steps=20), motions.swing(periods=2, steps=20)
+    far = far.assign(theta=far.theta + 9.0)
+    _, axes = plt.subplots()
+    plot.trajectory(long, axes, title="both")
+    before = axes.get_xlim()
+    plot.trajectory(far, axes)
+    assert axes.get_xlim() == before
+    assert axes.get_ylim()[0] < float(long.theta.min())
+    assert axes.get_ylim()[1] > float(far.theta.max())
+    assert axes.get_title() == "both"
+    plot.basins(MAP, axes)
+    assert axes.get_xlabel() == "$τ$"
+
+
+def test_a_second_result_adds_to_the_legend() -> None:
+    _, axes = plt.subplots(figsize=(6.0, 6.0))
+    plot.orbit(pendmap.orbit(Pendulum(p=0.6), 1), axes, legend=True)
+    first = {text.get_text() for text in axes.get_legend().get_texts()}
+    plot.lyapunov(pendmap.lyapunov(Pendulum(p=0.6)), axes, legend=True)
+    assert first < {text.get_text() for text in axes.get_legend().get_texts()}
+
+
+def test_labels_that_are_unreliable_say_so_under_any_title() -> None:
+    doubtful = synthetic.painted(**synthetic.UNRELIABLE)
+    for title in (True, False, "mine"):
+        _, axes = plt.subplots(figsize=(3.0, 3.0))
+        plot.basins(doubtful, axes, layer="labels", title=title)
+        (warning,) = (t for t in axes.texts if "labels unreliable" in t.get_text())
+        axes.figure.canvas.draw()
+        assert warning.get_window_extent().x1 < axes.bbox.x1
+    assert not plot.basins(doubtful).texts  # the settle time
+
+
+def test_the_leading_part_has_no_names_of_other_parts() -> None:
+    doubtful = synthetic.painted(**synthetic.UNRELIABLE)
+    assert plot.basins(doubtful, legend=True).get_legend() is None
+    assert plot.entries(doubtful) == ([], [])
+    handles, texts = plot.entries(doubtful, layer="labels")
+    assert len(handles) == len(texts) > 1
+
+
+def test_the_density_of_chaos_has_the_cells_of_its_axis() -> None:
+    cells = np.array([0.0, 0.1, 0.2, 1.2, 2.2, 3.2])
+    rng = np.random.default_rng(0)
+    x = np.repeat([0.05, 0.15, 1.7, 2.7], 700)  # none in the third cell
+    _, axes = plt.subplots()
+    marks.draw(axes, Points(x, rng.uniform(-1, 1, x.size), cells=cells))
+    (mesh,) = axes.collections
+    corners = mesh.get_coordinates()
+    np.testing.assert_allclose(corners[0, :, 0], cells)
+    shown = mesh.get_array()[..., 3].max(axis=0) > 0
+    assert shown.tolist() == [True, True, False, True, True]
+
+
 def test_powers_of_ten_are_raised() -> None:
     assert style.typeset("q ($10^{-6}$ 1/rad)") == "q ($10^{-6}$ 1/rad)"
     assert style.typeset("ln |δx|, p = YΩ²/g") == "ln |$δx$|, $p$ = $YΩ^2/g$"
@@ -152,6 +207,11 @@ def test_the_accessor_is_the_function() -> None:
         (lambda: plot.record(experiment(), layer="no"), "no layer 'no' in this figure; it has"),
         (lambda: plot.identification(identify_experiment(experiment()), layer="no"), "it has"),
         (lambda: plot.basins(MAP, layer="settle", colormap="no"), "no colour map 'no'"),
+        (
+            lambda: plot.basins(MAP, cmap="magma"),
+            "cmap: options must be among layer, title, legend",
+        ),
+        (lambda: plot.basins(MAP, legend="upper right"), "legend must be a bool"),
         (lambda: plot.figure(MAP, width=10), "width must be 40 to 500 mm"),
         (lambda: plot.figure(MAP, width=86, size=(3, 3)), "and no size given"),
         (

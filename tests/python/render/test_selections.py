@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 
 import pendmap
 from drawn import made
 from pendmap import InputError, Pendulum, render, viewer
-from pendmap.charts import legend, palette, parameter_map
+from pendmap.charts import bifurcation, legend, palette, parameter_map
 from pendmap.charts.selection import shown
 from pendmap.charts.trajectory import resting
 from recordings import recorded
@@ -216,6 +216,18 @@ def test_a_selection_of_a_bifurcation_diagram_is_drawn(
     ]
     assert sum(map(len, points)) == np.isin(DIAGRAM["point_value"].values, values).sum()
     assert ("A part is shown" in back.one("/summary", "TextDocument:text")) == (len(p) < 24)
+
+
+def test_sweeps_over_uneven_values_are_drawn_where_these_are() -> None:
+    values = np.r_[np.linspace(0.1, 0.3, 9), 0.6, 1.0]
+    found = pendmap.bifurcation(Pendulum(), {"p": values})
+    strip = pendmap.plot.bifurcation(found, layer="sweeps").images[0]
+    families = bifurcation.families(found)
+    for k, x in enumerate(values):
+        for row, sweep in ((0.5, "up"), (-0.5, "down")):
+            colour = next((one.colour for one in families if getattr(one, sweep)[k]), "#ffffff")
+            shade = at(np.asarray(strip.get_array()), strip.get_extent(), x, row)
+            assert to_hex(np.asarray(shade) / 255) == colour
 
 
 def test_curves_of_lifetimes_and_exponents(tmp_path: Path) -> None:

@@ -94,9 +94,14 @@ class Identification(Parameters):
 
     @property
     def sound(self) -> bool:
-        """Whether the result gives a model: it converged, with a positive finite w0."""
+        """Whether the result gives a model: it converged, with a positive finite w0.
+
+        A damping coefficient whose whole 95 % interval is below 0 gives none.
+        """
         w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
-        return self.applicable and self.converged and 0 < w0 < math.inf
+        damping = [self.estimates[name] for name in ("c_over_m", "Tr") if name in self.estimates]
+        driven = any(each.ci95 is not None and each.ci95[1] < 0 for each in damping)
+        return self.applicable and self.converged and 0 < w0 < math.inf and not driven
 
     @property
     def zero(self) -> float:

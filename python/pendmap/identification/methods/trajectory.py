@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, check_number
-from pendmap.formatting import counted
+from pendmap.formatting import Estimate, counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import TooShortError, starting_values
@@ -27,11 +27,10 @@ from pendmap.records import Run
 from pendmap.signal.robust import from_first, span
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
-    from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
@@ -42,6 +41,7 @@ TOO_GOOD: Final = 0.7
 """chi^2 per degree of freedom below which sigma is reported as too large."""
 OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
 POOR: Final = 0.1  # Rms residual over the record's standard deviation above which a fit is poor
+DAMPING: Final = ("c_over_m", "Tr")  # Coefficients of damping, which are not negative
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
 
@@ -65,7 +65,7 @@ def identify(
 
 def identification_of(joint: JointFit) -> Identification:
     """Return the identification from a fit."""
-    fit, runs, readings = joint.fit, joint.runs, joint.readings
+    fit, runs = joint.fit, joint.runs
     part = span(runs[0].time) if len(runs) == 1 else counted(len(runs), "free run")
     renamed = {f"{OFFSET}.d": "offset"}
     names = tuple(renamed.get(name, name) for name in fit.names)
@@ -76,18 +76,25 @@ def identification_of(joint: JointFit) -> Identification:
         for e in fit.estimates.values()
     ]
     estimates = dict(zip(names, found, strict=True))
+    # What was held at 0 has the interval of the fit in which it was free, if that reaches 0.
+    for name, free in joint.negative.items():
+        estimates[name] = (
+            dataclasses.replace(free, value=0.0) if _reaches_0(free) else Estimate(0.0)
+        )
+    first = [name for name in ("w0", *DAMPING) if name in estimates]
+    estimates = {name: estimates[name] for name in dict.fromkeys([*first, *estimates])}
     count = len(fit.windows)
     motions = "one motion" if len(runs) == 1 else f"{len(runs)} motions"
     how = f"as {motions}" if count == len(runs) else f"in {count} windows"
-    total = sum(len(reading.each) for reading in readings)
-    units = {r.unit for r in readings}
-    sigmas = [r.sigma * (r.gain if len(units) == 1 else 1.0) for r in readings]
+    total = sum(len(reading.each) for reading in joint.readings)
+    units = {r.unit for r in joint.readings}
+    sigmas = [r.sigma * (r.gain if len(units) == 1 else 1.0) for r in joint.readings]
     noise = " to ".join(f"{x:.2e}" for x in sorted({min(sigmas), max(sigmas)}))
     noise += f" {units.pop() if len(units) == 1 else 'rad'}"
     return Identification(
         estimates=estimates,
         used=f"{fit.samples} readings of {total}, {part}, {how}; noise {noise}",
-        warnings=tuple(_warnings(fit, estimates, readings)),
+        warnings=tuple(_warnings(joint, estimates)),
         covariance=(names, fit.widening * fit.covariance),
         misfit=fit.chi2 / max(fit.degrees, 1),
         model=fit.model,
@@ -124,26 +131,32 @@ def fit_decay(
     return JointFit(fit, (run,), readings)
 
 
-def _warnings(
-    fit: TrajectoryFit, estimates: Mapping[str, Estimate], readings: Sequence[Reading]
-) -> list[str]:
-    found = []
+def _reaches_0(estimate: Estimate) -> bool:
+    low, high = estimate.ci95 or (-math.inf, math.inf)
+    return low <= 0 <= high
+
+
+def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
+    fit, readings, found = joint.fit, joint.readings, []
     opposing = [
         f"{e.name}.{size}" for e in fit.model.effects if e.definition.opposes for size in e.sizes
     ]
-    for name in ("c_over_m", "Tr", *opposing):
-        if name in estimates and estimates[name].value < 0:
-            low, high = estimates[name].ci95 or (-math.inf, math.inf)
-            reaches = low <= 0 <= high
+    every = {**estimates, **joint.negative}
+    for name in (*DAMPING, *opposing):
+        if name in every and every[name].value < 0:
+            reaches = _reaches_0(every[name])
             why = "its interval reaches 0" if reaches else "an effect is missing in the model"
-            if name in {"c_over_m", "Tr"}:
+            if name in joint.negative:
+                why += "; it is held at 0, and the others are fitted again"
+            elif name in DAMPING:
                 why += "; the model has 0 in its place"
-            found.append(f"{name} is {estimates[name].value:.3g}, which is unphysical: {why}")
+            found.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         found.append(
-            f"the model does not fit: residuals are {math.sqrt(ratio):.2g} times the noise, and "
-            "the errors are widened by that factor; an effect is missing in the model"
+            f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
+            f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
+            "model"
         )
     elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
         found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
@@ -151,7 +164,7 @@ def _warnings(
         found.append("the search did not converge")
     # A sensor's tilt is determined by large swings only: its interval is not reported.
     wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
-    lost = [name for name, e in wanted.items() if e.ci95 is None]
+    lost = [name for name, e in wanted.items() if e.ci95 is None and name not in joint.negative]
     if lost:
         found.append(f"no finite interval was found for {', '.join(lost)}")
     laws = [reading.law for reading in readings if reading.law]
@@ -172,7 +185,7 @@ def fit_from_start(
     readings: Sequence[Reading],
     *,
     start: Rig | Mapping[str, float] | None = None,
-    friction: bool = True,
+    held: Collection[str] = (),
     effects: Sequence[Effect | str] = (),
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
     """Return the joint fit to several records, and their readings.
@@ -181,21 +194,20 @@ def fit_from_start(
     of the first record; TooShortError is raised if that has too few. If the fit is poor and
     ``start`` is not a Rig, a second one starts from the methods of peaks, or a global search over
     their envelope; the better one is returned. Readings whose noise grows with speed are weighted
-    accordingly, unless the model lacks an effect: then weights are equal. ``friction`` includes
-    Coulomb friction; further ``effects`` (SI) begin small if given by name; all their parameters
-    except exponents, orders and widths are fitted.
+    accordingly, unless the model lacks an effect: then weights are equal. Those of
+    :data:`DAMPING` that are ``held`` are 0; further ``effects`` (SI) begin small if given by name;
+    all their parameters except exponents, orders and widths are fitted.
     """
     first = runs[0]
     time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
-    names = ["w0", "c_over_m", *(["Tr"] if friction else [])]
+    names = ["w0", *(name for name in DAMPING if name not in held)]
+    zeros: dict[str, Any] = dict.fromkeys(held, 0.0)
     # A sensor on the rod has a bias instead of a zero error.
     zeroed = any(run.rod_sensor is None for run in runs)
 
     def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
-        model = _start_of(begin, time, theta, readings[0].sigma)
-        if not friction:
-            model = dataclasses.replace(model, Tr=0.0)
+        model = dataclasses.replace(_start_of(begin, time, theta, readings[0].sigma), **zeros)
         named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
         known = [*model.effects, *named]
         if zeroed and OFFSET not in {e.name for e in known}:
@@ -239,11 +251,16 @@ def _start_of(
 
 @dataclasses.dataclass(frozen=True)
 class JointFit:
-    """Fit of a pendulum to several runs, in the order of its curves and residuals."""
+    """Fit of a pendulum to several runs, in the order of its curves and residuals.
+
+    ``negative`` are damping coefficients that a fit made negative, as it gave them: they are held
+    at 0 in ``fit``.
+    """
 
     fit: TrajectoryFit
     runs: tuple[Run, ...]
     readings: tuple[Reading, ...]
+    negative: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
 
     @property
     def noise(self) -> float:
@@ -258,12 +275,14 @@ def fit_together(
     *,
     start: Rig | None = None,
     known: dict[str, float] | None = None,
+    held: Collection[str] = (),
     effects: Sequence[Effect | str] = (),
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
     Starting values are ``start``, with its effects, or ``known`` parameters, else estimated from
-    the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted.
+    the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted;
+    damping that is ``held`` is 0.
     """
     if not runs:
         raise InputError("runs must have one record or more, got none")
@@ -272,6 +291,20 @@ def fit_together(
         [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
         readings,
         start=start or known,
+        held=held,
         effects=effects,
     )
     return JointFit(fit, tuple(runs), worth)
+
+
+def physical(joint: JointFit) -> JointFit:
+    """Return a fit without negative damping: that is held at 0, and the others fitted again."""
+    while negative := {
+        name: estimate
+        for name, estimate in joint.fit.estimates.items()
+        if name in DAMPING and estimate.value < 0
+    }:
+        known = {**joint.negative, **negative}
+        again = fit_together(joint.runs, start=joint.fit.model, held=known)
+        joint = dataclasses.replace(again, negative=known)
+    return joint
