@@ -15,7 +15,7 @@ from pendmap.analysis.basins import RELIABLE
 from pendmap.charts import plane
 from pendmap.errors import InputError
 from pendmap.files import facts, with_facts
-from pendmap.formatting import counted
+from pendmap.formatting import counted, span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable
@@ -112,7 +112,7 @@ def member(dataset: xr.Dataset) -> xr.Dataset:
     part: xr.Dataset = dataset.isel(attractor=dataset["exists"].values.astype(bool), point=here)
     shows = str(part["plane"].attrs["flag_meanings"]).split()[int(part["plane"])]
     part = part.drop_vars("plane")
-    at = ", ".join(f"{name} = {float(dataset[name]):.6g}" for name in varied)
+    at = ", ".join(span(name, *[float(dataset[name])] * 2) for name in varied)
     told = f"One map of a sweep, {at}. The text below describes the whole sweep."
     part.attrs = dataset.attrs | {
         "kind": "basins",

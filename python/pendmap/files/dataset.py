@@ -24,8 +24,6 @@ from pendmap.files import check_regular, whole_file, whole_folder
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
-    from pendmap.files.saved import Saved
-
 MARK: Final = "pendmap"
 """Attribute of a Zarr store that a run began: the request, and whether it is complete."""
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
@@ -45,7 +43,10 @@ _UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
 _ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
 
 
-def save(dataset: xr.Dataset | Saved, path: str | os.PathLike[str]) -> Path:
+def save(
+    dataset: Any,  # noqa: ANN401 (a dataset, or what was found in records)
+    path: str | os.PathLike[str],
+) -> Path:
     """Write a result by the CF conventions 1.11; the file is complete or absent.
 
     The attribute ``history`` is added, unless the result has one: UTC time (or that of the
@@ -80,7 +81,8 @@ def save(dataset: xr.Dataset | Saved, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
-        return dataset.save(target)
+        own: Path = dataset.save(target)
+        return own
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(

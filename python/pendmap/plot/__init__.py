@@ -158,7 +158,7 @@ def entries(result: Any, *, layer: str | None = None) -> tuple[list[Any], list[s
     >>> handles, texts = pendmap.plot.entries(map_)
     >>> legend = fig.legend(handles, texts, loc="outside lower center", ncols=3)
     >>> texts[-1]
-    'rotation 1:+1, 8.4 %'
+    'rotation 1:+1, 8.81 %'
     >>> plt.close(fig)
     """
     return axes.entries(axes.first(_chart(result, layer)))

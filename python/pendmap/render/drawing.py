@@ -338,19 +338,12 @@ def panel_into(axes: Axes, panel: Panel) -> None:
 def _warn(axes: Axes, warning: str) -> None:
     """Write a warning into the upper left corner of a panel."""
     size = style.points("legend.fontsize")
-    axes.annotate(
-        style.broken(warning, inches_of(axes)[0] - 0.4, size, bold=True),
-        (0.0, 1.0),
-        (4.0, -4.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        va="top",
-        color=ALARM,
-        size=size,
-        weight="bold",
-        bbox={"boxstyle": "square,pad=0.25", "fc": "white", "ec": ALARM, "alpha": 0.85},
-        zorder=9.0,
-    ).set_in_layout(False)
+    text = style.broken(warning, inches_of(axes)[0] - 0.4, size, bold=True)
+    look: dict[str, Any] = {"color": ALARM, "size": size, "weight": "bold", "zorder": 9.0}
+    look["bbox"] = {"boxstyle": "square,pad=0.25", "fc": "white", "ec": ALARM, "alpha": 0.85}
+    where: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
+    words = axes.annotate(text, (0.0, 1.0), (4.0, -4.0), va="top", **where, **look)
+    words.set_in_layout(False)
 
 
 def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:

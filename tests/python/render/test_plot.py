@@ -26,7 +26,7 @@ from pendmap.charts.marks import Image, Points
 from pendmap.comparison import compare
 from pendmap.identification import identify_experiment
 from pendmap.records import Experiment, Run
-from pendmap.render import drawing, marks, regions, style
+from pendmap.render import drawing, regions, style
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -176,7 +176,8 @@ def test_the_density_of_chaos_has_the_cells_of_its_axis() -> None:
     rng = np.random.default_rng(0)
     x = np.repeat([0.05, 0.15, 1.7, 2.7], 700)  # none in the third cell
     _, axes = plt.subplots()
-    marks.draw(axes, Points(x, rng.uniform(-1, 1, x.size), cells=cells))
+    chaos = Points(x, rng.uniform(-1, 1, x.size), cells=cells)
+    drawing.panel_into(axes, Panel("a", "", Axis("", (0.0, 3.2)), Axis("", (-1.0, 1.0)), [chaos]))
     (mesh,) = axes.collections
     corners = mesh.get_coordinates()
     np.testing.assert_allclose(corners[0, :, 0], cells)
