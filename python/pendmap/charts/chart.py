@@ -157,10 +157,13 @@ class Sheet:
         return [chart.whole(panel) for chart in charts for panel in chart.panels]
 
     def only(self, layer: str | None) -> Sheet | Chart:
-        """Return a chart of one of the panels; the sheet without a name."""
+        """Return a chart of the first panel of a name, below its heading; the sheet without one."""
         if layer is None:
             return self
-        return Chart(self.title, self.subtitle, [[_named(self.panels, layer)]])
+        panel = _named(self.panels, layer)
+        charts = (chart for column in self.columns for chart in column)
+        own = next(one for one in charts if layer in {each.name for each in one.panels})
+        return Chart(self.title, own.title or self.subtitle, [[panel]])
 
 
 def _named(panels: Sequence[Panel], layer: str) -> Panel:

@@ -180,13 +180,14 @@ def by_run(found: Discrepancy) -> Panel:
     if back:
         marks.append(Span((back[0] - 0.5, back[-1] + 0.5), colour="#f1f1f1", name="held out"))
     level, ends = bars(noise, at - 0.32, at + 0.32)
+    (first, _), *further = models(found)
     marks += [
         Line(*bars(at, after, before), colour="#bbbbbb", width=1.0, order=1.0),
-        Points(at, before, colour=BEFORE, fill="#ffffff", edge_width=1.0, size=5.0),
+        Points(at, before, colour=BEFORE, fill="#ffffff", edge_width=1.0, size=5.0, name=first),
         Line(ends, level, width=1.1, name="noise"),
     ]
-    if found.adds:
-        marks.append(Points(at, after, marker="s", colour=AFTER, size=4.0))
+    for name, colour in further:
+        marks.append(Points(at, after, marker="s", colour=colour, size=4.0, name=name))
     across, up = _runs([row.name for row in rows]), names.sizes(RMS, noise, before, after)
     return Panel("by run", "Residual by run", across, up, marks)
 

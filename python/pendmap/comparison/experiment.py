@@ -97,11 +97,10 @@ class Comparison(Saved):
             name = one.run.name
             rows.append((name, "residual", one.sigma, one.rms, *[math.nan] * 4, "rad"))
             if isinstance(one, RunComparison):
-                rows += [
-                    (name, f"{r.what} {r.asked:g}", r.measured, *[math.nan] * 4, e, _UNITS[r.what])
-                    for r in one.table.rows
-                    for e in [r.errors.get(MODEL, math.nan)]
-                ]
+                for r in one.table.rows:
+                    told, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
+                    unit = _UNITS[r.what]
+                    rows.append((name, told, r.measured, *[math.nan] * 4, error, unit))
             else:
                 rows += [
                     (name, e.name, e.measured, e.median, *e.ci95, e.chance, math.nan, e.unit)
