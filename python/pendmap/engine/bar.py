@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import sys
 import threading
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -107,7 +108,7 @@ class ProgressBar:
             total=total,
             desc=f"{self._name} " if self._name else None,
             bar_format=_FORMAT,
-            ncols=WIDTH,
+            ncols=min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns),
             nrows=24,
             mininterval=_OFTEN,
             miniters=1,

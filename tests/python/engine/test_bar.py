@@ -36,13 +36,17 @@ def in_terminal(code: str) -> str:
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no such terminals")
-def test_a_terminal_shows_the_share_done_and_the_time() -> None:
+@pytest.mark.parametrize("columns", [200, 80, 50])
+def test_a_terminal_shows_the_share_done_and_the_time(
+    columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
     said = in_terminal(SHOWN.replace("WAIT", "0.15"))
     shares = [int(share) for share in re.findall(r"basins +(\d+) %\|", said)]
     assert shares[0] == 0
     assert {30, 100} <= set(shares)
     assert "passed" in said
-    assert max(map(len, said.split("\r"))) <= 82
+    assert max(map(len, said.split("\r"))) <= min(columns, 80) + 2
 
 
 def test_a_file_has_no_bar() -> None:
