@@ -17,6 +17,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import counted, listed
+from pendmap.records.dates import without_dates
 from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
 
@@ -51,6 +52,7 @@ _LEVELS: Final = {
 }
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 _HEADS: Final = 30  # Most lines above the numbers of a short file
+TIME: Final = "t_s"  # Heading of times that a record has as dates
 LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 1970) are missing
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
@@ -150,7 +152,7 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
 
     index = frame.index
     if isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex):
-        index = index.rename("t_s")
+        index = index.rename(TIME)
     if index.name is not None and index.name not in frame.columns:
         frame = frame.set_axis(index).reset_index()
     refuse_large(where, columns=frame.shape[1], size=8 * frame.size)
@@ -279,6 +281,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
         )
     # Lines that are too long are unreadable.
     lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
+    lines, dated = without_dates(lines)
     delimiter, decimal, width = _way(lines, reader, where)
     cells, fits = list[str](), list[bool]()
     for _, line in lines:
@@ -304,6 +307,8 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
         shown = listed([str(k) for k in dropped], 3)
         said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
         findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
+    if dated and headed and TIME not in names:
+        names = (TIME, *names[1:])
     order = np.flatnonzero(fits)
     numbers = [_numbers(column, decimal) for column in columns]
     places = np.array([lines[k][0] for k in order])

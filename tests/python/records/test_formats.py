@@ -156,6 +156,37 @@ def test_a_data_frame_is_read_as_its_file(tmp_path: Path, indexed: str | None) -
     assert {"outliers"} <= found(run).keys() == found(written).keys()
 
 
+@pytest.mark.parametrize(
+    ("form", "separator", "decimal", "head"),
+    [
+        ("%Y-%m-%d %H:%M:%S.%f", ",", ".", "when"),
+        ("%Y-%m-%dT%H:%M:%S.%fZ", ";", ".", ""),
+        ("%Y-%m-%d %H:%M:%S,%f", ";", ",", "Datum"),
+        ("%Y-%m-%dT%H:%M:%S.%f+02:00", "\t", ".", None),
+    ],
+)
+def test_times_may_be_dates(
+    tmp_path: Path, form: str, separator: str, decimal: str, head: str | None
+) -> None:
+    time, theta = clean()
+    dates = (pd.Timestamp("2026-02-28 23:59:50") + pd.to_timedelta(time, unit="s")).strftime(form)
+    rows = [
+        f"{d}{separator}{repr(x).replace('.', decimal)}"
+        for d, x in zip(dates, theta.tolist(), strict=True)
+    ]
+    first = [] if head is None else [f"{head}{separator}theta_rad"]
+    (tmp_path / "a.csv").write_text("\n".join([*first, *rows]) + "\n", encoding="utf-8")
+    (run,) = pendmap.read_experiment(tmp_path / "a.csv").runs
+    same(run, within=1e-12)
+
+
+def test_dates_that_are_none_are_refused(tmp_path: Path) -> None:
+    rows = [f"2026-02-{28 + k:02d} 10:00:00,{k}" for k in range(9)]
+    (tmp_path / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    with pytest.raises(pendmap.InputError, match="got no rows of numbers"):
+        pendmap.read_experiment(tmp_path / "a.csv")
+
+
 def test_a_data_frame_without_times_has_a_rate() -> None:
     time, theta = clean()
     frame = pd.DataFrame({"theta_deg": np.degrees(theta)})
