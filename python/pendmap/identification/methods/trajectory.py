@@ -298,13 +298,19 @@ def fit_together(
 
 
 def physical(joint: JointFit) -> JointFit:
-    """Return a fit without negative damping: that is held at 0, and the others fitted again."""
+    """Return a fit without negative damping: that is held at 0, and the others fitted again.
+
+    Where no such fit is found, the fit is returned as it is.
+    """
     while negative := {
         name: estimate
         for name, estimate in joint.fit.estimates.items()
         if name in DAMPING and estimate.value < 0
     }:
         known = {**joint.negative, **negative}
-        again = fit_together(joint.runs, start=joint.fit.model, held=known)
+        try:
+            again = fit_together(joint.runs, start=joint.fit.model, held=known)
+        except FitDiverged:
+            return joint
         joint = dataclasses.replace(again, negative=known)
     return joint
