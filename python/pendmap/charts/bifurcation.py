@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 MOST: Final = 16  # Greatest number of families that a legend names; all others are grey
 _POINTS: Final = ("theta", "velocity")  # What the points of a diagram show
 _BELOW: Final = ("sweeps", "exponent")
-_CELLS: Final = 1200  # Most pixels along a strip
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
 _STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
@@ -48,9 +47,8 @@ class Family:
     down: npt.NDArray[np.bool_]
 
 
-def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
+def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
     """Return angles and velocities of the points, the sweeps, and the exponents."""
-    del cells
     shown = layer or _POINTS[0]
     if shown not in (*_POINTS, *_BELOW):
         layers = ", ".join([*_POINTS, *_BELOW])
@@ -74,7 +72,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     panels = [
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
         Panel("velocity", "", bare, speed, _points(dataset, every, "velocity")),
-        Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends)),
+        Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends, cells)),
         Panel("exponent", "", Axis(name, ends), rate, exponents),
     ]
     count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
@@ -124,7 +122,9 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     return drawn
 
 
-def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float]) -> list[Mark]:
+def _sweeps(
+    dataset: xr.Dataset, every: list[Family], ends: tuple[float, float], cells: int
+) -> list[Mark]:
     """Return a strip for each sweep, coloured by its attractor, with the names of all families."""
     strip = np.zeros((2, dataset.sizes[str(dataset.attrs["varied"])]), dtype=np.int64)
     classes = [("", "#ffffff")]
@@ -134,7 +134,7 @@ def _sweeps(dataset: xr.Dataset, every: list[Family], ends: tuple[float, float])
     if (strip == 0).any():
         classes[0] = ("sweep on none", "#ffffff")
     texts = [("" if name == "sweep on none" else name, name) for name, _ in classes]
-    shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), _CELLS)]
+    shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), cells)]
     image = Image(shown, ends, (-1.0, 1.0), classes=classes, labels=texts)
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
 

@@ -12,6 +12,7 @@ import numpy as np
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
+from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.valley import refine_exponent
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
@@ -43,7 +44,6 @@ SIZED_STEPS: Final = 5  # Most steps of the fit of a size before its shape is fi
 
 NEAR_STEPS: Final = 6  # Most steps of a fit after an exponent was moved
 
-OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 
 ERRORS: Final = 3.0  # Standard errors by which an estimate may exceed a physical limit
 

@@ -10,7 +10,14 @@ import numpy as np
 
 from pendmap.errors import FitDiverged, InputError, core_errors
 from pendmap.formatting import Estimate
-from pendmap.identification.parameters import PER_RUN, PLACES, Conversion, free_quantities, interval
+from pendmap.identification.parameters import (
+    OPPOSING,
+    PER_RUN,
+    PLACES,
+    Conversion,
+    free_quantities,
+    interval,
+)
 from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.units import Units
 
@@ -193,7 +200,7 @@ def _result(
 
 def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
     own = {n: e.value for n, e in estimates.items() if n in PLACES}
-    own |= {n: max(own[n], 0.0) for n in ("c_over_m", "Tr") if n in own}
+    own |= {n: max(own[n], 0.0) for n in OPPOSING if n in own}
     if model.p == 0:
         own = {n: value for n, value in own.items() if n not in PER_RUN}
     effects = []

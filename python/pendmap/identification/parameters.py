@@ -30,6 +30,7 @@ PLACES: Final[Mapping[str, tuple[str, float]]] = {"w0": ("gravity", 1)} | {
 SENSOR: Final = ("bias", "tilt")
 """Parameters of a sensor on the rod, always fitted run by run."""
 
+OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run
 
 

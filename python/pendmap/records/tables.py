@@ -326,7 +326,6 @@ def _numbers(column: list[str], decimal: str) -> Floats:
     if np.isnan(numbers).all():
         words = texts.str.lower().map(_LEVELS)
         numbers = pd.to_numeric(words, errors="coerce").to_numpy(dtype=float, copy=True)
-    numbers[~np.isfinite(numbers)] = np.nan
     return np.asarray(numbers)
 
 

@@ -259,9 +259,7 @@ def _alternatives(found: Discrepancy, each: Identifiability) -> Iterator[str]:
     head = ("instead", "gain", "behind", "share", "separation", "why not")
     rows = [
         (
-            " ".join(
-                [code(other.candidate.name), plain(shape_text(found, other.candidate))]
-            ).strip(),
+            f"{code(other.candidate.name)} {plain(shape_text(found, other.candidate))}".rstrip(),
             gained(other.gain),
             gained(other.behind),
             number(other.separation, 2),

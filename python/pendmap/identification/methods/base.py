@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 
 from pendmap.formatting import Estimate, counted, estimate_text
+from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.results import Parameters
 from pendmap.model import Rig
 from pendmap.signal.robust import Z95
@@ -99,7 +100,7 @@ class Identification(Parameters):
         A damping coefficient whose whole 95 % interval is below 0 gives none.
         """
         w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
-        damping = [self.estimates[name] for name in ("c_over_m", "Tr") if name in self.estimates]
+        damping = [self.estimates[name] for name in OPPOSING if name in self.estimates]
         driven = any(each.ci95 is not None and each.ci95[1] < 0 for each in damping)
         return self.applicable and self.converged and 0 < w0 < math.inf and not driven
 
@@ -145,7 +146,7 @@ class Identification(Parameters):
         known: dict[str, Any] = {
             n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
         }
-        for name in ("c_over_m", "Tr"):
+        for name in OPPOSING:
             if name in known:
                 known[name] = max(known[name], 0.0)
         if not math.isfinite(known.get("w0", math.nan)):
@@ -191,7 +192,7 @@ def identified(  # noqa: PLR0913 (all of a result)
         error = math.sqrt(max(float(variance), 0.0))
         normal = (value - Z95 * error, value + Z95 * error)
         estimates[name] = Estimate(value, error, (intervals or {}).get(name, normal))
-        if name in {"c_over_m", "Tr"} and value < 0:
+        if name in OPPOSING and value < 0:
             negative.append(f"unphysical: {name} is {value:.4g}, below 0")
     return Identification(
         estimates=estimates,

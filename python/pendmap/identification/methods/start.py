@@ -11,6 +11,7 @@ from scipy.special import ellipk
 
 from pendmap.errors import InputError
 from pendmap.identification.methods import energy_balance, repaired
+from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.peaks import find_peaks, samples
 from pendmap.identification.period import envelope
 
@@ -99,7 +100,7 @@ def _start_of(found: Identification) -> dict[str, float] | None:
     """Return starting values from a method's result; None if they are implausible."""
     if not found.applicable:
         return None
-    for name in ("c_over_m", "Tr"):
+    for name in OPPOSING:
         estimate = found.estimates[name]
         if not math.isfinite(estimate.value) or estimate.value < -3 * (estimate.stderr or 0.0):
             return None

@@ -18,7 +18,7 @@ from pendmap.formatting import Estimate, counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import TooShortError, starting_values
-from pendmap.identification.parameters import SENSOR
+from pendmap.identification.parameters import OPPOSING, SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
@@ -41,7 +41,6 @@ TOO_GOOD: Final = 0.7
 """chi^2 per degree of freedom below which sigma is reported as too large."""
 OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
 POOR: Final = 0.1  # Rms residual over the record's standard deviation above which a fit is poor
-DAMPING: Final = ("c_over_m", "Tr")  # Coefficients of damping, which are not negative
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
 
@@ -81,7 +80,7 @@ def identification_of(joint: JointFit) -> Identification:
         estimates[name] = (
             dataclasses.replace(free, value=0.0) if _reaches_0(free) else Estimate(0.0)
         )
-    first = [name for name in ("w0", *DAMPING) if name in estimates]
+    first = [name for name in ("w0", *OPPOSING) if name in estimates]
     estimates = {name: estimates[name] for name in dict.fromkeys([*first, *estimates])}
     count = len(fit.windows)
     motions = "one motion" if len(runs) == 1 else f"{len(runs)} motions"
@@ -142,13 +141,13 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
         f"{e.name}.{size}" for e in fit.model.effects if e.definition.opposes for size in e.sizes
     ]
     every = {**estimates, **joint.negative}
-    for name in (*DAMPING, *opposing):
+    for name in (*OPPOSING, *opposing):
         if name in every and every[name].value < 0:
             reaches = _reaches_0(every[name])
             why = "its interval reaches 0" if reaches else "an effect is missing in the model"
             if name in joint.negative:
                 why += "; it is held at 0, and the others are fitted again"
-            elif name in DAMPING:
+            elif name in OPPOSING:
                 why += "; the model has 0 in its place"
             found.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
@@ -194,14 +193,14 @@ def fit_from_start(
     of the first record; TooShortError is raised if that has too few. If the fit is poor and
     ``start`` is not a Rig, a second one starts from the methods of peaks, or a global search over
     their envelope; the better one is returned. Readings whose noise grows with speed are weighted
-    accordingly, unless the model lacks an effect: then weights are equal. Those of
-    :data:`DAMPING` that are ``held`` are 0; further ``effects`` (SI) begin small if given by name;
-    all their parameters except exponents, orders and widths are fitted.
+    accordingly, unless the model lacks an effect: then weights are equal. Damping coefficients that
+    are ``held`` are 0; further ``effects`` (SI) begin small if given by name; all their parameters
+    except exponents, orders and widths are fitted.
     """
     first = runs[0]
     time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
-    names = ["w0", *(name for name in DAMPING if name not in held)]
+    names = ["w0", *(name for name in OPPOSING if name not in held)]
     zeros: dict[str, Any] = dict.fromkeys(held, 0.0)
     # A sensor on the rod has a bias instead of a zero error.
     zeroed = any(run.rod_sensor is None for run in runs)
@@ -305,7 +304,7 @@ def physical(joint: JointFit) -> JointFit:
     while negative := {
         name: estimate
         for name, estimate in joint.fit.estimates.items()
-        if name in DAMPING and estimate.value < 0
+        if name in OPPOSING and estimate.value < 0
     }:
         known = {**joint.negative, **negative}
         try:
