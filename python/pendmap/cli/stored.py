@@ -31,30 +31,21 @@ class Kept:
     mix: bool
     count: int | None
     scheduler: str | None
-    dry_run: bool
 
     @property
     def goes_on(self) -> bool:
         """Whether an existing store is not replaced."""
-        return self.resume or self.part is not None or self.dry_run
+        return self.resume or self.part is not None
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Kept:
-        """Remove these options from ``given``; refuse what a dry run cannot have."""
-        kept = cls(**{field.name: given.pop(field.name) for field in dataclasses.fields(cls)})
-        if kept.dry_run:
-            others = {"--part": kept.part, "--resume": kept.resume, "--view": given["view"]}
-            for option in (option for option, other in others.items() if other):
-                raise click.UsageError(f"--dry-run must be given without {option}, got both")
-        return kept
+        """Remove these options from ``given``."""
+        return cls(**{field.name: given.pop(field.name) for field in dataclasses.fields(cls)})
 
     def run(
         self, analysis: partial[xr.Dataset], outputs: Outputs, name: str, schema: Schema
     ) -> None:
         """Compute a result, write its files, and show it or what a part has done."""
-        if self.dry_run:
-            self._tell_cost(analysis, outputs, schema)
-            return
         store = outputs.store
         if analysis.keywords.get("draws") and not isinstance(store, Address):
             store = None  # draws are written when all are computed
@@ -74,16 +65,6 @@ class Kept:
         else:
             show(dataset, dataclasses.replace(outputs, out=None), schema, [str(store)])
 
-    def _tell_cost(self, analysis: partial[xr.Dataset], outputs: Outputs, schema: Schema) -> None:
-        """Report what the command would take."""
-        from pendmap.cli.planning import show_cost
-
-        count = self.count
-        if self.scheduler is not None:
-            with workers(self.scheduler, count, quiet=outputs.quiet) as client:
-                count = max(1, sum(client.nthreads().values()))
-        show_cost(analysis, outputs, schema.kind, count)
-
 
 @contextlib.contextmanager
 def workers(scheduler: str | None, count: int | None, *, quiet: bool) -> Iterator[Any]:
@@ -95,7 +76,7 @@ def workers(scheduler: str | None, count: int | None, *, quiet: bool) -> Iterato
 
     with executor_of(scheduler, count) as executor:
         if not quiet and not executor.nthreads():
-            click.echo(f"{scheduler} has no workers yet: waiting for them.", err=True)
+            say(f"{scheduler} has no workers yet: waiting for them.", err=True)
         yield executor
 
 
