@@ -13,13 +13,21 @@ if TYPE_CHECKING:
 MOST: Final = 500  # Largest length of a message, characters
 
 
+def escaped(text: str) -> str:
+    """Return a text whose control characters are escapes, line ends excepted."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
+
+
 def one_line(text: str) -> str:
     """Return a text on one line of 500 characters at most, control characters as escapes.
 
     It may contain file names, values and messages of libraries; a longer text lacks its middle.
     """
-    line = " ".join(text[: 100 * MOST].split())
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+    line = escaped(" ".join(text[: 100 * MOST].split()))
     if len(line) <= MOST:
         return line
     return f"{line[: MOST // 2]} ... {line[-(MOST // 2 - 5) :]}"

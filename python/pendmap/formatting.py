@@ -55,13 +55,6 @@ def duration(seconds: float) -> str:
     return counted(max(1, round(seconds)), "second")
 
 
-def size_of(size: float) -> str:
-    """Return a number of bytes as ``0.3 MB``, ``45 MB``, ``1.2 GB``."""
-    power = max(2, min(4, int(math.log10(max(size, 1)) / 3)))
-    scaled, unit = size / 1000**power, ("MB", "GB", "TB")[power - 2]
-    return f"{scaled:.0f} {unit}" if scaled >= 10 else f"{scaled:.2g} {unit}"  # noqa: PLR2004
-
-
 def listed(texts: Sequence[str], most: int) -> str:
     """Return the first ``most`` texts joined by commas, with ``, ...`` if there are more."""
     return ", ".join(texts[:most]) + (", ..." if len(texts) > most else "")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.parse.groups import group
 from pendmap.cli.parse.options import (
@@ -19,6 +17,7 @@ from pendmap.cli.parse.options import (
     window_options,
 )
 from pendmap.cli.parse.types import whole
+from pendmap.cli.text import say
 from pendmap.errors import MOST_PERIODS
 
 if TYPE_CHECKING:
@@ -71,5 +70,5 @@ def command(model: Pendulum | Rig, outputs: Outputs, **given: Any) -> dict[str, 
         _core.reckon("cells", grid.cells, BYTES_OF_CELL)
     if outputs.shows_progress:  # the summary repeats it after the computation
         for line in unlimited_rotation(without_dimensions(model)[0]):
-            click.echo(line, err=True)
+            say(line, err=True)
     return {"grid": grid, **given}

@@ -13,6 +13,7 @@ from pendmap.cli.parse.groups import PRINTED, argument, new_command
 from pendmap.cli.parse.options import flag, option, verbose_option
 from pendmap.cli.parse.types import EFFECT, FILE
 from pendmap.cli.text import say, write_json
+from pendmap.errors import escaped
 from pendmap.files import toml_text
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json
         for effect in shown:
             said = [known[effect.name].table] if effect.name in known else []
             tables = {"formula": said, "effect": [_example(effect)]}
-            click.echo(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip())
+            click.echo(escaped(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip()))
     elif not whole:
         say("\nAll about one: pendmap effects NAME; about all: pendmap effects --verbose")
 

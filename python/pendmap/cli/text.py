@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from pendmap.errors import escaped
 from pendmap.formatting import columns, json_text, wrapped
 
 if TYPE_CHECKING:
@@ -14,9 +16,17 @@ if TYPE_CHECKING:
     from pendmap.formatting import Readable
 
 
-def say(text: str) -> None:
-    """Write lines to stdout; those of more than 80 columns go on below, indented."""
-    click.echo(wrapped(text))
+_BOLD: Final = re.compile("(\x1b\\[[01]m)")  # What click.style writes
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Write lines to stdout or stderr; those of more than 80 columns go on below, indented.
+
+    Control characters, which names of files and columns may have, are escaped.
+    """
+    parts = enumerate(_BOLD.split(text))
+    safe = "".join(part if place % 2 else escaped(part) for place, part in parts)
+    click.echo(wrapped(safe), err=err)
 
 
 def write_json(fields: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any, Final
@@ -14,11 +15,16 @@ from pendmap.files.atomic import read_whole
 
 _LONGEST: Final = 100  # Largest length of a table written on one line, characters
 _MOST_TOML: Final = 2**22  # Largest size of a TOML file, bytes; a thousand runs take a tenth
+_DEEPEST: Final = 20  # Most parts of a key: the time to read one grows with their square
+_PART: Final = rb"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*"""
+_DEEP: Final = re.compile(rb"(?<![\w-])(?:%b\.[ \t]*){%d}" % (_PART, _DEEPEST))
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read a TOML file, with or without a byte order mark; raise InputError for anything else."""
     data = read_whole(path, _MOST_TOML)
+    if _DEEP.search(data):
+        raise InputError(f"{os.fspath(path)}: keys must have at most {_DEEPEST} parts, got more")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import datetime as dt
 import hashlib
 import io
 import re
-import zipfile
 from collections import Counter
 from typing import TYPE_CHECKING, Final
 
@@ -20,6 +18,7 @@ from pendmap.formatting import counted, listed
 from pendmap.records.dates import without_dates
 from pendmap.records.experiment import Finding
 from pendmap.records.units import CHANNELS
+from pendmap.records.workbooks import WORKBOOKS, sheet_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,8 +60,6 @@ _KNOWN: Final = {
     b"%PDF": "must be CSV or Parquet, it is a PDF file",
     b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
 }
-# Reader of a workbook (.xlsx, .xls) by its first bytes
-ENGINES: Final = {b"PK\x03\x04": "openpyxl", b"\xd0\xcf\x11\xe0": "xlrd"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,8 +89,12 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
             raise InputError(f"{where}: {what}")
-    if data[:4] in ENGINES:
-        table = read_workbook(data, reader, where)
+    if data[:4] in WORKBOOKS:
+        text, columns, chosen = sheet_text(data, where, MOST_BYTES)
+        refuse_large(where, columns=columns)
+        reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
+        table = parsed(text, reader, where)
+        table = dataclasses.replace(table, findings=(*chosen, *table.findings))
     elif data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
         table = _parquet(data, where)
     else:
@@ -174,64 +175,6 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
     values = np.column_stack(columns)
     order = np.arange(values.shape[0])
     return Table(tuple(map(str, frame.columns)), values, order + 1, order=order)
-
-
-def read_workbook(data: bytes, reader: Reader, where: str) -> Table:
-    """Return the table of the sheet with the most numbers; raise InputError if there is none."""
-    import pandas as pd
-
-    engine = ENGINES[data[:4]]
-    try:
-        if engine == "openpyxl":
-            with zipfile.ZipFile(io.BytesIO(data)) as packed:
-                refuse_large(where, size=sum(part.file_size for part in packed.infolist()))
-        sheets = pd.read_excel(io.BytesIO(data), sheet_name=None, header=None, engine=engine)
-    except InputError:
-        raise
-    except ImportError:
-        raise InputError(
-            f"{where}: an Excel file must be read with {engine}: pip install pendmap[excel]; or"
-            " saved as CSV"
-        ) from None
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no Excel file that can be read: {error}") from None
-    numbers = {name: _count_numbers(frame) for name, frame in sheets.items()}
-    if not any(numbers.values()):
-        raise InputError(f"{where}: a sheet must have rows of numbers, got none")
-    name = max(numbers, key=lambda each: numbers[each])
-    frame = sheets[name].dropna(axis="columns", how="all")
-    refuse_large(where, columns=frame.shape[1])
-    lines = ("\t".join(map(_cell, row)) for row in frame.itertuples(index=False, name=None))
-    tabs = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
-    table = parsed("\n".join(lines) + "\n", tabs, where)
-    if len(sheets) < 2:
-        return table
-    text = f"of {len(sheets)} sheets {str(name)!r} is read, which has most numbers"
-    return dataclasses.replace(table, findings=(Finding("sheet-chosen", text), *table.findings))
-
-
-def _count_numbers(frame: pd.DataFrame) -> int:
-    """Return the number of cells with a number."""
-    import pandas as pd
-
-    kinds = (int, float, dt.datetime, dt.time)
-    return int(frame.map(lambda cell: isinstance(cell, kinds) and not pd.isna(cell)).sum().sum())
-
-
-def _cell(cell: object) -> str:
-    """Return a cell as text: numbers in full, times in s."""
-    if cell is None or cell != cell:  # noqa: PLR0124 (what is no number or no date)
-        return ""
-    if isinstance(cell, dt.datetime):
-        # timestamp() would apply daylight saving time, which the record does not contain.
-        return repr((cell - dt.datetime(1970, 1, 1)).total_seconds())  # noqa: DTZ001
-    if isinstance(cell, dt.time):
-        return repr(3600 * cell.hour + 60 * cell.minute + cell.second + 1e-6 * cell.microsecond)
-    if isinstance(cell, dt.timedelta):
-        return repr(cell.total_seconds())
-    if isinstance(cell, (int, float)) and not isinstance(cell, bool):
-        return repr(float(cell))
-    return " ".join(str(cell).split())
 
 
 def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:

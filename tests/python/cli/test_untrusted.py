@@ -73,6 +73,18 @@ def test_formulas_and_descriptions_are_files_too(tmp_path: Path) -> None:
         pendmap.load_model(tmp_path / "large.toml")
 
 
+@pytest.mark.parametrize("part", ["a", '"a"', "'a'", '"\\""', "a "])
+@pytest.mark.parametrize("form", ["{}.b = 1", "[{}.b]", "x = {{ {}.b = 1 }}", "[[{}]]"])
+def test_a_key_has_no_more_parts_than_are_read(tmp_path: Path, part: str, form: str) -> None:
+    path = tmp_path / "deep.toml"
+    path.write_text(form.format(".".join([part] * 30_000)))
+    with pytest.raises(InputError, match="keys must have at most 20 parts"):
+        pendmap.load_model(path)
+    path.write_text("# " + "a" * 10**6 + "\n" + form.format(".".join([part] * 3)))
+    with pytest.raises(InputError, match="is not known"):
+        pendmap.load_model(path)
+
+
 @pytest.mark.parametrize("columns", [MOST_COLUMNS + 1, 20_000, 1_000_000])
 @pytest.mark.parametrize("cell", ["0.5", ""])
 def test_a_table_has_no_more_columns_than_are_read(tmp_path: Path, columns: int, cell: str) -> None:
@@ -206,3 +218,31 @@ def test_a_parquet_file_with_one_byte_wrong_ends_no_process(tmp_path: Path) -> N
     run = subprocess.run(words, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 40
+
+
+def test_names_reach_the_terminal_escaped(pendmap_command: Run, tmp_path: Path) -> None:
+    """Control characters of files and columns are shown as escapes by every command."""
+    wild = "an\x1b]0;title\x07\x9b31m\u202e\rgle"
+    t = np.arange(0, 60, 0.02)
+    x = 1.2 * np.exp(-0.03 * t) * np.cos(6.1 * t)
+    rows = "\n".join(f"{a:.4f},{b:.6f},{b / 9:.6f}" for a, b in zip(t, x, strict=True))
+    record, folder = f"re{wild}.csv", tmp_path / f"fo{wild}"
+    folder.mkdir()
+    for path in (tmp_path / record, folder / record):
+        path.write_text(f't_s,theta_rad,"{wild}"\n{rows}\n', newline="")
+    commands = (
+        ("look", record),
+        ("look", folder.name),
+        ("identify", record, "--out", f"{wild}.nc", "--out", "model.toml"),
+        ("compare", "model.toml", record, "--out", f"{wild}.png"),
+        ("plot", f"{wild}.nc", "--out", f"other{wild}.png"),
+        ("plot", f"missing{wild}.nc"),
+        ("basins", "--grid", "4", "--out", f"map{wild}.nc"),
+        ("simulate", "--model", f"missing{wild}.toml"),
+    )
+    for words in commands:
+        run = pendmap_command(*words)
+        assert run.returncode == (2 if "missing" in words[-1] else 0), run.stderr
+        assert r"\x1b]0;title" in run.stdout + run.stderr, words
+        shown = set(run.stdout + run.stderr) - {"\n"}
+        assert all(c.isprintable() for c in shown), (words, shown)

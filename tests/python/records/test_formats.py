@@ -6,12 +6,16 @@ import datetime as dt
 import hashlib
 import math
 import re
+import sys
 import zipfile
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
+import xlrd
 
 import pendmap
 from pendmap.records import tables as reading
@@ -19,7 +23,6 @@ from pendmap.records.summary import as_text
 from recorded import clean, experiment, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     from pendmap import Run
@@ -329,56 +332,91 @@ def test_a_refused_description_names_its_fault(tmp_path: Path, line: str, says: 
         experiment(tmp_path, f'[[run]]\nfile = "run.csv"\n{line}\n', run=text(clean()))
 
 
-@pytest.fixture
-def workbook(tmp_path: Path) -> Callable[[str], Path]:
-    """Return the first bytes of a workbook."""
-
-    def made(kind: str) -> Path:
-        path = tmp_path / f"book.{kind}"
-        if kind == "xlsx":
-            with zipfile.ZipFile(path, "w") as packed:
-                packed.writestr("xl/workbook.xml", "<workbook/>")
-        else:
-            path.write_bytes(b"\xd0\xcf\x11\xe0" + bytes(600))
-        return path
-
-    return made
+def workbook(folder: Path, kind: str, sheets: dict[str, list[list[Any]]]) -> Path:
+    """Write a workbook; of an ``.xls``, the first bytes, and read its sheets instead."""
+    path = folder / f"book.{kind}"
+    if kind == "xlsx":
+        book = openpyxl.Workbook()
+        book.remove(book.active)
+        for name, rows in sheets.items():
+            sheet = book.create_sheet(name)
+            for row in rows:
+                sheet.append(row)
+        book.save(path)
+    else:
+        path.write_bytes(b"\xd0\xcf\x11\xe0" + bytes(600))
+    return path
 
 
 @pytest.mark.parametrize(("kind", "engine"), [("xlsx", "openpyxl"), ("xls", "xlrd")])
 def test_a_workbook_without_its_reader_is_refused_in_one_line(
-    workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, engine: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, engine: str
 ) -> None:
-    def absent(*_: object, **__: object) -> None:
-        raise ImportError(engine)
-
-    monkeypatch.setattr(pd, "read_excel", absent)
+    path = workbook(tmp_path, kind, {"data": [[1.0, 2.0]]})
+    monkeypatch.setitem(sys.modules, engine, None)
     with pytest.raises(pendmap.InputError, match=rf"with {engine}: pip install pendmap\[excel\]"):
-        pendmap.read_experiment(workbook(kind))
+        pendmap.read_experiment(path)
 
 
-@pytest.mark.parametrize("kind", ["xlsx", "xls"])
 @pytest.mark.parametrize("clock", ["s", "date"])
-def test_a_workbook_is_read_as_its_text_would_be(
-    workbook: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, kind: str, clock: str
-) -> None:
+def test_a_workbook_is_read_as_its_text_would_be(tmp_path: Path, clock: str) -> None:
     time, theta = clean()
     begin = dt.datetime(2024, 3, 31, 1, 59, 50)  # noqa: DTZ001 (workbooks have no time zone)
     stamps = [begin + dt.timedelta(seconds=t) for t in time] if clock == "date" else time
-    rows: list[list[Any]] = [["Pendulum of Monday", None, None], [None, None, None]]
-    rows += [["Time", None, "Angle (deg)"]]
+    rows: list[list[Any]] = [["Pendulum of Monday"], [], ["Time", None, "Angle (deg)"]]
     rows += [[t, None, a] for t, a in zip(stamps, np.degrees(theta), strict=True)]
-    sheets = {"notes": pd.DataFrame([["a", 1.0]]), "data": pd.DataFrame(rows)}
-
-    def sheet(*_: object, **given: object) -> dict[str, pd.DataFrame]:
-        assert given["engine"] == {"xlsx": "openpyxl", "xls": "xlrd"}[kind]
-        return sheets
-
-    monkeypatch.setattr(pd, "read_excel", sheet)
-    (run,) = pendmap.read_experiment(workbook(kind)).runs
-    np.testing.assert_allclose(run.time - run.time[0], time, atol=2e-6)
+    path = workbook(tmp_path, "xlsx", {"notes": [["a", 1.0]], "data": rows})
+    (run,) = pendmap.read_experiment(path).runs
+    np.testing.assert_allclose(run.time - run.time[0], time, atol=2e-3 if clock == "date" else 1e-9)
     np.testing.assert_allclose(run.theta, theta, atol=1e-12)
     assert "'data' is read" in found(run)["sheet-chosen"].text
+
+
+def test_an_old_workbook_is_read_cell_by_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time, theta = clean()
+    names, none = [xlrd.XL_CELL_TEXT] * 2, xlrd.XL_CELL_EMPTY
+    kinds = [names, *([[xlrd.XL_CELL_DATE, xlrd.XL_CELL_NUMBER, none]] * time.size)]
+    days = 45382.0 + time / 86400
+    values = [["Time", "Angle (deg)"]]
+    values += [[t, a, ""] for t, a in zip(days, np.degrees(theta), strict=True)]
+    sheet = SimpleNamespace(
+        nrows=len(values), row_types=kinds.__getitem__, row_values=values.__getitem__
+    )
+    book = SimpleNamespace(
+        datemode=0,
+        sheet_names=lambda: ["data"],
+        sheet_by_name=lambda _: sheet,
+        unload_sheet=lambda _: None,
+    )
+    monkeypatch.setattr(xlrd, "open_workbook", lambda **_: book)
+    (run,) = pendmap.read_experiment(workbook(tmp_path, "xls", {})).runs
+    np.testing.assert_allclose(run.time - run.time[0], time, atol=2e-3)
+    np.testing.assert_allclose(run.theta, theta, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "says"),
+    [
+        ('<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>', "no column of times"),
+        ('<row r="2000000000"><c r="A2000000000"><v>1</v></c></row>', "rows of numbers"),
+        ('<row><c r="ALM1"><v>1</v></c></row>' * 6000, "at most 5000000 cells"),
+    ],
+)
+def test_a_small_workbook_does_not_unpack_to_gigabytes(
+    tmp_path: Path, sheet: str, says: str
+) -> None:
+    plain, path = workbook(tmp_path, "xlsx", {"data": [[1.0]]}), tmp_path / "bomb.xlsx"
+    with zipfile.ZipFile(plain) as packed, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bomb:
+        for part in packed.namelist():
+            text = packed.read(part)
+            if part.startswith("xl/worksheets"):
+                rows = f"<sheetData>{sheet}</sheetData>".encode()
+                text = re.sub(rb"<sheetData>.*</sheetData>", rows, text)
+            bomb.writestr(part, text)
+    with pytest.raises(pendmap.InputError, match=says):
+        pendmap.read_experiment(path)
 
 
 def test_a_workbook_that_unpacks_to_too_much_is_refused(

@@ -207,7 +207,6 @@ search_options = added(
 
 store_options = added(
     flag("--resume", "Go on with the unfinished run in --out F.zarr.", group=LONG),
-    flag("--dry-run", "Only tell time, memory and disk, from timed samples.", group=LONG),
     option(
         "--part",
         PART,
