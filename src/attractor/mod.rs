@@ -3,6 +3,7 @@
 //! - [`find`]: the search, from starts to a catalogue; [`effort`]: its budget
 //! - [`kind`], [`catalogue`]: kinds, names and twins of attractors
 //! - [`trap`]: regions that no trajectory leaves; [`capture`]: trajectories run until a trap holds them
+//! - `gauge`: what shrinks within a trap
 //! - [`rest`]: equilibria, and sets of equilibria under friction
 //! - `uncaptured`: whether uncaptured trajectories are chaotic or unsettled; `membership`: the attractor of each
 //! - [`chaos`]: chaotic attractors, from long runs cut into windows ([`long_runs`]), which `groups` sorts; [`region`]:
@@ -14,6 +15,7 @@ pub mod catalogue;
 pub mod chaos;
 pub mod effort;
 pub mod find;
+mod gauge;
 mod groups;
 pub mod kind;
 pub mod long_runs;

@@ -14,6 +14,7 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::effort::Sampling;
+use super::gauge::Gauge;
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
 use crate::model::Angle;
@@ -72,7 +73,10 @@ pub fn ellipses(
     let lower = 1.0 - LEFT * (1.0 - shrink);
     let points = orbit.points.iter().zip(&orbit.monodromy).enumerate();
     for (point, (centre, monodromy)) in points.take(sampling.points) {
-        let Some(root) = lyapunov_root(&(monodromy / shrink)) else { return Vec::new() };
+        let kinked = Gauge::of_kink(&strobe.pendulum, orbit, shrink);
+        let own = || lyapunov_root(&(monodromy / shrink)).map(Gauge::Ellipse);
+        let Some(gauge) = kinked.or_else(own) else { return Vec::new() };
+        let root = gauge.root();
         if cancel.load(Ordering::Relaxed) {
             return Vec::new();
         }
@@ -80,7 +84,7 @@ pub fn ellipses(
         let part = sampling.ratio.powi(sampling.levels as i32);
         let from = |round: usize| widest * part.powi(round as i32);
         let radius = (0..sampling.rounds).find_map(|round| {
-            safe_radius(strobe, orbit.n, *centre, &root, lower, sampling, from(round))
+            safe_radius(strobe, orbit.n, *centre, &gauge, lower, sampling, from(round))
         });
         let Some(radius) = radius else { return Vec::new() };
         let shape = root.map(|x| x / radius);
@@ -140,12 +144,11 @@ fn safe_radius(
     strobe: &Strobe,
     n: usize,
     centre: State,
-    root: &[f64; 3],
+    gauge: &Gauge,
     lower: f64,
     sampling: &Sampling,
     widest: f64,
 ) -> Option<f64> {
-    let [a, b, c] = *root;
     let Sampling { rays, levels, ratio, returns, .. } = *sampling;
     let radii: Vec<f64> = (0..levels).map(|k| widest * ratio.powi(k as i32)).collect();
     let count = rays * levels;
@@ -153,9 +156,9 @@ fn safe_radius(
     for radius in &radii {
         for ray in 0..rays {
             let angle = TAU * (ray as f64 + 0.5) / rays as f64;
-            let dv = radius * angle.sin() / c;
-            theta.push(centre[0] + (radius * angle.cos() - b * dv) / a);
-            velocity.push(centre[1] + dv);
+            let [dtheta, dv] = gauge.point(angle);
+            theta.push(centre[0] + radius * dtheta);
+            velocity.push(centre[1] + radius * dv);
         }
     }
     let mut turns = vec![0.0; count];
@@ -164,7 +167,7 @@ fn safe_radius(
         strobe.advance(&mut theta, &mut velocity, &mut turns, n).ok()?;
         let height = |i: usize| {
             let (x, y) = (strobe.angle.wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
-            (a * x + b * y).hypot(c * y)
+            gauge.height([x, y])
         };
         // From the smallest level outward, up to the first one with a sample that rises.
         let safe = (0..levels)

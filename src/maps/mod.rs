@@ -31,6 +31,7 @@ mod continuation;
 pub mod control;
 pub mod ensemble;
 pub mod finite_time;
+mod kinked_tongues;
 pub mod label;
 pub mod lyapunov;
 mod multistart;

@@ -20,13 +20,16 @@ use rayon::prelude::*;
 use super::chebyshev::{Interpolant, Values};
 use super::continuation;
 use super::control::{Control, pool};
+use super::kinked_tongues;
 use crate::error::Error;
 use crate::model::Pendulum;
-use crate::orbit::PoincareMap;
 use crate::orbit::fold::{Fold, fold_of_onset};
+use crate::orbit::kink::QUICK;
+use crate::orbit::{KinkedRest, PoincareMap};
 
-/// Largest `p` of a request.
-pub const MOST_P: f64 = 100.0;
+/// Largest `p` of a request, in squares of the lowest frequency: at it solutions grow over a period by about
+/// the exponential of 560, and twice that is beyond the range of numbers.
+const MOST_P: f64 = 5e4;
 /// Over a part of the range of `p` solutions grow at most by the exponential of about this.
 const GROWTH: f64 = 8.0;
 /// Relative difference below which entries, or products of multipliers, are equal.
@@ -110,11 +113,13 @@ pub fn tongues(
     threads: usize,
     control: &Control,
 ) -> Result<Vec<Curve>, Error> {
-    if !(p_max > 0.0 && p_max <= MOST_P) {
-        return Err(Error::Range { name: "p_max", value: p_max, allowed: "above 0, up to 100" });
-    }
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(Error::Range { name: "omega", value: *value, allowed: "a number above 0" });
+    }
+    let lowest = omegas.iter().copied().fold(f64::INFINITY, f64::min);
+    if !(p_max > 0.0 && p_max <= MOST_P * lowest * lowest && p_max.is_finite()) {
+        let allowed = "above 0, up to 50000 times the square of the lowest omega";
+        return Err(Error::Range { name: "p_max", value: p_max, allowed });
     }
     let mut level = pendulum.clone();
     level.torque = 0.0;
@@ -165,10 +170,17 @@ fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> R
     Ok(())
 }
 
-/// Entries of the monodromy matrix by rows, and its determinant.
+/// Entries of the monodromy matrix by rows, and its determinant; at a kink those of a diagonal matrix with its
+/// multipliers, whose sum is real.
 fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Values<5> {
     // Without drive the period is arbitrary: so small a drive changes nothing.
-    let map = PoincareMap::new(&under(pendulum, p.max(f64::MIN_POSITIVE), omega));
+    let driven = under(pendulum, p.max(f64::MIN_POSITIVE), omega);
+    if let Some(rest) = KinkedRest::of(&driven, balance.angle()) {
+        let [a, b] = rest.multipliers(QUICK).0;
+        let half = 0.5 * (a + b).re;
+        return [half, 0.0, 0.0, half, (a * b).re];
+    }
+    let map = PoincareMap::new(&driven);
     let image = map.once([balance.angle(), 0.0]);
     let m = image.derivative;
     let product = image.product.unwrap_or(m.determinant());
@@ -191,6 +203,10 @@ fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: b
     let period = std::f64::consts::TAU / omega;
     let parts = (0.4 * period * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
     let end = |i: usize| p_max * (i as f64 / parts as f64).powi(2);
+    if KinkedRest::of(&under(pendulum, p_max, omega), balance.angle()).is_some() {
+        let (critical, stable_at_first) = kinked_tongues::critical(parts, p_max, at);
+        return Curve { omega, critical, stable_at_first, fold: None };
+    }
     let mut critical: Vec<(f64, f64)> = Vec::new();
     let mut panels = Vec::new();
     for i in 0..parts {

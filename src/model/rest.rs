@@ -74,6 +74,13 @@ impl Equation<f64> {
         self.excess(theta) <= EDGE * self.hold(theta)
     }
 
+    /// The sense, 1 or -1, in which a pendulum at rest at `theta` at time `tau` moves at once; none where it
+    /// is held, and where no load acts.
+    #[must_use]
+    pub fn moves_at_once(&self, tau: f64, theta: f64) -> Option<f64> {
+        sets_out(self, tau, theta).0
+    }
+
     /// The friction that a load must exceed to move the pendulum from `theta`, at `tau = 0`.
     #[must_use]
     pub fn hold(&self, theta: f64) -> f64 {
@@ -115,11 +122,9 @@ pub enum Release {
 /// The time at which a pendulum at rest at `theta` at time `tau` moves; sought up to `until` if the
 /// equation is not periodic.
 pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
-    let [forth, back] = excesses(load, tau, theta);
-    // The load cancels in their sum.
-    let edge = EDGE * (-0.5 * (forth + back)).max(0.0);
-    if forth.max(back) > edge {
-        return Release::Now(if forth >= back { 1.0 } else { -1.0 });
+    let (moves, edge) = sets_out(load, tau, theta);
+    if let Some(sense) = moves {
+        return Release::Now(sense);
     }
     if load.has_closed_release() {
         return closed(load, tau, theta, edge);
@@ -130,6 +135,15 @@ pub fn release<L: Load>(load: &L, tau: f64, theta: f64, until: f64) -> Release {
         None if load.period().is_some() => Release::Never,
         None => Release::Later,
     }
+}
+
+/// The sense in which a pendulum at rest moves at once, none if it is held; and the excess that is neglected.
+fn sets_out<L: Load>(load: &L, tau: f64, theta: f64) -> (Option<f64>, f64) {
+    let [forth, back] = excesses(load, tau, theta);
+    // The load cancels in their sum.
+    let edge = EDGE * (-0.5 * (forth + back)).max(0.0);
+    let sense = if forth >= back { 1.0 } else { -1.0 };
+    ((forth.max(back) > edge).then_some(sense), edge)
 }
 
 /// The excess in the sense 1 and in the sense -1.

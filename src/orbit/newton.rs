@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use super::floquet::{Multipliers, multipliers};
+use super::kink::{KinkedRest, PRECISE};
 use super::poincare::{Image, PoincareMap};
 use crate::integrate::State;
 use crate::model::Angle;
@@ -33,7 +34,7 @@ pub struct PeriodicOrbit {
     pub points: Vec<State>,
     /// `|P^n(x) - x|`.
     pub residual: f64,
-    /// Eigenvalues of the derivative of `P^n`.
+    /// Eigenvalues of the derivative of `P^n`; at a rest on a kink those of [`KinkedRest::multipliers`].
     pub multipliers: Multipliers,
     /// Derivative of `P^n` at each point.
     pub monodromy: Vec<Matrix2<f64>>,
@@ -268,6 +269,20 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
     }
     let w = (way / TAU).round() as i64;
     let residual = map.gap(first, state).norm();
+    if n == 1
+        && first[1].abs() < SAME_POINT
+        && let Some(rest) = KinkedRest::of(&map.pendulum, first[0])
+    {
+        return Some(PeriodicOrbit {
+            n,
+            w,
+            points: vec![[rest.theta, 0.0]],
+            residual,
+            multipliers: rest.multipliers(PRECISE),
+            monodromy: vec![rest.along(Vector2::new(1.0, 0.0))],
+            angle: map.angle,
+        });
+    }
     let lowest = lowest(&points);
     points.rotate_left(lowest);
     derivatives.rotate_left(lowest);

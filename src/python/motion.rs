@@ -41,8 +41,8 @@ pub fn acceleration<'py>(
     Ok(all.into_pyarray(py))
 }
 
-/// [`acceleration`] with time in the laboratory going on, as in a trajectory, and its derivatives by
-/// angle and velocity.
+/// The acceleration with time in the laboratory going on, as in a trajectory, and its derivatives by angle and
+/// velocity; at a velocity 0 all are 0 where friction holds the pendulum, else those of the motion that begins.
 #[pyfunction]
 pub fn rates<'py>(
     py: Python<'py>,
@@ -55,6 +55,9 @@ pub fn rates<'py>(
     let pendulum = model.pendulum()?;
     let mut equation = Equation::lift(&pendulum, |_, value| Number::constant(value));
     equation.ages = true;
+    let mut plain = pendulum.equation();
+    plain.ages = true;
+    let rubs = pendulum.has_friction();
     if equation.keeps()[0] || equation.sways() {
         return Err(PyValueError::new_err(
             "effects must act by time, angle and velocity alone, one depends on the last turn or on a \
@@ -66,10 +69,15 @@ pub fn rates<'py>(
     for ((t, x), v) in tau.iter().zip(theta).zip(velocity) {
         let forcing = equation.forcing(Number::constant(*t));
         let (angle, speed) = (Number::seeded(*x, 0), Number::seeded(*v, 1));
-        let sense = Number::constant(1_f64.copysign(*v));
-        let at = equation.point(&forcing, angle, speed, sense);
-        let Number { value, slope: [by_theta, by_velocity] } = equation.acceleration(&forcing, &at);
-        for (column, number) in columns.iter_mut().zip([value, by_theta, by_velocity]) {
+        let sense = if *v == 0.0 { plain.moves_at_once(*t, *x) } else { Some(v.signum()) };
+        let sense = if rubs { sense } else { sense.or(Some(1.0)) };
+        let rates = sense.map_or([0.0; 3], |sense| {
+            let at = equation.point(&forcing, angle, speed, Number::constant(sense));
+            let Number { value, slope: [by_theta, by_velocity] } =
+                equation.acceleration(&forcing, &at);
+            [value, by_theta, by_velocity]
+        });
+        for (column, number) in columns.iter_mut().zip(rates) {
             column.push(number);
         }
     }

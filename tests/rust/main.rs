@@ -44,6 +44,7 @@ mod formulas;
 mod free_decay;
 mod friction;
 mod input;
+mod kinks;
 mod lanes;
 mod maps;
 mod orbit_search;

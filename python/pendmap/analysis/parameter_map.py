@@ -17,7 +17,7 @@ from pendmap.analysis.result import Field, Schema, flag, rows, summarised, varia
 from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
-from pendmap.analysis.tongues import MOST_P, tongues
+from pendmap.analysis.tongues import tongues
 from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.files import facts
 from pendmap.formatting import counted
@@ -304,8 +304,7 @@ def _curves(
     # Cells extend half a spacing beyond their centres: curves go to the edges of the figure.
     half = np.diff(omega.bare)[0] / 2
     low, high = omega.bare[0] - half, omega.bare[-1] + half
-    above = p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0)
-    p_max = max(float(p.bare[-1]), min(float(above), MOST_P))
+    p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
     found = tongues(model, frequency, p_max, inverted=False, refine=True, progress=progress)
     scale, sought = omega.values[-1] / omega.bare[-1], found["fold_sought"]

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 _Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
 OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Default frequencies and largest amplitude
-MOST_P = 100.0  # Largest allowed ``p_max``
 _OF_P = "1", "amplitude of the drive over gravity"  # Unit and meaning of p
 _STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
@@ -152,7 +151,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
         evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
     p_max : float
-        Largest amplitude, up to 100.
+        Largest amplitude, up to 50,000 times the square of the lowest frequency: there motions
+        about rest grow nearly beyond the range of numbers in a period.
     plane : str
         In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
     inverted : bool

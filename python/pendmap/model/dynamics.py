@@ -23,9 +23,10 @@ ACCELERATION = 2  # Power of ``w0`` of an acceleration
 class Dynamics(abc.ABC):
     """Acceleration, its derivatives, and the right-hand side of the equation of motion.
 
-    Time in the laboratory goes on, as in :func:`pendmap.simulate`. Friction opposes the velocity,
-    at 0 a motion forward (at -0.0 backward): these functions do not hold a pendulum at rest, which
-    ``simulate`` does. Effects on the reading have no part in the motion.
+    Time in the laboratory goes on, as in :func:`pendmap.simulate`. Friction opposes the velocity;
+    at a velocity 0 it holds the pendulum, whose acceleration and derivatives are 0 then, unless the
+    load exceeds it, and opposes the motion that the load begins. Effects on the reading have no
+    part in the motion.
     """
 
     @property

@@ -99,13 +99,43 @@ def test_the_jacobian_is_that_of_differences_and_serves_implicit_methods(
 
 def test_friction_opposes_the_sense_of_the_motion() -> None:
     model = Pendulum(gamma=0.0, p=0.0, theta_r=0.2)
-    assert model.acceleration(0, 0, [0.1, 0.0, -0.0, -0.1]).tolist() == [-0.2, -0.2, 0.2, 0.2]
+    assert model.acceleration(0, 0, [0.1, 0.0, -0.0, -0.1]).tolist() == [-0.2, 0.0, 0.0, 0.2]
     run = pendmap.simulate(model, 1.0, 0.0, 10.0, tol=1e-12)
     turn = float(run.event_time[0])
     until = np.array([0.0, 0.999 * turn])
     ((_, end), _) = dop853(model, until, (1.0, -1e-300))
     exact = pendmap.simulate(model, 1.0, 0.0, t_eval=until, tol=1e-12)
     assert end == pytest.approx(float(exact.theta[-1]), abs=1e-10)
+
+
+RUBBING = (
+    Effect("asymmetric_coulomb", {"d": 0.05}),
+    Effect("stribeck_friction", {"a": 0.1, "vs": 0.3}),
+    Effect("load_dependent_friction", {"k": 0.1}),
+    Effect("coulomb_drift", {"r": 0.002}),
+    Effect("rough_spot", {"f": 0.2, "th0": 0.3, "w": 0.2}),
+    Formula("own_rub", "-k*sign(v)*(2 + cos(theta)) - k*v", {"k": 1})(k=0.05),
+)
+
+
+@pytest.mark.parametrize("effect", RUBBING, ids=lambda effect: effect.name)
+def test_at_rest_friction_holds_or_opposes_the_motion_that_begins(effect: Effect) -> None:
+    draw = np.random.default_rng(7)
+    t, theta = draw.uniform(0, 6, 200), draw.uniform(-np.pi, np.pi, 200)
+    model = Pendulum(0.1, 0.7, 1.9, 0.4, 0.02, 0.15, lab_time=5.0, effects=(effect,))
+    found, jacobian = model.acceleration(t, theta, 0.0), model.jacobian(t, theta, -0.0)
+    # A motion forward is slowed below 0 and one backward above it where neither begins.
+    forth, back = (model.acceleration(t, theta, v) for v in (1e-300, -1e-300))
+    expected = np.where(forth > 0, forth, np.where(back < 0, back, 0.0))
+    held = expected == 0
+    assert 20 < held.sum() < 180
+    assert found == pytest.approx(expected, abs=1e-12)
+    assert (jacobian[held] == [[0, 1], [0, 0]]).all()
+    moving = model.jacobian(t, theta, 1e-300 * np.sign(expected))[~held]
+    assert jacobian[~held] == pytest.approx(moving, abs=1e-12)
+    assert model.rhs(t[0], [theta, 0 * theta])[1] == pytest.approx(
+        model.acceleration(t[0], theta, 0.0), abs=0
+    )
 
 
 def test_what_no_function_of_time_and_state_gives_is_refused() -> None:

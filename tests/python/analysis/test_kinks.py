@@ -1,0 +1,125 @@
+"""Rest on a kink of the torque: one growth in all analyses, against scipy in each sector."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import Effect, Formula, Pendulum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pendmap.model import Pendulum as Model
+
+FORMULA = Formula("uneven", "-b*abs(v)", {"b": 1})
+
+
+def growth(
+    stiffness: Callable[[float], float], damping: tuple[float, float], period: float, periods: int
+) -> float:
+    """Return the mean growth rate of a small motion that is damped by its sense, by scipy."""
+    state, logs = np.array([1.0, 0.3]), []
+    for _ in range(periods):
+        t = 0.0
+        while t < period:
+            forth = state[1] > 0 or (state[1] == 0 and stiffness(t) * state[0] < 0)
+
+            def turn(_: float, y: np.ndarray) -> float:
+                return float(y[1])
+
+            turn.terminal, turn.direction = True, -1.0 if forth else 1.0  # type: ignore[attr-defined]
+            run = solve_ivp(
+                lambda t, y, c=damping[0 if forth else 1]: [y[1], -stiffness(t) * y[0] - c * y[1]],
+                (t, period),
+                state,
+                method="DOP853",
+                rtol=1e-11,
+                atol=1e-14,
+                events=turn,
+            )
+            t, state = float(run.t[-1]), run.y[:, -1]
+            if run.status == 1:
+                state = np.array([state[0], 0.0])
+        logs.append(np.log(np.hypot(*state)))
+        state /= np.hypot(*state)
+    half = logs[periods // 2 :]
+    part = (np.arange(len(half)) + 1) / (len(half) + 1)
+    weights = np.exp(-1 / (part * (1 - part)))
+    return float(np.average(half, weights=weights) / period)
+
+
+def expected(model: Model, b: float, theta: float, periods: int = 120) -> float:
+    sign = np.cos(theta)
+    return growth(
+        lambda t: sign * (1 + model.p * np.cos(model.omega * t)),
+        (model.gamma + b, model.gamma - b),
+        2 * np.pi / model.omega,
+        periods,
+    )
+
+
+def rest_of(found: object, word: str = "rest") -> float:
+    """Return the exponent of this rest among attractors, nan where it is none of them."""
+    names = [str(name) for name in found["name"].values]  # type: ignore[index]
+    return float(found["exponent"].values[names.index(word)]) if word in names else float("nan")  # type: ignore[index]
+
+
+@pytest.mark.parametrize("as_formula", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_all_analyses_give_rest_one_growth(seed: int, as_formula: bool) -> None:
+    draw = np.random.default_rng(seed)
+    gamma, omega, p = draw.uniform(0.1, 0.4), draw.uniform(1.6, 2.4), draw.uniform(0.2, 0.9)
+    b = float(gamma * draw.uniform(-1, 1))
+    effect = FORMULA(b=b) if as_formula else Effect("asymmetric_viscous", {"b": b})
+    model = Pendulum(gamma, p, omega, effects=(effect,))
+    exact = expected(model, b, 0.0)
+    orbits = pendmap.orbits(model, 1, 0, grid=24)
+    k = int(np.abs(orbits["theta_point"].values).argmin())
+    size = np.hypot(*orbits["multipliers"].values[k, 0])
+    assert np.log(size) * omega / (2 * np.pi) == pytest.approx(exact, abs=1e-6)
+    assert bool(orbits["stable"].values[k]) == (exact < 0)
+    basins = pendmap.basins(model, grid=8)
+    assert np.isnan(rest_of(basins)) == (exact > 0)
+    if exact < 0:
+        assert rest_of(basins) == pytest.approx(exact, abs=1e-6)
+        found = pendmap.lyapunov(model, 0.01, 0.0)
+        assert float(found["exponent"]) == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gamma", "omega", "b", "theta", "p_max"),
+    [(0.2, 1.8, 0.15, 0.0, 0.7), (0.1, 2.3, -0.1, 0.0, 0.9), (0.3, 10.0, 0.02, np.pi, 16.0)],
+)
+def test_critical_amplitudes_are_where_the_growth_vanishes(
+    gamma: float, omega: float, b: float, theta: float, p_max: float
+) -> None:
+    effects = (Effect("asymmetric_viscous", {"b": b}),)
+    prefix = "inverted_" if theta else ""
+    found = pendmap.tongues(Pendulum(gamma, 0.5, omega, effects=effects), [omega], p_max)
+    (p,) = found[f"{prefix}p"].values
+    above = bool(found[f"{prefix}stable_above"].values[0])
+    sides = [
+        expected(Pendulum(gamma, p * by, omega), b, theta, 200) < 0 for by in (1 - 1e-5, 1 + 1e-5)
+    ]
+    assert sides == [not above, above]
+
+
+def test_the_growth_at_a_kink_that_vanishes_is_that_of_smooth_damping() -> None:
+    smooth = pendmap.orbits(Pendulum(0.2, 0.5, 1.8), 1, 0, grid=16)["multipliers"].values[0]
+    effects = (Effect("asymmetric_viscous", {"b": 1e-9}),)
+    kinked = pendmap.orbits(Pendulum(0.2, 0.5, 1.8, effects=effects), 1, 0, grid=16)
+    assert kinked["multipliers"].values[0] == pytest.approx(smooth, abs=1e-8)
+
+
+def test_an_equilibrium_under_a_torque_has_the_growth_of_both_half_swings() -> None:
+    effects = (Effect("asymmetric_viscous", {"b": 0.07}),)
+    found = pendmap.basins(Pendulum(0.1, 0.0, 2.0, torque=0.5, effects=effects), grid=8)
+    stiffness = np.sqrt(1 - 0.5**2)
+    times = [np.pi / np.sqrt(stiffness - c**2 / 4) for c in (0.17, 0.03)]
+    exact = -(0.17 * times[0] + 0.03 * times[1]) / 2 / sum(times)
+    assert rest_of(found) == pytest.approx(exact, abs=1e-6)
