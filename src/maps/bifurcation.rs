@@ -2,7 +2,7 @@
 //! and decrease.
 
 use super::bounds::decay_periods;
-use super::cell::Cell;
+use super::cell::{Cell, LIKE};
 use super::control::{Control, pool};
 use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, parameter_map};
 use crate::attractor::Attractor;
@@ -16,7 +16,7 @@ use crate::orbit::rotation::running_states;
 const KEPT: usize = 200;
 /// Periods between two tests of a followed motion.
 const ROUND: usize = 32;
-/// Number of tests after which it may be on an attractor without a period.
+/// Number of tests after which, and after its multiples, it may be on an attractor without a period.
 const ROUNDS: usize = 12;
 /// Distance to a known orbit, also a period later, below which a trajectory has arrived.
 const ARRIVED: f64 = 1e-3;
@@ -177,7 +177,7 @@ impl Follow<'_> {
             .collect();
         let rates = cell.found.iter().map(|f| -f.attractor.exponent).filter(|rate| *rate > 0.0);
         let slowest = rates.fold(f64::INFINITY, f64::min);
-        let least = (ROUNDS * ROUND) as u32;
+        let least = cell.watched.max((ROUNDS * ROUND) as u32);
         let periods = decay_periods(&strobe.pendulum, slowest, least, self.bound) as usize;
         for round in 1..=periods.div_ceil(ROUND) {
             self.control.check()?;
@@ -200,7 +200,7 @@ impl Follow<'_> {
             if let Some(k) = cell.found.iter().position(|f| arrived(&f.attractor)) {
                 return Ok((Some(k), Vec::new()));
             }
-            if round == ROUNDS
+            if round.is_multiple_of(ROUNDS)
                 && let Some(k) = on_set(strobe, cell, *state)
             {
                 return Ok((Some(k), Vec::new()));
@@ -215,9 +215,8 @@ impl Follow<'_> {
     }
 }
 
-/// The attractor without a period nearest to a motion on average. On chaos the motion's exponent is nearer to that of
-/// the attractor than to 0, where a slow one has it; on a curve its points lie as near to those of the
-/// curve, within a factor of 2, as these lie to one another.
+/// The attractor without a period that a motion is nearest to on average: chaos, if the motion's exponent is nearer
+/// to that of the attractor than to 0, where a slow one has it; a quasi-periodic rotation within [`LIKE`].
 fn on_set(strobe: &Strobe, cell: &Cell, state: State) -> Option<usize> {
     let (mut theta, mut velocity, mut turns) = ([state[0]], [state[1]], [0.0]);
     let (mut along, mut across, mut growth) = ([1.0], [0.0], [0.0]);
@@ -234,19 +233,18 @@ fn on_set(strobe: &Strobe, cell: &Cell, state: State) -> Option<usize> {
         points.push([theta[0], velocity[0]]);
     }
     let exponent = growth[0] / (KEPT as f64 * strobe.pendulum.period());
-    let mean = |set: &[State], a: &Attractor| -> f64 {
+    let mean = |a: &Attractor| -> f64 {
         let nearest = |p: &State| {
             let away = a.points.iter().map(|q| a.angle.distance(*p, *q));
-            away.filter(|away| *away > 0.0).fold(f64::INFINITY, f64::min)
+            away.fold(f64::INFINITY, f64::min)
         };
-        set.iter().map(nearest).sum::<f64>() / set.len() as f64
+        points.iter().map(nearest).sum::<f64>() / points.len() as f64
     };
-    let fits = |a: &Attractor, apart: f64| match a.kind {
-        kind if kind.is_chaotic() => exponent > 0.5 * a.exponent,
-        _ => apart < 2.0 * mean(&a.points, a),
+    let fits = |a: &Attractor, apart: f64| {
+        if a.kind.is_chaotic() { exponent > 0.5 * a.exponent } else { apart < LIKE }
     };
     let sets = cell.found.iter().map(|f| &f.attractor).enumerate().filter(|(_, a)| a.n.is_none());
-    let far = sets.map(|(k, a)| (k, a, mean(&points, a))).filter(|(_, a, apart)| fits(a, *apart));
+    let far = sets.map(|(k, a)| (k, a, mean(a))).filter(|(_, a, apart)| fits(a, *apart));
     far.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(k, ..)| k)
 }
 

@@ -4,9 +4,10 @@ An orbit is followed from one model to the next by Newton's method, in halved st
 parameters where a whole one fails; two orbits are one where that leads from each to the other
 without a change of symmetry. Global continuation as by Attractors.jl (Datseris & Wagemakers 2022,
 Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151) compares the distances
-of sets instead. So are here the attractors of which one has no period or another one: chaos, and
-what an orbit becomes where its period doubles. Tumbling chaos is followed by its kind alone.
-Nothing depends on the order in which the models were mapped or on the direction of a parameter.
+of sets instead. So are here those of which one has another period or none that Newton's method
+finds: what an orbit becomes where its period doubles, chaos. Tumbling chaos and running states that
+no orbit locks are followed by their kind alone. Nothing depends on the order in which the models
+were mapped or on the direction of a parameter.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 _SAME: Final = 1e-6  # Distance within which two orbits of the integration steps are one
 _LIKE: Final = 0.25
 """Largest mean distance between the points of two sets that follow one another."""
-_EVERYWHERE: Final = "tumbling_chaos"
-"""Kind that one attractor of a model has at most; its samples lie apart by their own spacing."""
+_ALONE: Final = ("tumbling_chaos", "quasiperiodic_rotation", "rotation")
+"""Kinds that a model has at most once in each sense unless Newton's method finds them."""
 _HALVED: Final = 4  # Number of times that a step of the parameters is halved
 
 
@@ -108,16 +109,23 @@ def _links(
     """Return pairs of attractors of two neighbours: whether no orbit leads there, and distance."""
     old, new = maps[before].found, maps[place].found
     circle = not _core.counts_turns(job.pendulum)
-    ahead, back = _followed(job, maps, before, place), _followed(job, maps, place, before)
+    ahead, there = _followed(job, maps, before, place)
+    back, here = _followed(job, maps, place, before)
     orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
     left = set(range(len(old))) - {k for k, _ in orbits}
     free = set(range(len(new))) - {m for _, m in orbits}
-    every = [*orbits, *((k, m) for k in left for m in free if _alike(old[k], new[m], k, m))]
+    others = [
+        (k, m)
+        for k, m in itertools.product(left, free)
+        if _alike(old[k], new[m], k, m) and not (k in here and m in there and old[k].n == new[m].n)
+    ]
+    every = (*orbits, *others)
     far = {(k, m): _apart(old[k].points, new[m].points, circle=circle) for k, m in every}
     near: list[tuple[int, int]] = []
-    for k, m in sorted(every[len(orbits) :], key=lambda pair: (far[pair], pair)):
+    for k, m in sorted(others, key=lambda pair: (far[pair], pair)):
         taken = any(k == one or m == other for one, other in near)
-        if not taken and (far[k, m] < _LIKE or old[k].kind == _EVERYWHERE):
+        alone = old[k].kind == new[m].kind in _ALONE and k not in here and m not in there
+        if not taken and (alone or far[k, m] < _LIKE):
             near.append((k, m))
     return [
         (pair in near, far[pair], (before, pair[0]), (place, pair[1])) for pair in (*orbits, *near)
@@ -126,8 +134,8 @@ def _links(
 
 def _followed(
     job: SweepTiles, maps: Mapping[Place, Mapped], before: Place, place: Place
-) -> dict[int, int]:
-    """Return the attractor of the next model that each orbit leads to."""
+) -> tuple[dict[int, int], set[int]]:
+    """Return the attractor of the next model that each orbit leads to, and those it may lead to."""
     old, new = maps[before].found, maps[place].found
     steps, circle = int(maps[before].measures["steps"]), not _core.counts_turns(job.pendulum)
     first, last = np.array(before, float), np.array(place, float)
@@ -157,7 +165,7 @@ def _followed(
         nearest = min(far, key=far.__getitem__, default=None)
         if nearest is not None and far[nearest] < _SAME:
             followed[k] = nearest
-    return followed
+    return followed, {*those}
 
 
 def _symmetric(own: Found, k: int) -> bool | None:
@@ -166,15 +174,11 @@ def _symmetric(own: Found, k: int) -> bool | None:
 
 
 def _alike(one: Found, other: Found, k: int, m: int) -> bool:
-    """Return whether they may follow one another where none or one of them is an orbit of its n.
-
-    Turns are equal, and both are symmetric or neither.
-    """
+    """Return whether they may follow one another: equal turns, not one symmetric alone."""
     turns = _family(one) == _family(other)
     if one.n and other.n:
-        turns = turns and one.n != other.n and one.w * other.n == other.w * one.n
-    symmetric = {_symmetric(one, k), _symmetric(other, m)}
-    return turns and not symmetric >= {True, False}
+        turns = turns and one.w * other.n == other.w * one.n
+    return turns and not {_symmetric(one, k), _symmetric(other, m)} >= {True, False}
 
 
 def _family(own: Found) -> tuple[str, str]:
