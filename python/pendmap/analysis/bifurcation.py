@@ -84,7 +84,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     the parameter rises in steps, and one as it falls: at each value it continues from its last
     state, displaced by 1e-6, until it is on an attractor, for as long as the attractor with the
     smallest exponent there needs to shrink what decays to exp(-200). Where both have arrived and
-    the two differ there is hysteresis; where one has not, the summary says so.
+    the two differ there is hysteresis, unless they differ at all values because each stays on the
+    attractor on which it begins; where one has not arrived, the summary says so.
 
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.
@@ -245,7 +246,9 @@ def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
     differ = arrived & (kind[up] != kind[down])
     where = "everywhere" if arrived.all() else "wherever both have arrived"
     lines = [f"Up and down are on the same kinds of attractor {where}."]
-    if differ.any():
+    if differ[arrived].all() and arrived.any():
+        lines = [f"Up and down are on different kinds of attractor {where}, as they begin."]
+    elif differ.any():
         lines = [f"Up and down differ at {name} = {_spans(values, differ)}: hysteresis."]
     if not arrived.all():
         late = _spans(values, ~arrived)
