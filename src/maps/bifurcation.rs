@@ -1,7 +1,8 @@
 //! The attractors along one parameter: all coexisting ones, and those followed under slow increase
 //! and decrease.
 
-use super::cell::Cell;
+use super::bounds::decay_periods;
+use super::cell::{Cell, LIKE};
 use super::control::{Control, pool};
 use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, parameter_map};
 use crate::attractor::Attractor;
@@ -15,7 +16,7 @@ use crate::orbit::rotation::running_states;
 const KEPT: usize = 200;
 /// Periods between two tests of a followed motion.
 const ROUND: usize = 32;
-/// Number of tests before it is classified as on no known orbit.
+/// Number of tests after which, and after its multiples, it may be on an attractor without a period.
 const ROUNDS: usize = 12;
 /// Distance to a known orbit, also a period later, below which a trajectory has arrived.
 const ARRIVED: f64 = 1e-3;
@@ -75,7 +76,7 @@ pub fn bifurcation(
     let asked = request.of_map(base);
     let map = parameter_map(base, &asked, control)?;
     let plane = Plane { base, axes: &asked.axes };
-    pool(request.threads)?.install(|| followed(map, &plane, request.first, control))
+    pool(request.threads)?.install(|| followed(map, &plane, request.first, request.bound, control))
 }
 
 impl Request {
@@ -99,16 +100,21 @@ impl Request {
 
 /// The diagram of a map of one row, followed on the threads of the current pool; see [`Request`].
 ///
+/// At each value a motion is followed for as long as the attractor that attracts most slowly there needs, at most for
+/// `bound` periods.
+///
 /// # Errors
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn followed(
     map: ParameterMap,
     plane: &Plane,
     first: Option<State>,
+    bound: Option<u32>,
     control: &Control,
 ) -> Result<Diagram, Error> {
     let offset = offsets(&map.cells);
-    let sweep = |order: Vec<usize>| follow(&map, plane, &offset, order, first, control);
+    let follow = Follow { map: &map, plane, bound, control };
+    let sweep = |order: Vec<usize>| follow.along(&offset, order, first);
     let count = map.cells.len();
     let (up, down) =
         rayon::join(|| sweep((0..count).collect()), || sweep((0..count).rev().collect()));
@@ -125,26 +131,121 @@ fn offsets(cells: &[Cell]) -> Vec<usize> {
     cells.iter().map(place).collect()
 }
 
-fn follow(
-    map: &ParameterMap,
-    plane: &Plane,
-    offset: &[usize],
-    order: Vec<usize>,
-    first: Option<State>,
-    control: &Control,
-) -> Result<Vec<Followed>, Error> {
-    let mut followed = vec![Followed::default(); map.cells.len()];
-    let leading = order.first().and_then(|cell| leading(&map.cells[*cell]));
-    let mut state = first.or(leading).unwrap_or([NUDGE, NUDGE]);
-    for cell in order {
-        control.check()?;
-        let strobe = map.resolution.strobe(&plane.pendulum(cell), plane.place(cell));
-        let found = &map.cells[cell];
-        state = [state[0] + NUDGE, state[1] + NUDGE];
-        let (on, loose) = settle(&strobe, found, &mut state);
-        followed[cell] = Followed { on: on.map(|k| offset[cell] + k), loose };
+/// What both sweeps share.
+struct Follow<'a> {
+    map: &'a ParameterMap,
+    plane: &'a Plane<'a>,
+    bound: Option<u32>,
+    control: &'a Control,
+}
+
+impl Follow<'_> {
+    fn along(
+        &self,
+        offset: &[usize],
+        order: Vec<usize>,
+        first: Option<State>,
+    ) -> Result<Vec<Followed>, Error> {
+        let cells = &self.map.cells;
+        let mut followed = vec![Followed::default(); cells.len()];
+        let leading = order.first().and_then(|cell| leading(&cells[*cell]));
+        let mut state = first.or(leading).unwrap_or([NUDGE, NUDGE]);
+        for cell in order {
+            let pendulum = self.plane.pendulum(cell);
+            let strobe = self.map.resolution.strobe(&pendulum, self.plane.place(cell));
+            state = [state[0] + NUDGE, state[1] + NUDGE];
+            let (on, loose) = self.settle(&strobe, &cells[cell], &mut state)?;
+            followed[cell] = Followed { on: on.map(|k| offset[cell] + k), loose };
+        }
+        Ok(followed)
     }
-    Ok(followed)
+
+    /// Integrates `state` until it has converged to an attractor of the cell and returns its index, or
+    /// else the points.
+    fn settle(
+        &self,
+        strobe: &Strobe,
+        cell: &Cell,
+        state: &mut State,
+    ) -> Result<(Option<usize>, Vec<State>), Error> {
+        // Without drive a running state is not synchronous with the section: its band traps it.
+        let runs = cell.found.iter().any(|f| f.attractor.is_running());
+        let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
+        let running: Vec<(i64, Band)> = states
+            .iter()
+            .filter_map(|one| Some((one.sense, Band::around(strobe, &one.curve, 0)?)))
+            .collect();
+        let rates = cell.found.iter().map(|f| -f.attractor.exponent).filter(|rate| *rate > 0.0);
+        let slowest = rates.fold(f64::INFINITY, f64::min);
+        let least = cell.watched.max((ROUNDS * ROUND) as u32);
+        let periods = decay_periods(&strobe.pendulum, slowest, least, self.bound) as usize;
+        for round in 1..=periods.div_ceil(ROUND) {
+            self.control.check()?;
+            step(strobe, state, ROUND);
+            let mut next = *state;
+            step(strobe, &mut next, 1);
+            let arrived = |a: &Attractor| {
+                if a.is_held() {
+                    let same = (state[0].cos() < 0.0) == (a.points[0][0].cos() < 0.0);
+                    return same && state[1] == 0.0 && strobe.equation.holds_for_ever(state[0]);
+                }
+                if a.is_running() {
+                    let held =
+                        |(sense, band): &(i64, Band)| *sense == a.sense && band.contains(*state);
+                    return running.iter().any(held);
+                }
+                let near = |s: State| a.passes(s, ARRIVED);
+                a.n.is_some() && near(*state) && near(next)
+            };
+            if let Some(k) = cell.found.iter().position(|f| arrived(&f.attractor)) {
+                return Ok((Some(k), Vec::new()));
+            }
+            if round.is_multiple_of(ROUNDS)
+                && let Some(k) = on_set(strobe, cell, *state)
+            {
+                return Ok((Some(k), Vec::new()));
+            }
+        }
+        let mut loose = Vec::with_capacity(KEPT);
+        for _ in 0..KEPT {
+            step(strobe, state, 1);
+            loose.push(*state);
+        }
+        Ok((None, loose))
+    }
+}
+
+/// The attractor without a period that a motion is nearest to on average: chaos, if the motion's exponent is nearer
+/// to that of the attractor than to 0, where a slow one has it; a quasi-periodic rotation within [`LIKE`].
+fn on_set(strobe: &Strobe, cell: &Cell, state: State) -> Option<usize> {
+    let (mut theta, mut velocity, mut turns) = ([state[0]], [state[1]], [0.0]);
+    let (mut along, mut across, mut growth) = ([1.0], [0.0], [0.0]);
+    let mut points = Vec::with_capacity(KEPT);
+    for _ in 0..KEPT {
+        // Lengths agree, so this cannot fail.
+        let _ = strobe.stretch(
+            (&mut theta, &mut velocity),
+            &mut turns,
+            (&mut along, &mut across),
+            &mut growth,
+            1,
+        );
+        points.push([theta[0], velocity[0]]);
+    }
+    let exponent = growth[0] / (KEPT as f64 * strobe.pendulum.period());
+    let mean = |a: &Attractor| -> f64 {
+        let nearest = |p: &State| {
+            let away = a.points.iter().map(|q| a.angle.distance(*p, *q));
+            away.fold(f64::INFINITY, f64::min)
+        };
+        points.iter().map(nearest).sum::<f64>() / points.len() as f64
+    };
+    let fits = |a: &Attractor, apart: f64| {
+        if a.kind.is_chaotic() { exponent > 0.5 * a.exponent } else { apart < LIKE }
+    };
+    let sets = cell.found.iter().map(|f| &f.attractor).enumerate().filter(|(_, a)| a.n.is_none());
+    let far = sets.map(|(k, a)| (k, a, mean(a))).filter(|(_, a, apart)| fits(a, *apart));
+    far.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(k, ..)| k)
 }
 
 /// A point of the attractor that most starts end on; the first of equals.
@@ -152,49 +253,6 @@ fn leading(cell: &Cell) -> Option<State> {
     let most = cell.found.iter().map(|f| f.share).fold(0.0, f64::max);
     let found = cell.found.iter().find(|f| f.share >= most)?;
     found.attractor.points.first().copied()
-}
-
-/// Integrates `state` until it has converged to an attractor of the cell and returns its index, or
-/// else the points.
-fn settle(strobe: &Strobe, cell: &Cell, state: &mut State) -> (Option<usize>, Vec<State>) {
-    // Without drive a running state is not synchronous with the section: its band traps it.
-    let runs = cell.found.iter().any(|f| f.attractor.is_running());
-    let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
-    let running: Vec<(i64, Band)> = states
-        .iter()
-        .filter_map(|one| Some((one.sense, Band::around(strobe, &one.curve, 0)?)))
-        .collect();
-    for _ in 0..ROUNDS {
-        step(strobe, state, ROUND);
-        let mut next = *state;
-        step(strobe, &mut next, 1);
-        let arrived = |a: &Attractor| {
-            if a.is_held() {
-                let same = (state[0].cos() < 0.0) == (a.points[0][0].cos() < 0.0);
-                return same && state[1] == 0.0 && strobe.equation.holds_for_ever(state[0]);
-            }
-            if a.is_running() {
-                let held = |(sense, band): &(i64, Band)| *sense == a.sense && band.contains(*state);
-                return running.iter().any(held);
-            }
-            let near = |s: State| a.passes(s, ARRIVED);
-            a.n.is_some() && near(*state) && near(next)
-        };
-        if let Some(k) = cell.found.iter().position(|f| arrived(&f.attractor)) {
-            return (Some(k), Vec::new());
-        }
-    }
-    let chaotic: Vec<usize> =
-        (0..cell.found.len()).filter(|k| cell.found[*k].attractor.kind.is_chaotic()).collect();
-    if let [one] = chaotic[..] {
-        return (Some(one), Vec::new());
-    }
-    let mut loose = Vec::with_capacity(KEPT);
-    for _ in 0..KEPT {
-        step(strobe, state, 1);
-        loose.push(*state);
-    }
-    (None, loose)
 }
 
 fn step(strobe: &Strobe, state: &mut State, periods: usize) {

@@ -26,6 +26,13 @@ fn shrinking(pendulum: &Pendulum, decay: f64, least: f64) -> u32 {
     periods.clamp(least, MOST).ceil() as u32
 }
 
+/// Periods in which what decays at this rate shrinks by `exp(-DECAY)`, from `least` to `most` or [`MOST`].
+#[must_use]
+pub fn decay_periods(pendulum: &Pendulum, rate: f64, least: u32, most: Option<u32>) -> u32 {
+    let most = most.map_or(MOST, f64::from).max(f64::from(least));
+    (DECAY / (rate * pendulum.period())).clamp(f64::from(least), most).ceil() as u32
+}
+
 /// Periods after which a start is undecided, by default.
 #[must_use]
 pub fn max_periods(pendulum: &Pendulum) -> u32 {

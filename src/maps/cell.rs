@@ -15,7 +15,7 @@ use crate::orbit::PoincareMap;
 use crate::orbit::newton::PeriodicOrbit;
 
 /// Largest distance between points of corresponding orbits of similar pendulums.
-const LIKE: f64 = 0.25;
+pub(super) const LIKE: f64 = 0.25;
 /// Distance within which points belong to one orbit.
 const SAME: f64 = 1e-6;
 /// Largest number of hints of a search.

@@ -106,6 +106,12 @@ impl Survey {
         stored(&self.resolution)
     }
 
+    /// The bound of its request.
+    #[must_use]
+    pub fn bound(&self) -> Option<u32> {
+        self.request.bound
+    }
+
     /// Its plane.
     #[must_use]
     pub fn plane(&self) -> Plane<'_> {

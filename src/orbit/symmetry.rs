@@ -51,6 +51,20 @@ impl Mirror {
         if self.half.is_some() { 1e-4 } else { 1e-7 }
     }
 
+    /// Whether an orbit continues that of a similar pendulum with the point `start`: both are symmetric or neither is
+    /// (unless `symmetric` is unknown), and of a pair of mirror images it is the nearer one.
+    #[must_use]
+    pub fn continues(&self, orbit: &PeriodicOrbit, start: State, symmetric: Option<bool>) -> bool {
+        let image: Vec<State> = orbit.points.iter().map(|p| self.image(*p)).collect();
+        let is_symmetric = image.iter().all(|p| orbit.contains(*p, self.tolerance()));
+        let apart = |points: &[State]| {
+            let away = points.iter().map(|p| self.angle.distance(*p, start));
+            away.fold(f64::INFINITY, f64::min)
+        };
+        let nearer = is_symmetric || apart(&orbit.points) <= apart(&image);
+        nearer && symmetric.is_none_or(|known| known == is_symmetric)
+    }
+
     /// The mirror image of an orbit of `map`, and where that is exact the number of places that its points
     /// have moved ([`PeriodicOrbit::mirrored`]).
     ///

@@ -5,6 +5,7 @@ use pendmap::attractor::catalogue::arrange;
 use pendmap::integrate::Strobe;
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::orbits::{Request, orbits as search};
+use pendmap::orbit::symmetry::Mirror;
 use pendmap::orbit::{PoincareMap, newton};
 use pyo3::prelude::*;
 
@@ -74,22 +75,28 @@ const REACH: f64 = 0.3;
 /// Turns, points of a periodic orbit.
 type Near = (i64, Vec<(f64, f64)>);
 
-/// The periodic orbits that Newton's method finds from states `(theta, velocity, n)`, n periods each; none where
-/// it finds none of that period. They are orbits of `steps` integration steps a period, with their error.
+/// The periodic orbits that continue orbits of a similar model, each given by a state of it, its period n and whether
+/// it is its own mirror image (none where that has no meaning). None where Newton's method finds no orbit of
+/// that period, or one of another symmetry or on the other side ([`Mirror::continues`]). They are orbits of `steps`
+/// integration steps a period, with their error.
 #[pyfunction]
 pub fn orbits_near(
     py: Python<'_>,
     model: Model,
     steps: usize,
-    states: Vec<(f64, f64, usize)>,
+    states: Vec<(f64, f64, usize, Option<bool>)>,
 ) -> PyResult<Vec<Option<Near>>> {
     let pendulum = model.pendulum()?;
     let simd = InstructionSet::choose().map_err(raise)?;
     Ok(py.detach(|| {
         let map = PoincareMap::of_steps(&Strobe::new(&pendulum, steps, simd));
-        let near = |&(theta, velocity, n): &(f64, f64, usize)| {
-            let orbit = newton::find(&map, [theta, velocity], n, REACH).filter(|o| o.n == n)?;
-            Some((orbit.w, orbit.points.iter().map(|p| (p[0], p[1])).collect()))
+        let mirror = Mirror::of(&pendulum);
+        let near = |&(theta, velocity, n, symmetric): &(f64, f64, usize, Option<bool>)| {
+            let start = [theta, velocity];
+            let orbit = newton::find(&map, start, n, REACH).filter(|o| o.n == n)?;
+            let continues = mirror.as_ref().is_none_or(|m| m.continues(&orbit, start, symmetric));
+            let points = || orbit.points.iter().map(|p| (p[0], p[1])).collect();
+            continues.then(|| (orbit.w, points()))
         };
         states.iter().map(near).collect()
     }))

@@ -172,7 +172,7 @@ impl Survey {
     ) -> PyResult<Py<Bifurcation>> {
         let found = pooled(py, self.threads, None, |control| {
             let map = self.own.result(&self.stored(&blocks)?)?;
-            followed(map, &self.own.plane(), first, control)
+            followed(map, &self.own.plane(), first, self.own.bound(), control)
         })?;
         Bifurcation::of(py, &found)
     }

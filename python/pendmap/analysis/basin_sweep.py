@@ -108,19 +108,21 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     confirmed by fewer runs than in a map alone (16 instead of 256; 64 starts where it attracted
     everything).
 
-    Then attractors are matched from model to model along both parameters: orbits by Newton's
-    method, in halved steps where a whole one fails; those left by least distance, if their turns
-    and their symmetry are equal: chaos, and what an orbit becomes where its period doubles. So an
-    attractor has one number in the whole sweep, in the order of first appearance. Mirror images
-    stay two attractors.
+    Then attractors are matched between neighbours along both parameters. Orbits are one where
+    Newton's method leads from each to the other, in halved steps where a whole one fails, without a
+    change of symmetry; those left are matched by least distance, if their turns and their symmetry
+    are equal: chaos, and what an orbit becomes where its period doubles. So an attractor has one
+    number in the whole sweep, in the order of first appearance along rising parameters. Mirror
+    images stay two attractors.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; parameters that vary replace its own.
     ranges : mapping of str to array_like or (float, float, int)
-        One or two parameters with an array of ascending values, or a tuple of first value, last
-        value (both included) and how many; names as for :func:`pendmap.parameter_map`.
+        One or two parameters with an array of rising or falling values, or a tuple of first value,
+        last value (both included) and how many; names as for :func:`pendmap.parameter_map`. The
+        result is the same for both directions, its coordinates rise.
     analysis : str
         What is done for each model: ``basins``.
     grid : Grid or int, optional

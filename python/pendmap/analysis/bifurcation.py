@@ -82,7 +82,10 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     At every value all attractors are searched as by :func:`pendmap.parameter_map`, from several
     starts and from the attractors at neighbouring values. In addition, one motion is followed as
     the parameter rises in steps, and one as it falls: at each value it continues from its last
-    state, displaced by 1e-6, until it is on an attractor. Where the two differ there is hysteresis.
+    state, displaced by 1e-6, until it is on an attractor, for as long as the attractor with the
+    smallest exponent there needs to shrink what decays to exp(-200). Where both have arrived and
+    the two differ there is hysteresis, unless they differ at all values because each stays on the
+    attractor on which it begins; where one has not arrived, the summary says so.
 
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.
@@ -237,19 +240,24 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
     """Return summary lines on the values at which the sweeps are on different attractors."""
-    up, down = dataset["up"].values, dataset["down"].values
-    kind = np.append(dataset["entry_kind"].values, -1)
-    differ = kind[up] != kind[down]
-    lines = ["Up and down are on the same kinds of attractor everywhere."]
-    if differ.any():
-        lines = [
-            f"Up and down differ at {name} = {_spans(dataset[name].values, differ)}: hysteresis."
-        ]
-    others = ~differ & (up != down)
+    up, down, values = dataset["up"].values, dataset["down"].values, dataset[name].values
+    kind = dataset["entry_kind"].values
+    arrived = (up >= 0) & (down >= 0)
+    differ = arrived & (kind[up] != kind[down])
+    where = "everywhere" if arrived.all() else "wherever both have arrived"
+    lines = [f"Up and down are on the same kinds of attractor {where}."]
+    if differ[arrived].all() and arrived.any():
+        lines = [f"Up and down are on different kinds of attractor {where}, as they begin."]
+    elif differ.any():
+        lines = [f"Up and down differ at {name} = {_spans(values, differ)}: hysteresis."]
+    if not arrived.all():
+        late = _spans(values, ~arrived)
+        lines.append(f"A sweep has arrived on no attractor at {name} = {late}: no difference.")
+    others = arrived & ~differ & (up != down)
     if others.any():
         images = all(_mirrored(dataset, up[k], down[k]) for k in np.flatnonzero(others))
         which = "mirror images of one another" if images else "different attractors of one kind"
-        lines.append(f"They are on {which} at {name} = {_spans(dataset[name].values, others)}.")
+        lines.append(f"They are on {which} at {name} = {_spans(values, others)}.")
     return lines
 
 

@@ -191,8 +191,8 @@ def evenly(values: Floats) -> bool:
     return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
 
 
-def ascending(name: str, given: ArrayLike) -> Floats:
-    """Return values of a parameter as an array; each must be greater than the one before."""
+def ascending(name: str, given: ArrayLike, *, falling: bool = False) -> Floats:
+    """Return values as an ascending array; they may be given ``falling`` where that is allowed."""
     try:
         values = np.atleast_1d(np.array(given, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
@@ -201,8 +201,11 @@ def ascending(name: str, given: ArrayLike) -> Floats:
         raise InputError(
             f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
         )
+    if falling and values[0] > values[-1]:
+        values = values[::-1].copy()
     if not (np.diff(values) > 0).all():
-        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
+        which = "ascending or descending" if falling else "ascending"
+        raise InputError(f"{name} must be {which} values, got {short_repr(given)}")
     return values
 
 

@@ -138,7 +138,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum : Pendulum or Rig
         The model; parameters that vary replace its own.
     ranges : mapping of str to (float, float, int) or array_like
-        Two parameters, columns, then rows, each with an array of ascending values, evenly spaced or
+        Two parameters, columns, then rows, each with an array of monotonic values, evenly spaced or
         not, or a tuple of first value, last value (both included) and how many. Any of ``p``,
         ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without dimensions, with a rig also
         ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI, ``frequency_hz`` (``p`` is kept) and

@@ -93,6 +93,7 @@ def varied(
     """Return the ``count`` parameters that vary.
 
     A tuple has the first value, the last and their number; anything else is an array of values.
+    Values that fall are turned round: no result depends on their direction.
     """
     if not isinstance(ranges, dict) or len(ranges) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
@@ -124,9 +125,9 @@ def varied(
 
 
 def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
-    """Return ranges as a request to a store has them: tuples as given, arrays as lists."""
+    """Return ranges as a request to a store has them: tuples with the lower end first, or lists."""
     return {
-        axis.name: own if isinstance(own, tuple) else axis.values.tolist()
+        axis.name: (*sorted(own[:2]), own[2]) if isinstance(own, tuple) else axis.values.tolist()
         for axis, own in zip(axes, ranges.values(), strict=True)
     }
 
@@ -192,7 +193,8 @@ def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN40
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
             f"{_of_effect(name)}"
         )
-    values = _values(name, given) if isinstance(given, tuple) else ascending(name, given)
+    listed = not isinstance(given, tuple)
+    values = ascending(name, given, falling=True) if listed else _values(name, given)
     if name in own:
         bare, factor, power = own[name]
         if name in {"frequency_hz", "stroke_mm"}:
@@ -235,10 +237,10 @@ def _values(name: str, given: tuple[Any, ...]) -> Floats:
     wanted = f"{name} must be (first, last, how many), like {name}=(0.5, 2.0, 100)"
     if len(given) != 3:  # noqa: PLR2004
         raise InputError(f"{wanted}, got {short_repr(given)}")
-    low, high = (check_number(name, end) for end in given[:2])
+    low, high = sorted(check_number(name, end) for end in given[:2])
     count = check_whole(f"{name}: how many", given[2], 1, MOST_CELLS)
     if not (low < high and math.isfinite(high - low)) and not (count == 1 and low == high):
-        raise InputError(f"{wanted}, the lower one first, got {low:g} to {high:g}")
+        raise InputError(f"{wanted}, two finite values a finite distance apart, got {given[:2]}")
     if count == 1 and low < high:
         raise InputError(f"{name} is {low:g} to {high:g}: one value has one bound")
     return np.linspace(low, high, count)

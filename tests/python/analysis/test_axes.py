@@ -60,8 +60,20 @@ def test_uneven_values_of_parameters_are_mapped_where_they_are(tmp_path: Path) -
     place = tmp_path / "map.zarr"
     stored = pendmap.parameter_map(Pendulum(), one, starts=4, store=place)
     assert stored.regime.equals(found.regime)
-    with pytest.raises(InputError, match="p must be ascending values"):
-        pendmap.bifurcation(Pendulum(), {"p": [0.4, 0.2]})
+    with pytest.raises(InputError, match="p must be ascending or descending values"):
+        pendmap.bifurcation(Pendulum(), {"p": [0.4, 0.2, 0.3]})
+
+
+def test_falling_values_give_the_result_of_rising_ones(tmp_path: Path) -> None:
+    values = [0.3, 0.5, 0.9]
+    for name, more in (("bifurcation", {}), ("parameter_map", {"omega": (1.9, 2.1, 2)})):
+        found = functools.partial(getattr(pendmap, name), Pendulum(), starts=4)
+        rising = found({"p": (0.3, 0.9, 4), **more})
+        assert found({"p": (0.9, 0.3, 4), **more}).drop_attrs().equals(rising.drop_attrs())
+        listed = found({"p": np.array(values[::-1]), **more}, store=tmp_path / f"{name}.zarr")
+        assert listed.p.values.tolist() == values
+        again = found({"p": values, **more}, store=tmp_path / f"{name}.zarr", resume=True)
+        assert again.drop_attrs().equals(listed.drop_attrs())
 
 
 RESULTS: dict[str, Callable[[Any], xr.Dataset]] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
@@ -250,6 +251,53 @@ def test_no_map_has_two_attractors_of_one_branch() -> None:
     assert all(len(set(own)) == len(own) for own in found.values())
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_numbers_do_not_depend_on_the_direction_of_a_parameter(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng, seen = np.random.default_rng(seed), []
+    rig = Pendulum(gamma=0.1, p=0.9, omega=rng.uniform(1.7, 2.2), theta_r=0.01 * (seed == 1))
+    ranges = {("gamma", "omega", "torque")[seed]: (rig.omega - 0.1, rig.omega + 0.1, 3)}
+    ranges |= {"gamma": (0.06, 0.14, 3)} if seed == 0 else {}
+    ranges |= {"torque": (-0.03, 0.03, 3)} if seed == 2 else {}
+    low = rng.uniform(0.3, 1.0)
+    ranges["p"] = (low, low + 0.4, 4)
+
+    def noted(job: SweepTiles, maps: dict[tuple[int, ...], Mapped]) -> object:
+        seen.append((job, maps))
+        return branches.branches(job, maps)
+
+    monkeypatch.setattr("pendmap.analysis.basin_sweep.branches", noted)
+    swept = functools.partial(pendmap.sweep, rig, grid=12, check=False)
+    rising = swept(ranges)
+    equal(swept({name: (high, low, n) for name, (low, high, n) in ranges.items()}), rising)
+    job, maps = seen[0]
+    every = tuple((name, values[::-1]) for name, values in job.varied)
+    turned = branches.branches(
+        dataclasses.replace(job, varied=every),
+        {tuple(n - 1 - k for n, k in zip(job.shape, at, strict=True)): maps[at] for at in maps},
+    )
+    pairs, symmetric = set(), {}
+    for at, numbers in branches.branches(job, maps).items():
+        other = turned[tuple(n - 1 - k for n, k in zip(job.shape, at, strict=True))]
+        pairs |= {*zip(numbers, other, strict=True)}
+        for k, (number, own) in enumerate(zip(numbers, maps[at].found, strict=True), 1):
+            symmetric.setdefault(number, set()).update({own.twin == k} if own.twin else ())
+    assert len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
+    assert max(len(both) for both in symmetric.values()) == 1
+
+
+def test_an_orbit_keeps_its_number_across_the_pitchforks_beside_it() -> None:
+    """Mirror images exist at gamma 0.06 to 0.08 alone, the symmetric orbit from 0.09 on."""
+    found = pendmap.sweep(Pendulum(p=1.25, omega=2.0), {"gamma": (0.14, 0.06, 5)}, grid=16)
+    swings = found.isel(attractor=found.w.values.any(axis=0) == 0)
+    own = swings.id.values == swings.twin.values
+    exists = swings.exists.values > 0
+    assert exists[:, own].sum(axis=1).tolist() == [0, 0, 1, 1, 1]
+    assert exists[:, ~own].sum(axis=1).tolist() == [2, 2, 0, 0, 0]
+    assert (own.sum(), (~own).sum()) == (1, 2)
+
+
 def test_names_are_different(line: xr.Dataset) -> None:
     names = [str(name) for name in line.attractor.values]
     assert len(set(names)) == len(names)
@@ -297,7 +345,7 @@ def test_two_parameters_may_have_any_values() -> None:
 @pytest.mark.parametrize(
     ("ranges", "said"),
     [
-        ({"p": [0.5, 0.4]}, "p must be ascending values"),
+        ({"p": [0.5, 0.4, 0.6]}, "p must be ascending or descending values"),
         ({"p": []}, r"p must be an array \(N,\) of finite numbers"),
     ],
 )

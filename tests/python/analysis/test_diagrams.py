@@ -82,6 +82,20 @@ def test_sweeps_on_mirror_images_are_reported() -> None:
     assert "mirror images of one another at p = 1.36 to 1.5" in found.attrs["summary"]
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.37])
+def test_sweeps_settle_at_supercritical_bifurcations(truths: dict[str, Any], offset: float) -> None:
+    known = truths["bifurcations_gamma0.1_omega2"]
+    onset = float(truths["rest_onset"]["res_w2.2"]["p_onset"])
+    places = [(2.2, onset), (2.0, float(known["rot_PD1"]["p"])), (2.0, float(known["osc_SB"]["p"]))]
+    for omega, place in places:
+        step = 2e-3
+        first = place + (offset - 5.5) * step
+        ranges = {"p": (first, first + 11 * step, 12)}
+        found = pendmap.bifurcation(Pendulum(omega=omega), ranges)
+        assert min(found["up"].values.min(), found["down"].values.min()) >= 0
+        assert "hysteresis" not in found.attrs["summary"]
+
+
 def test_results_in_si_agree() -> None:
     bare = pendmap.bifurcation(Pendulum(), {"omega": (1.9, 2.1, 5)})
     rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)

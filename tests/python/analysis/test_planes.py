@@ -116,7 +116,7 @@ def test_parameters_of_effects_vary_too() -> None:
         ({"p": (0, 1, 3), "viscous_damping.gamma": (0, 1, 3)}, "is no parameter of this model"),
         ({"p": (0, 1, 3), "gamma": (-1, 2, 3)}, "gamma = -1: gamma must be 0 or more, got -1"),
         ({"p": (0, 1, 3), "omega": (0, 2, 3)}, "omega must be a number above 0, got 0"),
-        ({"p": (1, 0, 3), "omega": (1, 2, 3)}, "the lower one first"),
+        ({"p": (1, 1, 3), "omega": (1, 2, 3)}, "two finite values a finite distance apart"),
         ({"p": (0, math.nan, 3), "omega": (1, 2, 3)}, "p must be .*, got nan"),
         ({"p": (0, 1, 0), "omega": (1, 2, 3)}, "how many must be .*, got 0"),
         ({"p": (0, 1), "omega": (1, 2, 3)}, "first, last, how many"),

@@ -1,11 +1,13 @@
 """Attractors matched along parameters: branches, each with one number over the whole sweep.
 
 An orbit is followed from one model to the next by Newton's method, in halved steps of the
-parameters where a whole one fails; global continuation as by Attractors.jl (Datseris & Wagemakers
-2022, Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151) compares the
-distances of sets instead. So are here the attractors that no orbit leads to: chaos, and what an
-orbit becomes where its period doubles. Tumbling chaos is followed by its kind alone. Nothing
-depends on the order in which the models were mapped.
+parameters where a whole one fails; two orbits are one where that leads from each to the other
+without a change of symmetry. Global continuation as by Attractors.jl (Datseris & Wagemakers 2022,
+Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151) compares the distances
+of sets instead. So are here those of which one has another period or none that Newton's method
+finds: what an orbit becomes where its period doubles, chaos. Tumbling chaos and running states that
+no orbit locks are followed by their kind alone. Nothing depends on the order in which the models
+were mapped or on the direction of a parameter.
 """
 
 from __future__ import annotations
@@ -27,12 +29,11 @@ if TYPE_CHECKING:
     Node = tuple[Place, int]
     """An attractor of a model: the place of the model, and its index there."""
 
-_SAME: Final = 1e-4
-"""Distance within which an orbit of the integration steps is the precise one."""
+_SAME: Final = 1e-6  # Distance within which two orbits of the integration steps are one
 _LIKE: Final = 0.25
 """Largest mean distance between the points of two sets that follow one another."""
-_EVERYWHERE: Final = "tumbling_chaos"
-"""Kind that one attractor of a model has at most; its samples lie apart by their own spacing."""
+_ALONE: Final = ("tumbling_chaos", "quasiperiodic_rotation", "rotation")
+"""Kinds that a model has at most once in each sense unless Newton's method finds them."""
 _HALVED: Final = 4  # Number of times that a step of the parameters is halved
 
 
@@ -43,15 +44,10 @@ def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[
     """
     places = sorted(maps)
     joined = _Joined({place: len(maps[place].found) for place in places})
-    near: list[tuple[Node, Node]] = []
-    for place in places:
-        for before in _before(place):
-            orbits, others = _links(job, maps, before, place)
-            for one, other in orbits:
-                joined.join((before, one), (place, other))
-            near += [((before, one), (place, other)) for one, other in others]
-    for pair in near:
-        joined.join(*pair)
+    pairs = [(before, place) for place in places for before in _before(place)]
+    links = [link for pair in pairs for link in _links(job, maps, *pair)]
+    for _, _, one, other in sorted(links):
+        joined.join(one, other)
     rests = [(place, k) for place in places for k, a in enumerate(maps[place].found) if _rests(a)]
     for both in itertools.pairwise(sorted(rests, key=lambda node: _name(maps, node))):
         if _name(maps, both[0]) == _name(maps, both[1]):
@@ -109,82 +105,80 @@ class _Joined:
 
 def _links(
     job: SweepTiles, maps: Mapping[Place, Mapped], before: Place, place: Place
-) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Return pairs of attractors of two neighbours: followed as orbits, and near ones."""
+) -> list[tuple[bool, float, Node, Node]]:
+    """Return pairs of attractors of two neighbours: whether no orbit leads there, and distance."""
     old, new = maps[before].found, maps[place].found
-    steps, circle = int(maps[place].measures["steps"]), not _core.counts_turns(job.pendulum)
-    orbits, free = [], set(range(len(new)))
-    for k, end in enumerate(_followed(job, steps, old, before, place)):
-        if end is None:
-            continue
-        w, point = end
-        for m in sorted(free):
-            own = new[m]
-            if (own.n, own.w) == (old[k].n, w) and distance(
-                point, own.points, circle=circle
-            ) < _SAME:
-                orbits.append((k, m))
-                free.discard(m)
-                break
-    left = [k for k in range(len(old)) if k not in {one for one, _ in orbits}]
-    far = {
-        (k, m): _apart(old[k].points, new[m].points, circle=circle)
-        for k, m in itertools.product(left, sorted(free))
-        if _alike(old[k], new[m], k, m)
-    }
-    others: list[tuple[int, int]] = []
-    for k, m in sorted(far, key=lambda pair: (far[pair], pair)):
-        taken = any(k == one or m == other for one, other in others)
-        near = far[k, m] < _LIKE or old[k].kind == _EVERYWHERE
-        if near and not taken:
-            others.append((k, m))
-    return orbits, others
+    circle = not _core.counts_turns(job.pendulum)
+    ahead, there = _followed(job, maps, before, place)
+    back, here = _followed(job, maps, place, before)
+    orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
+    left = set(range(len(old))) - {k for k, _ in orbits}
+    free = set(range(len(new))) - {m for _, m in orbits}
+    others = [
+        (k, m)
+        for k, m in itertools.product(left, free)
+        if _alike(old[k], new[m], k, m) and not (k in here and m in there and old[k].n == new[m].n)
+    ]
+    every = (*orbits, *others)
+    far = {(k, m): _apart(old[k].points, new[m].points, circle=circle) for k, m in every}
+    near: list[tuple[int, int]] = []
+    for k, m in sorted(others, key=lambda pair: (far[pair], pair)):
+        taken = any(k == one or m == other for one, other in near)
+        alone = old[k].kind == new[m].kind in _ALONE and k not in here and m not in there
+        if not taken and (alone or far[k, m] < _LIKE):
+            near.append((k, m))
+    return [
+        (pair in near, far[pair], (before, pair[0]), (place, pair[1])) for pair in (*orbits, *near)
+    ]
 
 
 def _followed(
-    job: SweepTiles, steps: int, old: list[Found], before: Place, place: Place
-) -> list[tuple[int, Floats] | None]:
-    """Return turns and first point of each orbit at the next model, None where it ends."""
+    job: SweepTiles, maps: Mapping[Place, Mapped], before: Place, place: Place
+) -> tuple[dict[int, int], set[int]]:
+    """Return the attractor of the next model that each orbit leads to, and those it may lead to."""
+    old, new = maps[before].found, maps[place].found
+    steps, circle = int(maps[before].measures["steps"]), not _core.counts_turns(job.pendulum)
     first, last = np.array(before, float), np.array(place, float)
-    closed = [k for k, own in enumerate(old) if own.n > 0]
-    ends: list[tuple[int, Floats] | None] = [None] * len(old)
 
-    def moved(
-        which: list[int], points: Mapping[int, Floats], at: float
-    ) -> dict[int, tuple[int, Floats]]:
+    def moved(every: list[Found], points: Mapping[int, Floats], at: float) -> dict[int, Floats]:
         model = job.model((first + at * (last - first)).tolist())
-        states = [(*points[k].tolist(), old[k].n) for k in which]
-        found = _core.orbits_near(model, steps, states)
-        return {
-            k: (one[0], np.array(one[1]))
-            for k, one in zip(which, found, strict=True)
-            if one is not None and one[0] == old[k].w
-        }
+        states = [(*x.tolist(), every[k].n, _symmetric(every[k], k)) for k, x in points.items()]
+        orbits = zip(points, _core.orbits_near(model, steps, states), strict=True)
+        return {k: np.array(one[1]) for k, one in orbits if one and one[0] == every[k].w}
 
-    for k, (w, points) in moved(closed, {k: old[k].points[0] for k in closed}, 1.0).items():
-        ends[k] = w, points[:1]
-    for k in closed:
-        at, step, point = 0.0, 0.5, old[k].points[0]
-        while ends[k] is None and step >= 0.5**_HALVED:
-            ahead = min(at + step, 1.0)
-            found = moved([k], {k: point}, ahead).get(k)
-            if found is None:
+    starts, theirs = ({k: a.points[0] for k, a in enumerate(s) if a.n > 0} for s in (old, new))
+    ends, those = moved(old, starts, 1.0), moved(new, theirs, 1.0)
+    for k in starts.keys() - ends.keys():
+        at, step, point = 0.0, 0.5, starts[k]
+        while at < 1.0 and step >= 0.5**_HALVED:
+            orbit = moved(old, {k: point}, min(at + step, 1.0)).get(k)
+            if orbit is None:
                 step *= 0.5
-                continue
-            at, point = ahead, found[1][0]
-            if at == 1.0:
-                ends[k] = found[0], found[1][:1]
-    return ends
+            else:
+                at, point = min(at + step, 1.0), orbit[0]
+        if orbit is not None:
+            ends[k] = orbit
+    followed = {}
+    for k, points in ends.items():
+        alike = [m for m in those if (new[m].n, new[m].w) == (old[k].n, old[k].w)]
+        far = {m: distance(points[:1], those[m], circle=circle) for m in alike}
+        nearest = min(far, key=far.__getitem__, default=None)
+        if nearest is not None and far[nearest] < _SAME:
+            followed[k] = nearest
+    return followed, {*those}
+
+
+def _symmetric(own: Found, k: int) -> bool | None:
+    """Return whether an attractor is its own mirror image, None if that is not known."""
+    return own.twin == k + 1 if own.twin else None
 
 
 def _alike(one: Found, other: Found, k: int, m: int) -> bool:
-    """Return whether they may follow one another: equal turns, both symmetric or neither."""
-    families = _family(one), _family(other)
-    turns = families[0] == families[1]
+    """Return whether they may follow one another: equal turns, not one symmetric alone."""
+    turns = _family(one) == _family(other)
     if one.n and other.n:
         turns = turns and one.w * other.n == other.w * one.n
-    symmetric = one.twin == k + 1, other.twin == m + 1
-    return turns and symmetric[0] == symmetric[1]
+    return turns and not {_symmetric(one, k), _symmetric(other, m)} >= {True, False}
 
 
 def _family(own: Found) -> tuple[str, str]:

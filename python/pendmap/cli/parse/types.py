@@ -107,7 +107,7 @@ def _axis(
     *,
     single: bool = False,
 ) -> AxisText:
-    """Read N cells between two bounds; a ``single`` value may have two equal ones."""
+    """Read N cells between two bounds; or values, in any order, and a ``single`` one."""
     wanted = f"must be A:B:N, {meaning}, got {text!r}"
     parts = text.split(":")
     if len(parts) != 3:  # noqa: PLR2004
@@ -116,6 +116,8 @@ def _axis(
         low, high, count = _value(parts[0]), _value(parts[1]), int(parts[2])
     except (ValueError, ZeroDivisionError):
         raise InputError(wanted) from None
+    if single:
+        low, high = sorted((low, high))
     rising = low < high or (single and low == high and count <= 1)
     if not (math.isfinite(low) and math.isfinite(high) and rising):
         raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
