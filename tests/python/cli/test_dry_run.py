@@ -112,10 +112,13 @@ def test_long_work_tells_its_time_once() -> None:
 def test_it_is_told_within_seconds_of_very_long_work() -> None:
     clock = Clock()
     clock.after(0, 0, 10**6)
-    clock.after(5, 500, 10**6)
+    clock.after(2, 200, 10**6)
     assert clock.said == []
-    clock.after(6, 1100, 10**6)
+    clock.after(2, 400, 10**6)
     assert clock.said == ["This takes about 3 hours."]
+    clock.after(0, 0, 100)  # other work, which takes no longer
+    clock.after(100, 1, 100)
+    assert len(clock.said) == 1
 
 
 def test_work_of_less_than_a_minute_tells_nothing() -> None:
