@@ -17,6 +17,7 @@
 //! | Which parameters does a record's pendulum have? | [`fit`] |
 //! | How do many trajectories share a register? | [`lanes`] |
 //! | Is there enough memory? | [`memory`] |
+//! | How far is it? | [`progress`] |
 //! | What was wrong with my request? | [`error`] |
 //!
 //! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
@@ -51,3 +52,4 @@ pub mod maps;
 pub mod memory;
 pub mod model;
 pub mod orbit;
+pub mod progress;

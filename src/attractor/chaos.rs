@@ -14,10 +14,12 @@ use super::groups::Groups;
 use super::kind::Kind;
 use super::long_runs::{Cut, Run, Senses, Window, long_runs};
 use super::region::Region;
+use super::rest::standing;
 use super::trap::Band;
 use crate::integrate::Strobe;
 use crate::integrate::kernel::stroboscopic::State;
 use crate::model::Angle;
+use crate::orbit::PoincareMap;
 
 /// Number of stroboscopic points stored as a sample of the set.
 const KEPT: usize = 2000;
@@ -263,7 +265,9 @@ impl Runs<'_> {
             // Near a resonance one trajectory fills the curve slowly; several fill it sooner.
             let curve: Vec<State> =
                 windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
-            let band = Band::around(strobe, &curve, 0)?;
+            let mut apart = standing(strobe, &PoincareMap::of_steps(strobe));
+            apart.extend(self.traps.ellipses.iter().map(|trap| trap.centre));
+            let band = Band::around(strobe, &curve, 0, &apart)?;
             let sense = windows[0].turns.signum() as i64;
             let stderr = stderr / strobe.pendulum.period();
             return found(Kind::QuasiperiodicRotation, sense, [0.0, stderr], Some(band));

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::integrate::Strobe;
+use crate::orbit::PoincareMap;
+
 /// The budget of a search for attractors: thorough for a single plane of starts, brisk for each of many
 /// thousand pendulums.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,6 +54,16 @@ pub struct Sampling {
 }
 
 impl Effort {
+    /// The map of which orbits are periodic points.
+    #[must_use]
+    pub fn map(&self, strobe: &Strobe) -> PoincareMap {
+        if self.precise {
+            PoincareMap::new(&strobe.pendulum)
+        } else {
+            PoincareMap::of_steps(strobe)
+        }
+    }
+
     /// The budget for a single pendulum.
     pub const THOROUGH: Self = Self {
         precise: true,

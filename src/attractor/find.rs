@@ -1,5 +1,6 @@
 //! The search for attractors: from a set of starts to a catalogue with traps.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
@@ -17,11 +18,16 @@ use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 use crate::orbit::rotation::{Rotation, running_states};
 use crate::orbit::symmetry::Mirror;
+use crate::progress::Progress;
 
 /// Largest distance of Newton's method from the trajectory's state.
 pub(super) const REACH: f64 = 0.3;
 /// Distance within which points belong to one orbit.
 pub(super) const SAME: f64 = 1e-6;
+/// Periods between two reports of progress.
+const STRETCH: u32 = 4096;
+/// Most starts settle within this part of a search's bound: in which damping shrinks a free motion by `exp(-10)`.
+const SETTLING: u32 = 5;
 
 /// How a start of a search ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +51,9 @@ pub struct Catalogue {
     pub traps: Traps,
     /// Longest time to capture in the searches, in periods.
     pub longest_settle: u32,
+    /// What a search reports, in periods.
+    #[serde(skip)]
+    pub progress: Arc<Progress>,
     pub(super) effort: Effort,
     pub(super) orbits: Vec<(PeriodicOrbit, Vec<Ellipse>)>,
     /// Attracting orbits that no trap was found for: they are not tried again.
@@ -52,6 +61,8 @@ pub struct Catalogue {
     pub(super) untrapped: Vec<PeriodicOrbit>,
     pub(super) rotations: Vec<(Rotation, Option<Band>)>,
     pub(super) rests: Vec<f64>,
+    /// Points of the orbits 1:0 where the pendulum may stand still, stable or not.
+    standing: Vec<State>,
     pub(super) sets: Vec<ChaoticSet>,
     /// Extents of the starts from which short cycles have been sought.
     #[serde(skip)]
@@ -64,17 +75,24 @@ impl Catalogue {
     /// The attractors known without a search: the running states of an undriven pendulum.
     #[must_use]
     pub fn new(strobe: &Strobe, effort: Effort) -> Self {
-        let band = |r: &Rotation| Band::around(strobe, &r.curve, 0);
-        let rotations = running_states(&strobe.pendulum);
+        let map = effort.map(strobe);
+        let standing = rest::standing(strobe, &map);
+        let band = |r: Rotation| {
+            let band = Band::around(strobe, &r.curve, 0, &standing);
+            (r, band)
+        };
+        let rotations = running_states(&strobe.pendulum).into_iter().map(band).collect();
         let mut empty = Self {
             attractors: Vec::new(),
             traps: Traps::default(),
             longest_settle: 0,
+            progress: Arc::default(),
             effort,
             orbits: Vec::new(),
             untrapped: Vec::new(),
-            rotations: rotations.into_iter().map(|r| (r.clone(), band(&r))).collect(),
+            rotations,
             rests: rest::centres(&strobe.pendulum),
+            standing,
             sets: Vec::new(),
             sought: [0.0; 2],
             known: Vec::new(),
@@ -166,12 +184,12 @@ impl Catalogue {
         if !strobe.pendulum.is_dissipative() {
             return;
         }
-        let map = self.map(strobe);
+        let map = self.effort.map(strobe);
         let fastest = escape_speed(&strobe.pendulum);
         let (mut elapsed, mut round) = (0, self.effort.first_round);
         while elapsed < bound && alive && !cancel.load(Ordering::Relaxed) {
             let length = round.min(bound - elapsed);
-            self.run(strobe, endings, length, elapsed, cancel);
+            self.run(strobe, endings, length, elapsed, bound, cancel);
             for ending in endings.iter_mut() {
                 if matches!(ending, Ending::Open(state) if state[1].abs() > fastest) {
                     *ending = Ending::Failed;
@@ -182,7 +200,7 @@ impl Catalogue {
             let free = open(endings);
             if self.find_cycles(strobe, &map, &free, cancel) {
                 // Trajectories within the new traps are captured at once.
-                self.run(strobe, endings, self.effort.first_round, elapsed, cancel);
+                self.run(strobe, endings, self.effort.first_round, elapsed, bound, cancel);
             }
             alive = endings.iter().any(is_open);
         }
@@ -196,7 +214,7 @@ impl Catalogue {
         orbits: &[Alike],
         cancel: &AtomicBool,
     ) -> Vec<State> {
-        let map = self.map(strobe);
+        let map = self.effort.map(strobe);
         let mut left = Vec::new();
         for ((points, _), orbit) in orbits.iter().zip(attracting(strobe, &map, orbits)) {
             match orbit {
@@ -211,34 +229,39 @@ impl Catalogue {
         left
     }
 
-    /// The map of which orbits are periodic points.
-    pub(super) fn map(&self, strobe: &Strobe) -> PoincareMap {
-        if self.effort.precise {
-            PoincareMap::new(&strobe.pendulum)
-        } else {
-            PoincareMap::of_steps(strobe)
-        }
-    }
-
-    /// Advances the open ones of `endings` by `length` periods.
+    /// Advances the open ones of `endings` by `length` periods, after `elapsed` of `bound`.
     fn run(
         &mut self,
         strobe: &Strobe,
         endings: &mut [Ending],
         length: u32,
         elapsed: u32,
+        bound: u32,
         cancel: &AtomicBool,
     ) {
-        let alive = open(endings);
-        let outcomes =
-            capture::outcomes(strobe, &self.traps, length, &alive, cancel).unwrap_or_default();
-        let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
-        for (ending, outcome) in free.zip(outcomes) {
-            if matches!(outcome.fate, Fate::Captured(_)) {
-                self.longest_settle = self.longest_settle.max(elapsed + outcome.periods);
+        for begin in (0..length).step_by(STRETCH as usize) {
+            let (alive, part) = (open(endings), STRETCH.min(length - begin));
+            let outcomes =
+                capture::outcomes(strobe, &self.traps, part, &alive, cancel).unwrap_or_default();
+            let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
+            for (ending, outcome) in free.zip(outcomes) {
+                if matches!(outcome.fate, Fate::Captured(_)) {
+                    let settled = elapsed + begin + outcome.periods;
+                    self.longest_settle = self.longest_settle.max(settled);
+                }
+                *ending = self.ending(outcome.fate, outcome.state);
             }
-            *ending = self.ending(outcome.fate, outcome.state);
+            self.report(endings, elapsed + begin + part, bound);
         }
+    }
+
+    /// Reports a search `elapsed` periods after its beginning. Most starts settle within a part of `bound`: the time
+    /// of that part is told first.
+    fn report(&self, endings: &[Ending], elapsed: u32, bound: u32) {
+        let soon = bound / SETTLING;
+        let [from, to] = if elapsed <= soon { [0, soon] } else { [soon, bound.max(elapsed)] };
+        let all = (to - from) as usize * endings.len();
+        self.progress.show(all - (to - elapsed) as usize * open(endings).len(), all);
     }
 
     /// How a start of this fate has ended.
@@ -341,6 +364,18 @@ impl Catalogue {
         }
         for (set, at) in self.sets.iter().zip(place) {
             traps.bands.extend(set.band.iter().map(|b| Band { attractor: at, ..b.clone() }));
+        }
+        // A trap ends short of what was found after it, and of orbits that do not attract.
+        let others = |at: usize| {
+            let single = |a: &Attractor| a.n.is_some() && !a.is_running();
+            let others = attractors.iter().enumerate().filter(move |(i, a)| *i != at && single(a));
+            others.flat_map(|(_, a)| &a.points).chain(&self.standing)
+        };
+        for ellipse in &mut traps.ellipses {
+            others(ellipse.attractor).for_each(|state| ellipse.end_short_of(*state));
+        }
+        for band in &mut traps.bands {
+            others(band.attractor).for_each(|state| band.end_short_of(*state));
         }
         self.attractors = attractors;
         self.traps = traps;

@@ -29,11 +29,22 @@ impl Catalogue {
         self.attractors.iter().any(|a| a.kind.is_chaotic())
     }
 
+    /// The least rate at which a deviation from an attractor shrinks, per unit of tau; `None` if no attractor has
+    /// multipliers.
+    #[must_use]
+    pub fn slowest(&self) -> Option<f64> {
+        let rate = |a: &Attractor| {
+            let slow = a.multipliers.iter().map(|m| m.norm()).fold(0.0, f64::max);
+            a.period.filter(|_| !a.multipliers.is_empty()).map(|period| -slow.ln() / period)
+        };
+        self.attractors.iter().filter_map(rate).min_by(f64::total_cmp)
+    }
+
     /// The attractors of open trajectories, if Newton's method from a near return leads to a known
     /// orbit, or the region of a known set contains the last points.
     #[must_use]
     pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
-        let map = self.map(strobe);
+        let map = self.effort.map(strobe);
         let longest = self.effort.longest_cycle;
         let own = |orbit: PeriodicOrbit| {
             let passes =

@@ -1,8 +1,11 @@
 //! Under friction, rest is a set: the angles at which the load never exceeds the friction.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::find::REACH;
+use crate::integrate::{State, Strobe};
 use crate::model::{Angle, Equation, Pendulum};
+use crate::orbit::{PoincareMap, newton};
 
 /// Number of angles at which a set without closed form is sought.
 const ANGLES: usize = 720;
@@ -10,6 +13,8 @@ const ANGLES: usize = 720;
 const MOST_HALF_TURNS: i32 = 1000;
 /// An angle this near to 0 or pi is set to it.
 const NEAR: f64 = 1e-6;
+/// An undriven pendulum stands still where the load exceeds the friction by no more than this.
+const BALANCED: f64 = 1e-9;
 
 /// The angle in the middle of each set at rest, hanging and upside down: where the load at its
 /// greatest is least. Empty without friction.
@@ -49,6 +54,42 @@ pub fn balances(pendulum: &Pendulum) -> [f64; 2] {
     [0.0, PI].map(|middle| centre(&equation, middle))
 }
 
+/// Points of the orbits 1:0 that lie where the pendulum may stand still, stable or not: no trap of another attractor
+/// may hold them. Without drive these are the equilibria.
+#[must_use]
+pub fn standing(strobe: &Strobe, map: &PoincareMap) -> Vec<State> {
+    if strobe.equation.is_autonomous() {
+        return equilibria(&strobe.equation).into_iter().map(|theta| [theta, 0.0]).collect();
+    }
+    let starts = balances(&strobe.pendulum).map(|theta| ([theta, 0.0], 1));
+    let mut points = Vec::new();
+    // Near a saddle-node both starts may lead to one orbit; the second search finds the other.
+    for _ in 0..2 {
+        let orbits = newton::find_others(map, &starts, REACH, &points);
+        points.extend(orbits.into_iter().flat_map(|orbit| orbit.points));
+    }
+    points
+}
+
+/// The angles at which an undriven pendulum stands still; of an interval that friction holds, some.
+fn equilibria(equation: &Equation<f64>) -> Vec<f64> {
+    let width = TAU / ANGLES as f64;
+    let excess: Vec<f64> =
+        (0..ANGLES).map(|k| equation.excess((k as f64 + 0.5) * width - PI)).collect();
+    let mut all = Vec::new();
+    for k in 0..ANGLES {
+        let theta = (k as f64 + 0.5) * width - PI;
+        let [before, after] = [ANGLES - 1, 1].map(|step| excess[(k + step) % ANGLES]);
+        if excess[k] <= 0.0 {
+            all.push(theta);
+        } else if excess[k] <= before && excess[k] <= after {
+            let least = least_loaded(equation, theta, width);
+            all.extend((equation.excess(least) <= BALANCED).then_some(least));
+        }
+    }
+    all
+}
+
 fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
     if equation.is_plain() {
         // The load torque - (1 + p cos) sin th is least in magnitude near torque = sin th.
@@ -60,13 +101,16 @@ fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
         .map(angle)
         .min_by(|a, b| equation.excess(*a).total_cmp(&equation.excess(*b)))
         .unwrap_or(middle);
-    // Between the samples, by ternary search.
-    let width = PI / ANGLES as f64;
-    let (mut low, mut high) = (best - width, best + width);
+    let theta = least_loaded(equation, best, PI / ANGLES as f64);
+    if (theta - middle).abs() < NEAR { middle } else { theta }
+}
+
+/// The angle within `width` of `theta` at which the excess of the load is least, by ternary search.
+fn least_loaded(equation: &Equation<f64>, theta: f64, width: f64) -> f64 {
+    let (mut low, mut high) = (theta - width, theta + width);
     for _ in 0..60 {
         let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
         if equation.excess(a) < equation.excess(b) { high = b } else { low = a }
     }
-    let theta = 0.5 * (low + high);
-    if (theta - middle).abs() < NEAR { middle } else { theta }
+    0.5 * (low + high)
 }

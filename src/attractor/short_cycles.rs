@@ -39,7 +39,7 @@ impl Catalogue {
         let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * extents[0] };
         let fastest = MARGIN * extents[1];
         self.sought = [widest, fastest];
-        let (map, steps) = (self.map(strobe), PoincareMap::of_steps(strobe));
+        let (map, steps) = (self.effort.map(strobe), PoincareMap::of_steps(strobe));
         let known = self.orbits.len();
         // Repelled by all orbits met: a stable orbit is next to the one it was created with.
         let mut met: Vec<State> = Vec::new();

@@ -14,6 +14,7 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::effort::Sampling;
+use super::find::SAME;
 use super::gauge::Gauge;
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, Strobe};
@@ -43,6 +44,15 @@ impl Ellipse {
         let (x, y) = (state[0] - self.centre[0], state[1] - self.centre[1]);
         (a * x + b * y).powi(2) + (c * y).powi(2)
     }
+
+    /// Shrinks it where it holds a state with wrapped angle, other than its centre, to end short of that.
+    pub fn end_short_of(&mut self, state: State) {
+        let height = self.height(state);
+        let own = (state[0] - self.centre[0]).hypot(state[1] - self.centre[1]) < SAME;
+        if height < 1.0 && !own {
+            self.shape = self.shape.map(|x| x / (MARGIN * height.sqrt()));
+        }
+    }
 }
 
 /// Sampled half widths of a band, each `RATIO` of the preceding one.
@@ -54,6 +64,16 @@ const LEFT: f64 = 0.2;
 const LEAST_SHRINK: f64 = 0.3;
 /// Samples of a band must come back lower by this factor.
 const BAND_LOWER: f64 = 0.999;
+/// Periods within which they must.
+const RETURNS: usize = 8;
+/// Samples of both edges of a band.
+const SIDES: usize = BAND_CELLS;
+/// An edge has come to the curve within this multiple of the narrowest width that the curve's table resolves.
+const ARRIVED: f64 = 2.0;
+/// Edges are followed for this multiple of the time in which damping should bring them to the curve.
+const PATIENCE: f64 = 2.0;
+/// Least damping for which that time is reckoned, per period.
+const LEAST_SHRINKING: f64 = 1e-4;
 /// The part of the sampled radius that is used.
 const MARGIN: f64 = 0.9;
 
@@ -211,7 +231,7 @@ impl Band {
     /// Whether a state with wrapped angle is inside.
     #[must_use]
     pub fn contains(&self, state: State) -> bool {
-        (state[1] - self.at(state[0])).abs() < self.half_width
+        self.distance(state) < self.half_width
     }
 
     /// The band around the image of its curve under `(th, v) -> (-th, -v)`.
@@ -220,49 +240,95 @@ impl Band {
         Self { curve: self.curve.iter().rev().map(|v| -v).collect(), ..*self }
     }
 
-    /// The band around states `curve` of a running state, `None` if no sampled width is safe.
+    /// The band around states `curve` of a running state, short of the states `apart`; `None` if no sampled width
+    /// is safe.
+    ///
+    /// Both edges are followed until they have come to the curve: the map keeps the order of states across it, so
+    /// that nothing between them can end elsewhere.
     #[must_use]
-    pub fn around(strobe: &Strobe, states: &[State], attractor: usize) -> Option<Self> {
+    pub fn around(
+        strobe: &Strobe,
+        states: &[State],
+        attractor: usize,
+        apart: &[State],
+    ) -> Option<Self> {
         if strobe.angle == Angle::Line {
             // A trajectory that rotates for ever there never returns.
             return None;
         }
         let curve = tabulate(states)?;
         let mut band = Self { curve, half_width: 1.0, attractor };
-        let columns = BAND_CELLS / 2;
-        let widths: Vec<f64> = (0..LEVELS).map(|k| 4.0 * RATIO.powi(k as i32)).collect();
-        let (mut theta, mut velocity) = (Vec::new(), Vec::new());
-        for width in &widths {
-            for column in 0..columns {
-                let at = TAU * ((column as f64 + 0.5) / columns as f64 - 0.5);
-                for side in [-1.0, 1.0] {
-                    theta.push(at);
-                    velocity.push(band.at(at) + side * width);
+        let limit = apart.iter().map(|s| band.distance(*s)).fold(f64::INFINITY, f64::min);
+        let narrower = |width: &f64| MARGIN * width < limit;
+        let widths: Vec<f64> =
+            (0..LEVELS).map(|k| 4.0 * RATIO.powi(k as i32)).filter(narrower).collect();
+        let (mut theta, mut velocity) = band.sides(&widths);
+        let mut turns = vec![0.0; theta.len()];
+        let mut best: Option<[f64; 2]> = None;
+        for _ in 0..RETURNS {
+            strobe.advance(&mut theta, &mut velocity, &mut turns, 1).ok()?;
+            let holds = |k: &usize| {
+                (k * SIDES..(k + 1) * SIDES)
+                    .all(|i| band.distance([theta[i], velocity[i]]) < BAND_LOWER * widths[*k])
+            };
+            // Interpolation of the curve limits how narrow a band can be judged.
+            let mut safe = (0..widths.len()).rev().skip_while(|k| !holds(k)).take_while(holds);
+            if let Some(first) = safe.next() {
+                let width = MARGIN * widths[safe.last().unwrap_or(first)];
+                if best.is_none_or(|[widest, _]| width > widest) {
+                    best = Some([width, ARRIVED * widths[first]]);
                 }
             }
         }
-        let mut turns = vec![0.0; theta.len()];
-        let mut best: Option<f64> = None;
-        for _ in 0..8 {
-            strobe.advance(&mut theta, &mut velocity, &mut turns, 1).ok()?;
-            let holds = |k: usize| {
-                let part = k * 2 * columns..(k + 1) * 2 * columns;
-                part.into_iter()
-                    .all(|i| (velocity[i] - band.at(theta[i])).abs() < BAND_LOWER * widths[k])
+        let [mut width, near] = best?;
+        while width > near {
+            let Some(elsewhere) = band.stays(strobe, width, near) else {
+                band.half_width = width;
+                return Some(band);
             };
-            let safe = (0..LEVELS)
-                .rev()
-                // Interpolation of the curve limits how narrow a band can be judged.
-                .skip_while(|k| !holds(*k))
-                .take_while(|k| holds(*k))
-                .last();
-            if let Some(k) = safe {
-                let width = MARGIN * widths[k];
-                best = Some(best.map_or(width, |b: f64| b.max(width)));
-            }
+            width = MARGIN * width.min(elsewhere);
         }
-        band.half_width = best?;
-        Some(band)
+        None
+    }
+
+    /// Narrows it where it holds a state with wrapped angle, to end short of that.
+    pub fn end_short_of(&mut self, state: State) {
+        self.half_width = self.half_width.min(MARGIN * self.distance(state));
+    }
+
+    /// How far a state with wrapped angle is from the curve, in velocity.
+    #[must_use]
+    pub fn distance(&self, state: State) -> f64 {
+        (state[1] - self.at(state[0])).abs()
+    }
+
+    /// States along both edges of bands of these half widths.
+    fn sides(&self, widths: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let state = |(k, width): (usize, f64)| {
+            let at = TAU * (((k / 2) as f64 + 0.5) / (SIDES / 2) as f64 - 0.5);
+            let side = if k.is_multiple_of(2) { -width } else { width };
+            (at, self.at(at) + side)
+        };
+        widths.iter().flat_map(|width| (0..SIDES).map(|k| (k, *width))).map(state).unzip()
+    }
+
+    /// The least distance from the curve at which states of the edges remain; `None` if all come within `near` of it.
+    fn stays(&self, strobe: &Strobe, width: f64, near: f64) -> Option<f64> {
+        let (mut theta, mut velocity) = self.sides(&[width]);
+        let mut turns = vec![0.0; theta.len()];
+        let shrinking = (width / near).ln()
+            / (strobe.pendulum.damping_rate() * strobe.pendulum.period()).max(LEAST_SHRINKING);
+        let mut elsewhere = None;
+        for _ in 0..RETURNS + (PATIENCE * shrinking) as usize / RETURNS {
+            // Lengths agree, so this cannot fail.
+            let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, RETURNS);
+            let far = theta.iter().zip(&velocity).map(|(theta, v)| self.distance([*theta, *v]));
+            // False too of what is not a number.
+            let far = far.filter(|distance| !(*distance < near));
+            elsewhere = far.min_by(f64::total_cmp);
+            elsewhere?;
+        }
+        elsewhere
     }
 }
 

@@ -12,6 +12,9 @@ use crate::integrate::{State, Strobe};
 /// classified as chaotic.
 const LEAST_DECAY: f64 = 20.0;
 
+/// Trajectories that are observed between two reports of progress.
+const OBSERVED: usize = 64;
+
 /// Observation of chaos that another attractor could end: trajectories, and periods of each. A transient
 /// ends at a constant rate, so that only their product counts.
 const STAYING: (usize, u32) = (32, 2500);
@@ -42,18 +45,21 @@ impl Catalogue {
         if sample.is_empty() || strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
             return;
         }
-        let Some(runs) =
-            chaos::observed(strobe, &self.traps, &sample, length, &self.effort, cancel)
-        else {
-            return;
-        };
+        let mut runs = Vec::with_capacity(sample.len());
+        for part in sample.chunks(OBSERVED) {
+            let all = sample.len() * length as usize;
+            self.progress.show(runs.len() * length as usize, all);
+            let observed = chaos::observed(strobe, &self.traps, part, length, &self.effort, cancel);
+            let Some(observed) = observed else { return };
+            runs.extend(observed);
+        }
         for (place, run) in places.into_iter().zip(&runs) {
             endings[place] = self.ending(run.fate, run.state);
         }
         if runs.iter().all(|run| run.fate != Fate::Open) {
             return;
         }
-        if self.find_cycles(strobe, &self.map(strobe), &open(endings), cancel) {
+        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel) {
             // They have settled by now.
             return self.watch(strobe, endings, bound, cancel);
         }

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bounds::{max_periods, search_periods};
+use super::bounds::{chaos_periods, max_periods, search_periods, settling_periods};
 use super::control::Control;
 use super::finite_time::{FiniteTime, finite_time};
 use super::label::{Labels, UNDECIDED, label};
@@ -144,11 +144,12 @@ impl Plan {
         }
         let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
         let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, simd)?;
-        let searched = search_periods(pendulum);
+        let searched = search_periods(pendulum, options.max_periods);
         let mut catalogue = known.map_or_else(
             || Catalogue::new(&strobe, Effort::THOROUGH),
             |known| known.catalogue.continued(&strobe, searched, control.flag()),
         );
+        catalogue.progress = control.shared();
         let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
         let endings = catalogue.endings(&strobe, &seeds, searched, control.flag());
         control.check()?;
@@ -251,13 +252,13 @@ impl Plan {
         }
         self.facts.further += 1;
         let before: Vec<[u64; 2]> = self.catalogue.attractors.iter().map(Attractor::mark).collect();
-        let searched = search_periods(&self.strobe.pendulum);
-        let most = self.most_periods();
+        let searched = search_periods(&self.strobe.pendulum, self.facts.given);
+        self.catalogue.progress = control.shared();
         if self.catalogue.search(&self.strobe, open, searched, control.flag()) {
             self.facts.bound = self.settling_bound().max(self.facts.bound);
-        } else if self.facts.bound < most {
+        } else if self.facts.bound < self.most_periods() {
             // The remaining starts are integrated up to the whole bound.
-            self.facts.bound = most;
+            self.facts.bound = self.most_periods();
         } else {
             return Ok(None);
         }
@@ -288,18 +289,27 @@ impl Plan {
         moved
     }
 
-    fn most_periods(&self) -> u32 {
-        self.facts.given.unwrap_or_else(|| max_periods(&self.strobe.pendulum)).max(1)
+    /// Periods without capture after which a trajectory is classified as chaotic.
+    #[must_use]
+    pub fn chaos_bound(&self) -> u32 {
+        chaos_periods(&self.strobe.pendulum, self.facts.given)
     }
 
-    /// Periods after which a start is undecided, with the attractors known by now.
+    /// Periods after which starts that are undecided at first are so at last, with the attractors known by now.
+    fn most_periods(&self) -> u32 {
+        let pendulum = &self.strobe.pendulum;
+        let slowest = self.catalogue.slowest();
+        self.facts.given.unwrap_or_else(|| settling_periods(pendulum, slowest)).max(1)
+    }
+
+    /// Periods after which a start is undecided at first.
     fn settling_bound(&self) -> u32 {
-        let most = self.most_periods();
+        let most = self.facts.given.unwrap_or_else(|| max_periods(&self.strobe.pendulum)).max(1);
         if !self.catalogue.has_chaos() || self.facts.given.is_some() {
             most
         } else if self.catalogue.longest_settle == 0 {
             // There are several chaotic sets only: no settling time to derive a bound from.
-            search_periods(&self.strobe.pendulum)
+            search_periods(&self.strobe.pendulum, None)
         } else {
             (PATIENCE * self.catalogue.longest_settle).clamp(LEAST_BOUND, most)
         }

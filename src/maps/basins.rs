@@ -4,7 +4,6 @@ use super::basin_entropy::{Texture, texture};
 use super::basin_plan::{EACH, FURTHER_SAMPLE};
 pub use super::basin_plan::{Labelling, Options, Plan};
 use super::boundary_distance::Thinned;
-use super::bounds::chaos_periods;
 use super::control::{Control, pool};
 use super::finite_time::FiniteTime;
 use super::label::Labels;
@@ -132,7 +131,7 @@ pub fn basins(
         steps: plan.facts.steps,
         reached_error: plan.facts.reached_error,
         bound: plan.facts.bound,
-        chaos_bound: chaos_periods(pendulum),
+        chaos_bound: plan.chaos_bound(),
         simd: plan.strobe.simd,
         labels,
     };

@@ -6,10 +6,12 @@ use super::cell::{Cell, LIKE};
 use super::control::{Control, pool};
 use super::parameter_map::{ParameterMap, Plane, Range, Request as MapRequest, parameter_map};
 use crate::attractor::Attractor;
+use crate::attractor::rest::standing;
 use crate::attractor::trap::Band;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
+use crate::orbit::PoincareMap;
 use crate::orbit::rotation::running_states;
 
 /// Number of points stored of a non-periodic attractor.
@@ -171,9 +173,11 @@ impl Follow<'_> {
         // Without drive a running state is not synchronous with the section: its band traps it.
         let runs = cell.found.iter().any(|f| f.attractor.is_running());
         let states = if runs { running_states(&strobe.pendulum) } else { Vec::new() };
+        let apart =
+            if runs { standing(strobe, &PoincareMap::of_steps(strobe)) } else { Vec::new() };
         let running: Vec<(i64, Band)> = states
             .iter()
-            .filter_map(|one| Some((one.sense, Band::around(strobe, &one.curve, 0)?)))
+            .filter_map(|one| Some((one.sense, Band::around(strobe, &one.curve, 0, &apart)?)))
             .collect();
         let rates = cell.found.iter().map(|f| -f.attractor.exponent).filter(|rate| *rate > 0.0);
         let slowest = rates.fold(f64::INFINITY, f64::min);

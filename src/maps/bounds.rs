@@ -47,15 +47,24 @@ pub fn cell_periods(pendulum: &Pendulum) -> u32 {
     shrinking(pendulum, decay, least)
 }
 
-/// Periods after which a search begins to observe uncaptured trajectories, independent of the
-/// starts' bound: so is the classification as chaotic.
+/// Periods after which a start is undecided where the slowest attractor known has this rate: those in which a deviation
+/// shrinks at that `rate` by `exp(-DECAY)`, if free motion does not take longer.
 #[must_use]
-pub fn search_periods(pendulum: &Pendulum) -> u32 {
-    max_periods(pendulum) / SEARCHED
+pub fn settling_periods(pendulum: &Pendulum, rate: Option<f64>) -> u32 {
+    let least = max_periods(pendulum);
+    rate.map_or(least, |rate| decay_periods(pendulum, rate, least, None))
+}
+
+/// Periods after which a search begins to observe uncaptured trajectories. A bound `given` for the starts is one for
+/// the search too, which no bound makes shorter than usual damping does: what is called chaos is watched for as long.
+#[must_use]
+pub fn search_periods(pendulum: &Pendulum, given: Option<u32>) -> u32 {
+    let most = given.map_or(u32::MAX, |given| given.max(LEAST / SEARCHED));
+    (max_periods(pendulum) / SEARCHED).min(most)
 }
 
 /// Periods without capture after which a trajectory is classified as chaotic.
 #[must_use]
-pub fn chaos_periods(pendulum: &Pendulum) -> u32 {
-    search_periods(pendulum) * (1 + Effort::THOROUGH.watch)
+pub fn chaos_periods(pendulum: &Pendulum, given: Option<u32>) -> u32 {
+    search_periods(pendulum, given) * (1 + Effort::THOROUGH.watch)
 }

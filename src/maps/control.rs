@@ -1,15 +1,16 @@
 //! Progress and cancellation of a long computation, and its threads.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
+use crate::progress::Progress;
 
 /// Progress and cancellation, shared between threads.
 #[derive(Debug, Default)]
 pub struct Control {
     cancel: AtomicBool,
-    done: AtomicUsize,
-    total: AtomicUsize,
+    progress: Arc<Progress>,
 }
 
 impl Control {
@@ -24,21 +25,26 @@ impl Control {
         &self.cancel
     }
 
-    /// Done and total, in cells.
+    /// Done and total, in cells; of a search for attractors in periods.
     #[must_use]
     pub fn progress(&self) -> (usize, usize) {
-        (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed))
+        self.progress.read()
+    }
+
+    /// The progress that a search for attractors reports.
+    #[must_use]
+    pub fn shared(&self) -> Arc<Progress> {
+        Arc::clone(&self.progress)
     }
 
     /// Begins a part of `total` cells.
     pub fn begin(&self, total: usize) {
-        self.done.store(0, Ordering::Relaxed);
-        self.total.store(total, Ordering::Relaxed);
+        self.progress.show(0, total);
     }
 
     /// Adds `count` finished cells.
     pub fn add(&self, count: usize) {
-        self.done.fetch_add(count, Ordering::Relaxed);
+        self.progress.add(count);
     }
 
     /// # Errors

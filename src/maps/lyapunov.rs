@@ -6,7 +6,7 @@
 //! that captures it.
 
 use super::basin_plan::SEARCH_SAMPLE;
-use super::bounds::{chaos_periods, max_periods, search_periods};
+use super::bounds::{chaos_periods, max_periods, search_periods, settling_periods};
 use super::control::{Control, pool};
 use super::ensemble::{Ensemble, NEAR, ROUND, Run};
 use super::starts::{Axis, Starts};
@@ -131,7 +131,7 @@ pub fn lyapunov(
         lost: 0,
         growth: Vec::new(),
         bound,
-        chaos_bound: chaos_periods(pendulum),
+        chaos_bound: chaos_periods(pendulum, request.max_periods),
         steps: strobe.steps(),
         reached_error,
         simd,
@@ -162,26 +162,22 @@ impl Run<'_> {
         max_periods: Option<u32>,
         result: &mut Exponent,
     ) -> Result<(), Error> {
+        let pendulum = &self.strobe.pendulum;
+        let searched = search_periods(pendulum, max_periods);
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
-        catalogue.search(
-            self.strobe,
-            seeds,
-            search_periods(&self.strobe.pendulum),
-            self.control.flag(),
-        );
+        catalogue.progress = self.control.shared();
+        catalogue.search(self.strobe, seeds, searched, self.control.flag());
         self.control.check()?;
         let (mut fate, mut periods) = self.follow(trajectory, &catalogue, result.bound)?;
         let mut home = self.home(trajectory, &catalogue, fate);
         if fate == Fate::Open && home.is_none() {
             // An attractor that the search has not found: it is repeated from the present state.
             let here: Vec<State> = trajectory.states.last().copied().into_iter().collect();
-            catalogue.search(
-                self.strobe,
-                &here,
-                search_periods(&self.strobe.pendulum),
-                self.control.flag(),
-            );
+            catalogue.search(self.strobe, &here, searched, self.control.flag());
             self.control.check()?;
+            if max_periods.is_none() {
+                result.bound = settling_periods(pendulum, catalogue.slowest());
+            }
             (fate, periods) = self.follow(trajectory, &catalogue, result.bound)?;
             home = self.home(trajectory, &catalogue, fate);
         }
@@ -274,12 +270,8 @@ impl Run<'_> {
             .map(|(_, end)| *end)
             .collect();
         if !suspects.is_empty() {
-            catalogue.search(
-                self.strobe,
-                &suspects,
-                search_periods(&self.strobe.pendulum),
-                self.control.flag(),
-            );
+            let searched = search_periods(&self.strobe.pendulum, None);
+            catalogue.search(self.strobe, &suspects, searched, self.control.flag());
         }
         let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());
         let found = found.ok_or(Error::Interrupted)?;

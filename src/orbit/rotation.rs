@@ -19,6 +19,8 @@ type Number = Tangent<f64, 2>;
 const STEP: f64 = 0.02;
 const MOST_STEPS: usize = 200_000;
 const RESIDUAL: f64 = 1e-12;
+/// Largest deviation of the section map's derivative from what the damping gives it.
+const SLOPE: f64 = 1e-6;
 /// No search begins at a higher velocity than this and a little.
 const FASTEST: f64 = 200.0;
 
@@ -150,7 +152,8 @@ pub fn running_states(pendulum: &Pendulum) -> Vec<Rotation> {
         _ => (-pendulum.gamma * end.time).exp(),
     };
     let closed = (end.velocity - velocity).abs() < RESIDUAL * velocity.abs().max(1.0);
-    if !closed || (end.slope / exact - 1.0).abs() > 1e-6 {
+    // Where the pendulum nearly stands still on its way, the multiplier is less than rounding leaves of the slope.
+    if !closed || (end.slope - exact).abs() > SLOPE {
         return Vec::new();
     }
     vec![Rotation { velocity, period: end.time, multiplier: exact, sense: sense as i64, curve }]

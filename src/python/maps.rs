@@ -6,7 +6,6 @@ use pendmap::maps::basin_entropy::{Texture as Entropies, TextureSum as Sum, text
 use pendmap::maps::basin_plan::{Labelling, Options, Plan};
 use pendmap::maps::basins::{LEAST_CELLS, ends};
 use pendmap::maps::boundary_distance::Thinned;
-use pendmap::maps::bounds::chaos_periods;
 use pendmap::maps::control::pool;
 use pendmap::maps::finite_time::FiniteTime;
 use pendmap::maps::label::Labels;
@@ -225,7 +224,7 @@ impl BasinPlan {
 
     #[getter]
     fn chaos_bound(&self) -> u32 {
-        chaos_periods(&self.plan.strobe.pendulum)
+        self.plan.chaos_bound()
     }
 
     #[getter]

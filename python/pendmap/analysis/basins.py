@@ -171,8 +171,10 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     max_periods : int, optional
         Periods after which a start is undecided; by default those in which damping shrinks a free
         motion by exp(-200), ``400 / (gamma T)``, from 4000 to a million; with dry friction
-        ``theta_r`` adds to ``gamma``. Where chaos coexists with other attractors ten times the
-        longest settling time seen.
+        ``theta_r`` adds to ``gamma``. Undecided starts are followed for ``200 / (abs(lambda) T)``
+        where ``lambda``, the exponent of the slowest attractor found, makes that longer. Where
+        chaos coexists with other attractors ten times the longest settling time seen. A bound
+        that is given is one for the search for attractors too, from 1000 periods on.
     layer_periods : int, optional
         Periods of the finite-time layers; by default those in which an exponent stretches one cell
         to the size of the plane.

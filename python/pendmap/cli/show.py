@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 
 _LONG: Final = 60.0  # Time left that is worth a line, s
-_SOON: Final = (3.0, 0.05)  # Time, s, and share of the work from which on both tell the rest
-_LATE: Final = (10.0, 1e-4)  # Likewise for long work: later, and less of it
+_SOON: Final = (3.0, 1e-4)  # Time, s, and share of the work from which on both tell the rest
+_LONGER: Final = 2.0  # Ratio of a new time to the one told that is worth another line
 
 
 class Forecast:
@@ -52,24 +52,27 @@ class Forecast:
         self._say, self._clock = say, clock
         self._began = self._since = clock()
         self._total, self._first, self._done = 0, 0, 0
-        self._said = False
+        self._whole = 0.0
 
     def report(self, done: int, total: int) -> None:
-        """Take units of work done and in total; tell the time once, if it is more than a minute."""
+        """Take units of work done and in total; tell the time if it is more than a minute.
+
+        It is told again where a later part of the computation makes it much longer.
+        """
         now = self._clock()
         if total != self._total or done < self._done:
             self._since, self._total, self._first = now, total, done
         self._done = done
-        if self._said or total <= 0:
+        if total <= 0:
             return
         passed, share = now - self._since, (done - self._first) / total
-        enough = any(passed >= seconds and share >= part for seconds, part in (_SOON, _LATE))
-        if not enough:
+        if passed < _SOON[0] or share < _SOON[1]:
             return
         left = passed * (total - done) / (done - self._first)
-        if left > _LONG:
-            self._said = True
-            self._say(f"This takes about {duration(now - self._began + left)}.")
+        whole = now - self._began + left
+        if left > _LONG and whole > _LONGER * self._whole:
+            self._whole = whole
+            self._say(f"This takes about {duration(whole)}.")
 
 
 _FIELDS: Final = {

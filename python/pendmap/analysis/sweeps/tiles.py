@@ -16,6 +16,7 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.analysis.fractality import uncertainty_exponent
+from pendmap.analysis.numerics import part
 from pendmap.analysis.varied import with_values
 from pendmap.engine import Tile, pack, unpack
 from pendmap.errors import InputError, core_errors
@@ -137,16 +138,13 @@ class SweepTiles:
         places, plan = self.places(tile), None
         maps: list[_Map] = []
         for k, place in enumerate(places):
-
-            def report(done: int, total: int, k: int = k) -> None:
-                if progress is not None:
-                    progress(k * max(total, 1) + done, len(places) * max(total, 1))
-
-            report(0, 1)
+            search, labels = (part(progress, 2 * k + own, 2 * len(places)) for own in (0, 1))
+            if search is not None:
+                search(0, 1)
             one, model = _Map((self.axes[1][2], self.axes[0][2])), self.model(place)
             with core_errors():
-                plan = _core.BasinPlan(model, self.axes, self.choices, None, report, plan)
-                one.take(plan, report, check=self.choices["check"] and k == 0)
+                plan = _core.BasinPlan(model, self.axes, self.choices, None, search, plan)
+                one.take(plan, labels, check=self.choices["check"] and k == 0)
             maps.append(one)
         return Tile(_packed(maps))
 

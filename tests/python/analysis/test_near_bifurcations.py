@@ -1,0 +1,86 @@
+"""Near bifurcations: no attractor takes the starts of another, and slow ones are waited for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pendmap
+from pendmap import Grid, Pendulum
+
+GRID = Grid.square(14)
+
+
+def rotating(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Return which starts rotate in the end, by scipy."""
+    n = theta.size
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        pull = 1 + pendulum.p * math.cos(pendulum.omega * t)
+        acceleration = pendulum.torque - pendulum.gamma * y[n:] - pull * np.sin(y[:n])
+        return np.concatenate([y[n:], acceleration])
+
+    y = np.concatenate([theta, velocity])
+    run = solve_ivp(slope, (0, 700), y, method="DOP853", rtol=1e-7, atol=1e-7, t_eval=[500, 700])
+    return np.abs(run.y[:n, 1] - run.y[:n, 0]) > math.tau
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rest_near_its_saddle_node_keeps_its_starts(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    torque = (1 - 10 ** draw.uniform(-3.5, -1.5)) * (-1) ** seed
+    p, gamma = (0.0, 0.01)[seed // 2], draw.uniform(0.4, 1.0)
+    pendulum = Pendulum(gamma=gamma, p=p, omega=draw.uniform(1.5, 2.5), torque=torque)
+    found = pendmap.basins(pendulum, GRID, check=False)
+    theta, velocity = np.meshgrid(found["theta"].values, found["velocity"].values)
+    truth = rotating(pendulum, theta.ravel(), velocity.ravel())
+    turns = found["id"].values[found["kind"].str.contains("rotation").values]
+    assert 0 < truth.sum() < truth.size
+    assert found["undecided"].item() == 0
+    assert np.array_equal(np.isin(found["label"].values.ravel(), turns), truth)
+
+
+@pytest.mark.parametrize(("gamma", "torque"), [(1.1, 0.99995), (0.9, -0.96), (1.5, 1.0001)])
+def test_a_rotation_that_nearly_stands_still_is_found(gamma: float, torque: float) -> None:
+    found = pendmap.basins(Pendulum(gamma=gamma, p=0.0, torque=torque), GRID, check=False)
+    assert "rotation" in found["kind"].values
+    assert found["undecided"].item() == 0
+
+
+def test_a_slow_attractor_is_waited_for() -> None:
+    pendulum = Pendulum(gamma=0.1, p=1.25893, omega=2.0)
+    found = pendmap.basins(pendulum, Grid.square(12), check=False)
+    slowest = np.abs(found["exponent"].values).min()
+    assert found["undecided"].item() == 0
+    assert found.attrs["max_periods"] == math.ceil(200 / (slowest * pendulum.period))
+    bounded = pendmap.basins(pendulum, Grid.square(12), check=False, max_periods=3000)
+    assert bounded.attrs["max_periods"] == 3000
+    assert bounded["undecided"].item() > 0.1
+
+
+def test_a_bound_that_is_given_bounds_the_search() -> None:
+    pendulum = Pendulum(gamma=1e-4, p=0.5, omega=2.0)
+    found = pendmap.basins(pendulum, Grid.square(4), check=False, max_periods=1200)
+    assert found.attrs["max_periods"] == 1200
+    assert found.attrs["chaos_bound"] == 5 * 1200
+    assert found["undecided"].item() == 1.0
+    usual = pendmap.basins(Pendulum(p=2.0), Grid.square(4), check=False, max_periods=10)
+    assert usual.attrs["chaos_bound"] == 5000
+
+
+def test_a_long_search_reports_its_progress() -> None:
+    reports: list[tuple[int, int]] = []
+
+    class StopError(Exception):
+        """Ends the computation."""
+
+    def progress(done: int, total: int) -> None:
+        reports.append((done, total))
+        if 0 < done < total:
+            raise StopError
+
+    with pytest.raises(StopError):
+        pendmap.basins(Pendulum(gamma=1e-4, p=0.3), Grid.square(4), progress=progress)
