@@ -42,6 +42,13 @@ RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 
 
+def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the attractors with their shares of the starts for the JSON object."""
+    found = orbit_table.objects(dataset, "attractor", "fraction", "stderr")
+    ends = result.binomial_ci95(dataset["fraction"].values, int(dataset.attrs["cells"])).tolist()
+    return [{**one, "ci95": own} for one, own in zip(found, ends, strict=True)]
+
+
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
     a = facts(dataset)
@@ -66,7 +73,7 @@ SCHEMA = Schema(
         "attractors",
         "",
         "attractors with their shares of the starts",
-        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr"),
+        read=_attractors,
     ),
     Found("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Found("failed", "1", "share of the starts that failed or diverged"),
@@ -396,12 +403,10 @@ def _complete(
     """Add the table of attractors, all facts and the summary to the cells."""
     count, attractors = dataset["label"].size, raw.attractors
     fraction = np.array([a.fraction for a in attractors], dtype=float)
-    stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))
     dataset = dataset.assign(
         {
             **orbit_table.table(attractors, model.units, "attractor"),
-            "fraction": variable("attractor", fraction, "1", "share of the starts"),
-            "stderr": variable("attractor", stderr, "1", "standard error of the share"),
+            **result.shares(("attractor",), fraction, count),
         }
     )
     values = {

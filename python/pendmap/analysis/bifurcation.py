@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import cell_search, result, varied
+from pendmap.analysis import cell_search, constant_drive, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
 from pendmap.analysis.stored import Kept
@@ -92,7 +92,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float, int) or array_like
-        One parameter; as for :func:`pendmap.parameter_map`.
+        One parameter; as for :func:`pendmap.parameter_map`. Several with arrays are a curve.
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
@@ -151,12 +151,13 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset = _dataset(raw, axis, units)
         values = {
             **search.attributes(raw, units),
+            **constant_drive.kept(pendulum, (axis,)),
             "varied": axis.name,
             "points": dataset.sizes["point"],
         }
         SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
         dataset.attrs["title"] = varied.title(pendulum, axis)
-        lines = [*_summary(dataset), *varied.without_damping(pendulum, axis)]
+        lines = [*_summary(dataset), *varied.remarks(pendulum, axis)]
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
@@ -223,6 +224,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
+    lines.append(cell_search.missed(a, values.size, "value"))
     lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():

@@ -193,6 +193,14 @@ def evenly(values: Floats) -> bool:
 
 def ascending(name: str, given: ArrayLike) -> Floats:
     """Return values of a parameter as an array; each must be greater than the one before."""
+    values = numbers_of(name, given)
+    if not (np.diff(values) > 0).all():
+        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
+    return values
+
+
+def numbers_of(name: str, given: ArrayLike) -> Floats:
+    """Return values of a parameter as an array."""
     try:
         values = np.atleast_1d(np.array(given, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
@@ -201,8 +209,6 @@ def ascending(name: str, given: ArrayLike) -> Floats:
         raise InputError(
             f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
         )
-    if not (np.diff(values) > 0).all():
-        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
     return values
 
 

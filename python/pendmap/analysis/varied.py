@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis.grid import ascending, coordinate, evenly
+from pendmap.analysis import constant_drive
+from pendmap.analysis.grid import ascending, coordinate, evenly, numbers_of
 from pendmap.analysis.result import variable
 from pendmap.errors import (
     MOST_CELLS,
@@ -26,7 +28,7 @@ from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike
@@ -51,11 +53,20 @@ class Varied:
     """Unit of the values; empty where they have none."""
     meaning: str
     """Meaning of the parameter."""
+    along: tuple[Varied, ...] = ()
+    """Parameters that vary with it, on the same dimension."""
+    derived: bool = False
+    """Whether it follows from a constant stroke; a factor of ``p`` of another axis has no name."""
 
     @property
-    def kernel(self) -> tuple[str, list[float]]:
-        """Name and values as passed to the core."""
-        return self.parameter, self.bare.tolist()
+    def every(self) -> tuple[Varied, ...]:
+        """All parameters of the dimension."""
+        return (self, *self.along)
+
+    @property
+    def kernel(self) -> list[tuple[str, list[float]]]:
+        """Names and values as passed to the core."""
+        return [(one.parameter, one.bare.tolist()) for one in self.every]
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -64,17 +75,18 @@ class Varied:
 
     @property
     def coordinates(self) -> dict[str, Any]:
-        """Coordinate of a dataset; with more than one value also their bounds."""
+        """Coordinates of a dataset; those of several values of the first also have bounds."""
         x = self.values
+        more = {one.name: (self.name, one.values, one.attributes) for one in self.along if one.name}
         if x.size == 1:
-            return {self.name: (self.name, x, self.attributes)}
+            return {self.name: (self.name, x, self.attributes), **more}
         if self.even:
             half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
             edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
         else:
             middle = 0.5 * (x[1:] + x[:-1])
             edges = np.array([2 * x[0] - middle[0], *middle, 2 * x[-1] - middle[-1]])
-        return coordinate(self.name, x, edges, **self.attributes)
+        return {**coordinate(self.name, x, edges, **self.attributes), **more}
 
     @property
     def even(self) -> bool:
@@ -83,19 +95,22 @@ class Varied:
 
     @property
     def replaced(self) -> tuple[str, ...]:
-        """Names of the model's own parameter that this one replaces."""
-        return self.parameter, COUNTERPARTS.get(self.parameter, ("",))[0]
+        """Names of the model's own parameters that these replace."""
+        names = [one.parameter for one in self.every]
+        return (*names, *(COUNTERPARTS[name][0] for name in names if name in COUNTERPARTS))
 
 
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` parameters that vary.
+    """Return the ``count`` axes along which parameters vary.
 
-    A tuple has the first value, the last and their number; anything else is an array of values.
+    A tuple has the first value, the last and their number; a mapping has arrays of one length, one
+    axis of several parameters; anything else is an array of values.
     """
-    if not isinstance(ranges, dict) or len(ranges) != count:
-        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+    curves = _curves(ranges, count)
+    if len(curves) != count:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
         options = " ".join(f"--{name} {low:g}:{high:g}:{n}" for name, (low, high, n) in few.items())
@@ -103,32 +118,52 @@ def varied(
             f"ranges must be a mapping like {few}, or on the command line {options}; "
             f"got {given or 'nothing'}"
         )
-    found = tuple(_one(model, name, given) for name, given in ranges.items())
+    found = tuple(_axis(model, curve) for curve in curves)
+    first: dict[str, str] = {}
+    for one in (one for axis in found for one in axis.every):
+        if one.parameter in first:
+            both = f"{first[one.parameter]} and {one.name}"
+            raise InputError(f"{both} must be two parameters, they are one")
+        first[one.parameter] = one.name
+    found = constant_drive.with_stroke(model, found)
     pendulum, _ = without_dimensions(model)
     for axis in found:
-        for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
-            try:
-                with_values(pendulum, {axis.parameter: float(bare)})
-            except InputError as error:
-                units = "" if value == bare else f" (without dimensions, w0 is {model.units.w0:g})"
-                raise InputError(f"{axis.name} = {value:g}: {error}{units}") from None
-    if len({one.parameter for one in found}) < len(found):
-        raise InputError(
-            f"{found[0].name} and {found[1].name} must be two parameters, they are one"
-        )
-    if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
-        raise InputError(
-            "stroke_mm and a frequency must not both vary: vary p = Y Omega^2 / g instead"
-        )
+        for one in axis.every:
+            for at in dict.fromkeys((int(one.bare.argmin()), int(one.bare.argmax()))):
+                value, bare = one.values[at], one.bare[at]
+                try:
+                    with_values(
+                        pendulum, {own.parameter: float(own.bare[at]) for own in axis.every}
+                    )
+                except InputError as error:
+                    where = f" (without dimensions, w0 is {model.units.w0:g})"
+                    units = "" if value == bare else where
+                    raise InputError(f"{one.name} = {value:g}: {error}{units}") from None
     return found
+
+
+def _curves(ranges: object, count: int) -> list[dict[str, Any]]:
+    """Return names and values of the parameters of each axis."""
+    if not isinstance(ranges, Mapping):
+        return []
+    curves = [
+        dict(own) if isinstance(own, Mapping) else {name: own} for name, own in ranges.items()
+    ]
+    if count == 1 and not any(isinstance(own, tuple | Mapping) for own in ranges.values()):
+        curves = [dict(ranges)]
+    return [curve for curve in curves if curve]
 
 
 def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """Return ranges as a request to a store has them: tuples as given, arrays as lists."""
-    return {
-        axis.name: own if isinstance(own, tuple) else axis.values.tolist()
-        for axis, own in zip(axes, ranges.values(), strict=True)
-    }
+    found: dict[str, Any] = {}
+    for axis in axes:
+        every = {one.name: one.values.tolist() for one in axis.every if not one.derived}
+        own = ranges.get(axis.name)
+        found[axis.name] = own if isinstance(own, tuple) else every[axis.name]
+        if len(every) > 1:
+            found[axis.name] = every
+    return found
 
 
 def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum | Rig:
@@ -140,14 +175,23 @@ def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum |
         for one in effects()
         if one.name not in there and len(one.parameters) == 1 and one.parameters[0].name not in own
     }
-    new = (lacking[name] for name in ranges if name in lacking) if isinstance(ranges, dict) else ()
+    names = [name for curve in _curves(ranges, 0) for name in curve]
+    new = (lacking[name] for name in names if name in lacking)
     return dataclasses.replace(model, effects=(*model.effects, *new))
 
 
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
     """Return one line: the ranges of the parameters that vary, and the other parameters."""
-    spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
-    rest = title_without(model, *(a.parameter for a in axes))
+    every = [one for axis in axes for one in axis.every]
+    spans = [
+        f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip()
+        for a in every
+        if not a.derived
+    ]
+    stroke = constant_drive.kept(model, axes)["stroke_mm"]
+    if stroke is not None:
+        spans[-1] += f" at the constant stroke {stroke:g} mm"
+    rest = title_without(model, *(a.parameter for a in every))
     return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
 
 
@@ -161,10 +205,15 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
     return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
 
 
-def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+def remarks(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+    """Return summary lines on what of the drive is constant, and on a lack of damping."""
+    return [*constant_drive.summary(model, axes), *_without_damping(model, axes)]
+
+
+def _without_damping(model: Pendulum | Rig, axes: Sequence[Varied]) -> list[str]:
     """Return a summary line if some of the pendulums have no damping, hence no attractors."""
     pendulum, _ = without_dimensions(model)
-    least = {axis.parameter: float(axis.bare[0]) for axis in axes}
+    least = {one.parameter: float(one.bare.min()) for axis in axes for one in axis.every}
     if any(effect.brakes for effect in model.effects):
         return []
     if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
@@ -172,7 +221,23 @@ def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
 
 
-def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN401
+def _axis(model: Pendulum | Rig, curve: Mapping[str, Any]) -> Varied:
+    """Return the parameters of one dimension, the first of them ascending."""
+    (name, values), *others = curve.items()
+    first = _one(
+        model, name, _values(name, values) if isinstance(values, tuple) else ascending(name, values)
+    )
+    along = []
+    for other, array in others:
+        one = _one(model, other, numbers_of(other, array))
+        if one.values.size != first.values.size:
+            as_many = f"as many values as {name}, {first.values.size}"
+            raise InputError(f"{other} must have {as_many}, got {one.values.size}")
+        along.append(one)
+    return dataclasses.replace(first, along=tuple(along))
+
+
+def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     # Name in the core, factor and power of w0 of each quantity.
@@ -182,8 +247,7 @@ def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN40
             si, power = COUNTERPARTS[bare]
             own[si] = (bare, 1.0, power)
         own["frequency_hz"] = ("omega", math.tau, 1)
-        if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
-            own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
+        own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
     if name not in own and name not in shared:
@@ -192,11 +256,10 @@ def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN40
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
             f"{_of_effect(name)}"
         )
-    values = _values(name, given) if isinstance(given, tuple) else ascending(name, given)
     if name in own:
         bare, factor, power = own[name]
         if name in {"frequency_hz", "stroke_mm"}:
-            check(name, values[0])
+            check(name, values.min())
         plain = units.bare(factor * values, power)
         # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")
