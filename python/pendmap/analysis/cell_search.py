@@ -201,12 +201,11 @@ def shares(
 
 def missed(attributes: Mapping[str, Any], cells: int, cell: str) -> str:
     """Return a summary line on the attractors that the starts may have missed."""
-    one = f"an attractor with {100 * attributes['missed']:.2g} % of the box"
-    every = 100 * result.missed(attributes["starts"] * cells)
-    line = f"{counted(attributes['starts'], 'start')} a {cell} miss {one} at a chance of 5 %"
-    if cells == 1:
-        return f"{line}."
-    return f"{line}; those of all, which exchange what they find, one with {every:.2g} %."
+    starts, one = attributes["starts"], f"{100 * attributes['missed']:.2g} % of the box"
+    every = (
+        f"those of all, which exchange what they find, {100 * result.missed(starts * cells):.2g} %"
+    )
+    return f"{counted(starts, 'start')} a {cell} may miss attractors with {one}; {every} (95 %)."
 
 
 def chaos(attributes: Mapping[str, Any]) -> list[str]:

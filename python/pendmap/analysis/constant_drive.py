@@ -43,14 +43,11 @@ def summary(model: Pendulum | Rig, axes: Sequence[Varied]) -> list[str]:
     known = kept(model, axes)
     if known["kept"] is None or not isinstance(model, Rig) or model.p == 0:
         return []
-    every = {one.parameter: one for axis in axes for one in axis.every}
     if known["kept"] == "stroke_mm":
-        p = every["p"].values
+        p = next(one.values for axis in axes for one in axis.every if one.parameter == "p")
         said = f"p = Y Omega^2/g is {p.min():.4g} to {p.max():.4g}"
         return [f"The stroke Y = {known['stroke_mm']:.4g} mm is constant: {said}."]
-    strokes = 1e3 * model.p * model.gravity / (model.w0 * every["omega"].bare) ** 2
-    said = f"the stroke Y = p g/Omega^2 is {strokes.max():.4g} to {strokes.min():.4g} mm"
-    return [f"p = {model.p:.4g} is constant, as the model gives it: {said}."]
+    return [f"p = {model.p:.4g} is constant, as the model gives it: the stroke is p g/Omega^2."]
 
 
 def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied, ...]:
@@ -68,26 +65,17 @@ def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied
     apart = varies and not any(one is p for one in own.every)
     scale = {"frequency_hz": math.tau, "omega": model.w0}.get(omega.name, 1.0)
     # Over two axes p is a product: of the stroke in m, and of Omega^2 / g.
-    strokes = [model.given_stroke] * omega.bare.size if p is None else 1e-3 * p.values
-    each = np.ones(omega.bare.size) if apart else strokes
-    both = zip(each, omega.values, strict=True)
+    metres = 1e-3 * p.values if p is not None else np.full(omega.values.size, model.given_stroke)
+    both = zip(np.ones(omega.values.size) if apart else metres, omega.values, strict=True)
     bare = np.array([amplitude(float(y), scale * float(x), model.gravity) for y, x in both])
-    new = {"p": dataclasses.replace(p, bare=strokes if apart else bare)} if p is not None else {}
-    follows = dataclasses.replace(
-        omega,
-        name="" if apart else "p",
-        values=bare,
-        parameter="p",
-        bare=bare,
-        unit="",
-        meaning=LABELS["p"].meaning,
-        along=(),
-        derived=True,
+    new = {} if p is None else {"p": dataclasses.replace(p, bare=metres if apart else bare)}
+    named, follows = (
+        ("" if apart else "p", bare, "p", bare, "", LABELS["p"].meaning),
+        apart or not p,
     )
     found = []
     for axis in axes:
         first, *along = [new.get(one.parameter, one) for one in axis.every]
-        if axis is own and (apart or p is None):
-            along.append(follows)
-        found.append(dataclasses.replace(first, along=tuple(along)))
+        more = [type(omega)(*named, derived=True)] if axis is own and follows else []
+        found.append(dataclasses.replace(first, along=(*along, *more)))
     return tuple(found)

@@ -191,16 +191,8 @@ def evenly(values: Floats) -> bool:
     return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
 
 
-def ascending(name: str, given: ArrayLike) -> Floats:
-    """Return values of a parameter as an array; each must be greater than the one before."""
-    values = numbers_of(name, given)
-    if not (np.diff(values) > 0).all():
-        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
-    return values
-
-
-def numbers_of(name: str, given: ArrayLike) -> Floats:
-    """Return values of a parameter as an array."""
+def ascending(name: str, given: ArrayLike, *, any_order: bool = False) -> Floats:
+    """Return values as an array; each must be greater than the one before, unless in any order."""
     try:
         values = np.atleast_1d(np.array(given, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
@@ -209,6 +201,8 @@ def numbers_of(name: str, given: ArrayLike) -> Floats:
         raise InputError(
             f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
         )
+    if not any_order and not (np.diff(values) > 0).all():
+        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
     return values
 
 

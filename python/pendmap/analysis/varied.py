@@ -11,7 +11,7 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.analysis import constant_drive
-from pendmap.analysis.grid import ascending, coordinate, evenly, numbers_of
+from pendmap.analysis.grid import ascending, coordinate, evenly
 from pendmap.analysis.result import variable
 from pendmap.errors import (
     MOST_CELLS,
@@ -119,26 +119,22 @@ def varied(
             f"got {given or 'nothing'}"
         )
     found = tuple(_axis(model, curve) for curve in curves)
-    first: dict[str, str] = {}
-    for one in (one for axis in found for one in axis.every):
-        if one.parameter in first:
-            both = f"{first[one.parameter]} and {one.name}"
-            raise InputError(f"{both} must be two parameters, they are one")
-        first[one.parameter] = one.name
+    every = [one for axis in found for one in axis.every]
+    first = {one.parameter: one for one in reversed(every)}
+    for one in every:
+        if (same := first[one.parameter]) is not one:
+            raise InputError(f"{same.name} and {one.name} must be two parameters, they are one")
     found = constant_drive.with_stroke(model, found)
     pendulum, _ = without_dimensions(model)
     for axis in found:
         for one in axis.every:
-            for at in dict.fromkeys((int(one.bare.argmin()), int(one.bare.argmax()))):
-                value, bare = one.values[at], one.bare[at]
+            for at in (one.bare.argmin(), one.bare.argmax()):
+                value, units = one.values[at], f" (without dimensions, w0 is {model.units.w0:g})"
                 try:
-                    with_values(
-                        pendulum, {own.parameter: float(own.bare[at]) for own in axis.every}
-                    )
+                    with_values(pendulum, {n: x[at] for n, x in axis.kernel})
                 except InputError as error:
-                    where = f" (without dimensions, w0 is {model.units.w0:g})"
-                    units = "" if value == bare else where
-                    raise InputError(f"{one.name} = {value:g}: {error}{units}") from None
+                    said = f"{error}{'' if value == one.bare[at] else units}"
+                    raise InputError(f"{one.name} = {value:g}: {said}") from None
     return found
 
 
@@ -146,12 +142,10 @@ def _curves(ranges: object, count: int) -> list[dict[str, Any]]:
     """Return names and values of the parameters of each axis."""
     if not isinstance(ranges, Mapping):
         return []
-    curves = [
-        dict(own) if isinstance(own, Mapping) else {name: own} for name, own in ranges.items()
-    ]
     if count == 1 and not any(isinstance(own, tuple | Mapping) for own in ranges.values()):
-        curves = [dict(ranges)]
-    return [curve for curve in curves if curve]
+        ranges = {"": ranges}
+    curves = (own if isinstance(own, Mapping) else {name: own} for name, own in ranges.items())
+    return [dict(curve) for curve in curves if curve]
 
 
 def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
@@ -160,9 +154,8 @@ def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[s
     for axis in axes:
         every = {one.name: one.values.tolist() for one in axis.every if not one.derived}
         own = ranges.get(axis.name)
-        found[axis.name] = own if isinstance(own, tuple) else every[axis.name]
-        if len(every) > 1:
-            found[axis.name] = every
+        one = own if isinstance(own, tuple) else every[axis.name]
+        found[axis.name] = every if len(every) > 1 else one
     return found
 
 
@@ -183,14 +176,8 @@ def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum |
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
     """Return one line: the ranges of the parameters that vary, and the other parameters."""
     every = [one for axis in axes for one in axis.every]
-    spans = [
-        f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip()
-        for a in every
-        if not a.derived
-    ]
-    stroke = constant_drive.kept(model, axes)["stroke_mm"]
-    if stroke is not None:
-        spans[-1] += f" at the constant stroke {stroke:g} mm"
+    ends = ((a, a.values[[0, -1]]) for a in every if a.name)
+    spans = [f"{a.name} = {low:g} to {high:g} {a.unit}".rstrip() for a, (low, high) in ends]
     rest = title_without(model, *(a.parameter for a in every))
     return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
 
@@ -207,33 +194,30 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
 
 def remarks(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     """Return summary lines on what of the drive is constant, and on a lack of damping."""
-    return [*constant_drive.summary(model, axes), *_without_damping(model, axes)]
-
-
-def _without_damping(model: Pendulum | Rig, axes: Sequence[Varied]) -> list[str]:
-    """Return a summary line if some of the pendulums have no damping, hence no attractors."""
+    lines = constant_drive.summary(model, axes)
     pendulum, _ = without_dimensions(model)
     least = {one.parameter: float(one.bare.min()) for axis in axes for one in axis.every}
-    if any(effect.brakes for effect in model.effects):
-        return []
-    if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
-        return []
-    return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
+    damping = [least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")]
+    if not any([*damping, *(effect.brakes for effect in model.effects)]):
+        lines.append(
+            "Without damping (gamma = 0) there are no attractors: such starts stay undecided."
+        )
+    return lines
 
 
 def _axis(model: Pendulum | Rig, curve: Mapping[str, Any]) -> Varied:
-    """Return the parameters of one dimension, the first of them ascending."""
-    (name, values), *others = curve.items()
-    first = _one(
-        model, name, _values(name, values) if isinstance(values, tuple) else ascending(name, values)
-    )
-    along = []
-    for other, array in others:
-        one = _one(model, other, numbers_of(other, array))
-        if one.values.size != first.values.size:
-            as_many = f"as many values as {name}, {first.values.size}"
-            raise InputError(f"{other} must have {as_many}, got {one.values.size}")
-        along.append(one)
+    """Return the parameters of one dimension; the first of a curve rises, or is turned round."""
+    name, given = next(iter(curve.items()))
+    if len(curve) == 1:
+        values = _values(name, given) if isinstance(given, tuple) else ascending(name, given)
+        return _one(model, name, values)
+    arrays = {one: ascending(one, own, any_order=True) for one, own in curve.items()}
+    count, order = arrays[name].size, -1 if arrays[name][0] > arrays[name][-1] else 1
+    for one, own in arrays.items():
+        if own.size != count:
+            raise InputError(f"{one} must have as many values as {name}, {count}, got {own.size}")
+    first, *along = (_one(model, one, own[::order]) for one, own in arrays.items())
+    ascending(name, first.values)
     return dataclasses.replace(first, along=tuple(along))
 
 

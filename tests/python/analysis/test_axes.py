@@ -154,7 +154,7 @@ def test_a_given_p_stays_where_the_frequency_varies() -> None:
     found = pendmap.sweep(fixed, {"frequency_hz": [1.9, 2.3]}, grid=20, check=False)
     assert found.p.values == 0.4
     assert found.attrs["kept"] == "p"
-    assert "p = 0.4 is constant, as the model gives it" in found.attrs["summary"]
+    assert "p = 0.4 is constant, as the model gives it: the stroke" in found.attrs["summary"]
     same_as_alone(found, {"frequency_hz": 1}, dataclasses.replace(fixed, Omega=2.3 * math.tau))
     for ranges in ({"p": [0.2, 0.4]}, {"stroke_mm": [10.0, 20.0]}):
         assert "kept" not in pendmap.bifurcation(fixed, ranges).attrs
@@ -185,14 +185,15 @@ def test_an_axis_may_be_any_curve(tmp_path: Path) -> None:
         same_as_alone(found, {"p": k, "gamma": 1}, one)
     diagram = pendmap.bifurcation(Pendulum(), curve, store=tmp_path / "b.zarr")
     assert diagram.omega.values == pytest.approx(curve["omega"])
-    again = pendmap.bifurcation(Pendulum(), {"c": curve}, store=tmp_path / "b.zarr", resume=True)
+    turned = {name: own[::-1] for name, own in curve.items()}
+    again = pendmap.bifurcation(Pendulum(), {"c": turned}, store=tmp_path / "b.zarr", resume=True)
     assert again.identical(diagram)
     map_ = pendmap.parameter_map(Pendulum(), {"c": curve, "gamma": [0.1]})
     kinds = sorted(map_.kind.values[map_.entry_kind.values])
     assert kinds == sorted(diagram.kind.values[diagram.entry_kind.values])
     for bad, text in (
         ({"p": [0.1, 0.2], "omega": [2.0]}, "omega must have as many values as p, 2, got 1"),
-        ({"p": [0.2, 0.1], "omega": [1, 2]}, "p must be ascending"),
+        ({"p": [0.1, 0.3, 0.2], "omega": [1, 2, 3]}, "p must be ascending"),
         ({"p": [0.1, 0.2], "omega": [1, -2]}, "p = 0.2: omega must be a number above 0, got -2"),
         ({"c": {"p": [1, 2], "omega": np.zeros((2, 2))}}, r"omega must be an array \(N,\)"),
     ):
