@@ -19,7 +19,7 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
-from pendmap.formatting import counted
+from pendmap.formatting import counted, percent
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
@@ -201,11 +201,12 @@ def shares(
 
 def missed(attributes: Mapping[str, Any], cells: int, cell: str) -> str:
     """Return a summary line on the attractors that the starts may have missed."""
-    starts, one = attributes["starts"], f"{100 * attributes['missed']:.2g} % of the box"
-    every = (
-        f"those of all, which exchange what they find, {100 * result.missed(starts * cells):.2g} %"
+    starts = attributes["starts"]
+    one, every = (percent(100 * result.missed(count)) for count in (starts, starts * cells))
+    return (
+        f"{counted(starts, 'start')} a {cell} may miss attractors with {one} of the box, those of "
+        f"all, which exchange what they find, with {every} (95 %)."
     )
-    return f"{counted(starts, 'start')} a {cell} may miss attractors with {one}; {every} (95 %)."
 
 
 def chaos(attributes: Mapping[str, Any]) -> list[str]:

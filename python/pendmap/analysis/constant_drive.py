@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.analysis.result import Field, Found
 from pendmap.errors import InputError
+from pendmap.formatting import span
 from pendmap.model import Rig
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import amplitude
@@ -45,9 +46,9 @@ def summary(model: Pendulum | Rig, axes: Sequence[Varied]) -> list[str]:
         return []
     if known["kept"] == "stroke_mm":
         p = next(one.values for axis in axes for one in axis.every if one.parameter == "p")
-        said = f"p = Y Omega^2/g is {p.min():.4g} to {p.max():.4g}"
-        return [f"The stroke Y = {known['stroke_mm']:.4g} mm is constant: {said}."]
-    return [f"p = {model.p:.4g} is constant, as the model gives it: the stroke is p g/Omega^2."]
+        stroke = span("The stroke Y", *[known["stroke_mm"]] * 2)
+        return [f"{stroke} mm is constant: {span('p', p.min(), p.max())} by p = Y Omega^2/g."]
+    return [f"{span('p', model.p, model.p)} is constant, as the model gives it: not the stroke."]
 
 
 def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied, ...]:
@@ -65,7 +66,8 @@ def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied
     apart = varies and not any(one is p for one in own.every)
     scale = {"frequency_hz": math.tau, "omega": model.w0}.get(omega.name, 1.0)
     # Over two axes p is a product: of the stroke in m, and of Omega^2 / g.
-    metres = 1e-3 * p.values if p is not None else np.full(omega.values.size, model.given_stroke)
+    given = np.full(omega.values.size, model.given_stroke or 0.0)
+    metres = given if p is None else 1e-3 * p.values
     both = zip(np.ones(omega.values.size) if apart else metres, omega.values, strict=True)
     bare = np.array([amplitude(float(y), scale * float(x), model.gravity) for y, x in both])
     new = {} if p is None else {"p": dataclasses.replace(p, bare=metres if apart else bare)}

@@ -11,7 +11,7 @@ from pendmap.analysis import adaptive
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.result import missed, of_model, rows
 from pendmap.files import facts
-from pendmap.formatting import counted, with_error, written
+from pendmap.formatting import counted, percent, with_error, written
 from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.units import TIME, VELOCITY, Units
 
@@ -197,8 +197,8 @@ def bound_said(share: float, starts: int) -> str:
     if 0 < share < 1 or not starts:
         return ""
     most = 100 * missed(starts)
-    least = f"{100 - most:.{max(0, 1 - math.floor(math.log10(most)))}f}"
-    return f", {f'at least {least}' if share else f'at most {most:.2g}'} % of the plane (95 %)"
+    bound = f"at least {written(100 - most, most)} %" if share else f"at most {percent(most)}"
+    return f", {bound} of the plane (95 %)"
 
 
 def _settling(dataset: xr.Dataset) -> list[str]:
