@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis import constant_drive, result, varied
+from pendmap.analysis import along, result, varied
 from pendmap.analysis.basins import choices_of
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweeps.table import Numbers
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
 
@@ -66,7 +66,7 @@ SCHEMA = Schema(
     Found(
         "failed", "1", "share of all starts that failed or diverged", None, variable="failed_share"
     ),
-    *constant_drive.DRIVE,
+    *along.DRIVE,
     *result.TIMED,
     Found("reached_error", "1", "largest error after 5 periods that was reached", None),
     *result.END,
@@ -205,7 +205,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
             **numerics.provenance(),
-            **constant_drive.kept(pendulum, axes),
+            **along.kept(pendulum, axes),
             "analysis": analysis,
             "varied": " ".join(axis.name for axis in axes),
             "models": models,

@@ -42,13 +42,6 @@ RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 
 
-def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the attractors with their shares of the starts for the JSON object."""
-    found = orbit_table.objects(dataset, "attractor", "fraction", "stderr")
-    ends = result.binomial_ci95(dataset["fraction"].values, int(dataset.attrs["cells"])).tolist()
-    return [{**one, "ci95": own} for one, own in zip(found, ends, strict=True)]
-
-
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
     a = facts(dataset)
@@ -73,7 +66,7 @@ SCHEMA = Schema(
         "attractors",
         "",
         "attractors with their shares of the starts",
-        read=_attractors,
+        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr", "ci95"),
     ),
     Found("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Found("failed", "1", "share of the starts that failed or diverged"),

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import cell_search, constant_drive, result, varied
+from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
 from pendmap.analysis.stored import Kept
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Indices, Mask
@@ -151,7 +151,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset = _dataset(raw, axis, units)
         values = {
             **search.attributes(raw, units),
-            **constant_drive.kept(pendulum, (axis,)),
+            **along.kept(pendulum, (axis,)),
             "varied": axis.name,
             "points": dataset.sizes["point"],
         }

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import find_objects, label
 
 from pendmap.analysis import result
-from pendmap.analysis.constant_drive import DRIVE
+from pendmap.analysis.along import DRIVE
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.result import Field, Found, point, variable
 from pendmap.errors import (

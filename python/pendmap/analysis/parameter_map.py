@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import cell_search, constant_drive, result, varied
+from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.numerics import part as progress_part
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
@@ -228,7 +228,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset = _dataset(raw, (columns, rows), units).assign(over)
         values = {
             **search.attributes(raw, units),
-            **constant_drive.kept(pendulum, (columns, rows)),
+            **along.kept(pendulum, (columns, rows)),
             "columns": columns.name,
             "rows": rows.name,
             "cells": columns.values.size * rows.values.size,

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis import constant_drive
-from pendmap.analysis.grid import ascending, coordinate, evenly
-from pendmap.analysis.result import variable
+from pendmap.analysis.along import Varied, drive_said, with_stroke
+from pendmap.analysis.grid import ascending
 from pendmap.errors import (
     MOST_CELLS,
     InputError,
@@ -35,69 +34,6 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum
     from pendmap.signal import Floats
-
-
-@dataclasses.dataclass(frozen=True)
-class Varied:
-    """A parameter and its values: ascending, evenly spaced unless they were listed."""
-
-    name: str
-    """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
-    values: Floats
-    """Values in the units of the parameter."""
-    parameter: str
-    """Name of the parameter in the core."""
-    bare: Floats
-    """The values without dimensions."""
-    unit: str
-    """Unit of the values; empty where they have none."""
-    meaning: str
-    """Meaning of the parameter."""
-    along: tuple[Varied, ...] = ()
-    """Parameters that vary with it, on the same dimension."""
-    derived: bool = False
-    """Whether it follows from a constant stroke; a factor of ``p`` of another axis has no name."""
-
-    @property
-    def every(self) -> tuple[Varied, ...]:
-        """All parameters of the dimension."""
-        return (self, *self.along)
-
-    @property
-    def kernel(self) -> list[tuple[str, list[float]]]:
-        """Names and values as passed to the core."""
-        return [(one.parameter, one.bare.tolist()) for one in self.every]
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of a quantity with these values."""
-        return variable((), 0.0, self.unit or "1", self.meaning)[2]
-
-    @property
-    def coordinates(self) -> dict[str, Any]:
-        """Coordinates of a dataset; those of several values of the first also have bounds."""
-        x = self.values
-        more = {one.name: (self.name, one.values, one.attributes) for one in self.along if one.name}
-        if x.size == 1:
-            return {self.name: (self.name, x, self.attributes), **more}
-        if self.even:
-            half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
-            edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
-        else:
-            middle = 0.5 * (x[1:] + x[:-1])
-            edges = np.array([2 * x[0] - middle[0], *middle, 2 * x[-1] - middle[-1]])
-        return {**coordinate(self.name, x, edges, **self.attributes), **more}
-
-    @property
-    def even(self) -> bool:
-        """Whether the values are evenly spaced."""
-        return evenly(self.values)
-
-    @property
-    def replaced(self) -> tuple[str, ...]:
-        """Names of the model's own parameters that these replace."""
-        names = [one.parameter for one in self.every]
-        return (*names, *(COUNTERPARTS[name][0] for name in names if name in COUNTERPARTS))
 
 
 def varied(
@@ -124,7 +60,7 @@ def varied(
     for one in every:
         if (same := first[one.parameter]) is not one:
             raise InputError(f"{same.name} and {one.name} must be two parameters, they are one")
-    found = constant_drive.with_stroke(model, found)
+    found = with_stroke(model, found)
     pendulum, _ = without_dimensions(model)
     for axis in found:
         for one in axis.every:
@@ -194,7 +130,7 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
 
 def remarks(model: Pendulum | Rig, *axes: Varied) -> list[str]:
     """Return summary lines on what of the drive is constant, and on a lack of damping."""
-    lines = constant_drive.summary(model, axes)
+    lines = drive_said(model, axes)
     pendulum, _ = without_dimensions(model)
     least = {one.parameter: float(one.bare.min()) for axis in axes for one in axis.every}
     damping = [least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")]

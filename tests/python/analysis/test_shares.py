@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING
 
@@ -12,26 +13,35 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from pendmap import Pendulum
-from pendmap.analysis.basins import SCHEMA
-from pendmap.analysis.result import binomial_ci95
 
 if TYPE_CHECKING:
+    from conftest import Run
     from pendmap.signal import Floats
 
 
-def test_a_share_of_all_or_of_none_has_its_binomial_bound() -> None:
-    calm = pendmap.basins(Pendulum(p=14.21, omega=10.0), 30, check=False)
-    known = {a["kind"]: a for a in SCHEMA.json(calm)["attractors"]}
+def test_a_share_of_all_or_of_none_has_its_binomial_bound(pendmap_command: Run) -> None:
+    words = ("basins", "--p", "14.21", "--omega", "10", "--grid", "30", "--json")
+    told = json.loads(pendmap_command(*words).stdout)
+    known = {a["kind"]: a for a in told["attractors"]}
     assert {kind: a["fraction"] for kind, a in known.items()} == {"rest": 1.0, "inverted_rest": 0.0}
     most = 1 - 0.05 ** (1 / 900)
     assert known["inverted_rest"]["ci95"] == pytest.approx([0.0, most])
     assert known["rest"]["ci95"] == pytest.approx([1 - most, 1.0])
-    assert calm.ci95.sel(attractor="rest").values == pytest.approx([1 - most, 1.0])
-    assert "inverted rest: 0.00 % of the starts, at most 0.332 % of the plane" in calm.summary
-    assert "rest: 100.00 % of the starts, at least 99.67 % of the plane" in calm.summary
-    for hits, starts in ((1, 9), (300, 900), (8, 9)):
-        exact = scipy.stats.binomtest(hits, starts).proportion_ci()
-        assert binomial_ci95(hits / starts, starts) == pytest.approx([exact.low, exact.high])
+    text = " ".join(told["summary"])
+    assert "inverted rest: 0.00 % of the starts, at most 0.332 % of the plane (95 %)" in text
+    assert "rest: 100.00 % of the starts, at least 99.67 % of the plane (95 %)" in text
+
+
+def test_intervals_of_shares_are_binomial() -> None:
+    found = pendmap.sweep(Pendulum(), {"p": [0.3, 0.6, 1.0]}, grid=9, check=False)
+    hits = np.rint(81 * found.fraction.values)
+    assert np.count_nonzero((hits > 0) & (hits < 81)) > 4
+    for place in zip(*np.nonzero((hits > 0) & (hits < 81)), strict=True):
+        exact = scipy.stats.binomtest(int(hits[place]), 81).proportion_ci()
+        assert found.ci95.values[place] == pytest.approx([exact.low, exact.high])
+    bounds = {0: [0.0, 1 - 0.05 ** (1 / 81)], 81: [0.05 ** (1 / 81), 1.0]}
+    for place in zip(*np.nonzero((hits == 0) | (hits == 81)), strict=True):
+        assert found.ci95.values[place] == pytest.approx(bounds[int(hits[place])])
 
 
 def test_every_stable_rest_is_listed() -> None:

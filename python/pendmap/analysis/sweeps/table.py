@@ -19,9 +19,9 @@ from pendmap.units import RATE, VELOCITY
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.sweeps.tiles import Mapped, Place
-    from pendmap.analysis.varied import Varied
     from pendmap.units import Units
 
     Maps = Mapping[Place, Mapped]
