@@ -65,7 +65,7 @@ class Diverged(ValueError): ...  # noqa: N818
 __version__: str
 
 _Axis: TypeAlias = tuple[float, float, int]
-_Range: TypeAlias = tuple[str, Sequence[float]]
+_Range: TypeAlias = Sequence[tuple[str, Sequence[float]]]
 _Floats: TypeAlias = NDArray[np.float64]
 _Places: TypeAlias = NDArray[np.int32]
 _Progress: TypeAlias = Callable[[int, int], object]

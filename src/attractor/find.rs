@@ -72,7 +72,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// The attractors known without a search: the running states of an undriven pendulum.
+    /// The attractors known without a search: rests, or the oscillations that a drive makes of them, and the
+    /// running states of an undriven pendulum.
     #[must_use]
     pub fn new(strobe: &Strobe, effort: Effort) -> Self {
         let map = effort.map(strobe);
@@ -98,6 +99,10 @@ impl Catalogue {
             known: Vec::new(),
         };
         empty.rebuild(&strobe.pendulum);
+        if strobe.pendulum.is_dissipative() {
+            let rests = rest::balances(&strobe.pendulum).map(|theta| (vec![[theta, 0.0]], 1));
+            empty.take_over(strobe, &rests, &AtomicBool::new(false));
+        }
         empty
     }
 

@@ -3,6 +3,8 @@
 //! A start's label depends on the plan and on the start alone, so starts may be labelled in any parts, on
 //! any machine, and in any order.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use serde::{Deserialize, Serialize};
 
 use super::bounds::{chaos_periods, max_periods, search_periods, settling_periods};
@@ -15,7 +17,7 @@ use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
 use crate::lanes::InstructionSet;
 use crate::memory;
-use crate::model::Pendulum;
+use crate::model::{Angle, Pendulum};
 
 /// Number of starts used to measure the step error.
 const ERROR_SAMPLE: usize = 400;
@@ -268,13 +270,17 @@ impl Plan {
         Ok(Some(moved.collect()))
     }
 
-    /// Leaves out sets at rest that no start reaches, because they are known without a search; returns
-    /// the new label of what has been labelled `k + 1` before. Traps are those of the old labels, so
-    /// this must come last.
-    pub fn drop_unreached_rests(&mut self, reached: impl Fn(i16) -> bool) -> Vec<i16> {
+    /// Leaves out sets at rest that no start reaches and that are further turns of those at 0 and pi; returns the new
+    /// label of what has been labelled `k + 1` before. Traps are those of the old labels, so this must
+    /// come last.
+    pub fn drop_unreached_turns(&mut self, reached: impl Fn(i16) -> bool) -> Vec<i16> {
         let attractors = &mut self.catalogue.attractors;
+        let further = |a: &Attractor| {
+            let first = || (a.points[0][0] - FRAC_PI_2).abs() <= PI;
+            a.is_held() && a.angle == Angle::Line && !first()
+        };
         let kept: Vec<bool> =
-            (1..).zip(&*attractors).map(|(label, a)| !a.is_held() || reached(label)).collect();
+            (1..).zip(&*attractors).map(|(label, a)| !further(a) || reached(label)).collect();
         let mut next = 0;
         let mut number = |kept: &bool| {
             next += i16::from(*kept);

@@ -148,7 +148,7 @@ pub fn basins(
             )?);
         }
     }
-    let moved = plan.drop_unreached_rests(|label| map.share(label) > 0.0);
+    let moved = plan.drop_unreached_turns(|label| map.share(label) > 0.0);
     map.labels.rename(&moved);
     map.attractors = plan.catalogue.attractors;
     map.fractions = (0..map.attractors.len()).map(|i| map.share(i as i16 + 1)).collect();

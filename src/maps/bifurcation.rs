@@ -24,13 +24,11 @@ const ROUNDS: usize = 12;
 const ARRIVED: f64 = 1e-3;
 /// Displacement at every value: no motion remains on an unstable orbit.
 const NUDGE: f64 = 1e-6;
-/// Index of the phase in the list of parameters, needed by a plane of one row.
-const PHASE: usize = 5;
 
 /// A request and its numerical choices.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// The parameter and its values.
+    /// The parameters and their values.
     pub axis: Range,
     /// Where the trajectories of the search start.
     pub starts: Vec<State>,
@@ -75,7 +73,7 @@ pub fn bifurcation(
     request: &Request,
     control: &Control,
 ) -> Result<Diagram, Error> {
-    let asked = request.of_map(base);
+    let asked = request.of_map();
     let map = parameter_map(base, &asked, control)?;
     let plane = Plane { base, axes: &asked.axes };
     pool(request.threads)?.install(|| followed(map, &plane, request.first, request.bound, control))
@@ -84,12 +82,9 @@ pub fn bifurcation(
 impl Request {
     /// The request of the map: a plane of one row.
     #[must_use]
-    pub fn of_map(&self, base: &Pendulum) -> MapRequest {
-        // Any parameter serves as the constant one.
-        let other = if self.axis.index == PHASE { 0 } else { PHASE };
-        let value = base.parameters()[other].1;
+    pub fn of_map(&self) -> MapRequest {
         MapRequest {
-            axes: [self.axis.clone(), Range { index: other, values: vec![value] }],
+            axes: [self.axis.clone(), Range::default()],
             starts: self.starts.clone(),
             each: self.each,
             tol: self.tol,

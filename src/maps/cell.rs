@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use super::bounds::cell_periods;
 use crate::attractor::chaos::spread;
 use crate::attractor::find::{Alike, attracting};
-use crate::attractor::rest::balances;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
@@ -96,7 +95,7 @@ impl Search {
             // Nothing attracts.
             return Cell { open: 1.0, ..Cell::default() };
         }
-        let mut catalogue = with_rests(strobe, cancel);
+        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
         let further = followed(&mut catalogue, strobe, hints, cancel);
         let mut starts: Vec<State> = self.starts_of(number).collect();
         starts.extend(further);
@@ -119,7 +118,7 @@ impl Search {
         if !strobe.pendulum.is_dissipative() {
             return None;
         }
-        let mut catalogue = with_rests(strobe, cancel);
+        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
         catalogue.take_over_chaos(cell.found.iter().map(|f| &f.attractor));
         let own: Vec<Hint> = cell.found.iter().filter_map(|f| Hint::of(&f.attractor)).collect();
         let restarts = followed(&mut catalogue, strobe, &own, cancel);
@@ -254,15 +253,6 @@ impl Search {
         let watched = if catalogue.has_chaos() { watched } else { 0 };
         Cell { found, open: share(undecided), failed: share(failed), watched, ends }
     }
-}
-
-/// The attractors known without a start: rests.
-fn with_rests(strobe: &Strobe, cancel: &AtomicBool) -> Catalogue {
-    let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
-    // A point exactly at rest stays there even if unstable: such points are no starts.
-    let rests = balances(&strobe.pendulum).map(|theta| (vec![[theta, 0.0]], 1));
-    catalogue.take_over(strobe, &rests, cancel);
-    catalogue
 }
 
 /// Adds the orbits that Newton's method finds from `hints`; returns the points of the others.

@@ -12,13 +12,26 @@ use crate::error::Error;
 use crate::integrate::State;
 use crate::model::Pendulum;
 
-/// A parameter and the values that it takes.
-#[derive(Clone, Debug)]
+/// Places along a curve in the space of the parameters.
+#[derive(Clone, Debug, Default)]
 pub struct Range {
-    /// Its index in [`Pendulum::parameters`].
-    pub index: usize,
-    /// The values.
-    pub values: Vec<f64>,
+    /// Indices in [`Pendulum::parameters`], each with its value at every place; without any there is one place,
+    /// the pendulum itself.
+    pub parameters: Vec<(usize, Vec<f64>)>,
+}
+
+impl Range {
+    /// One parameter and the values that it takes.
+    #[must_use]
+    pub fn of(index: usize, values: Vec<f64>) -> Self {
+        Self { parameters: vec![(index, values)] }
+    }
+
+    /// The number of places.
+    #[must_use]
+    pub fn places(&self) -> usize {
+        self.parameters.first().map_or(1, |(_, values)| values.len())
+    }
 }
 
 /// A request and its numerical choices.
@@ -65,7 +78,7 @@ impl Plane<'_> {
     /// Numbers of columns and rows.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
-        [self.axes[0].values.len(), self.axes[1].values.len()]
+        [self.axes[0].places(), self.axes[1].places()]
     }
 
     /// Column and row of a cell.
@@ -81,12 +94,19 @@ impl Plane<'_> {
         row * self.size()[0] + column
     }
 
-    /// The pendulum of a cell.
+    /// The pendulum of a cell; a parameter of both axes is the product of its values.
     #[must_use]
     pub fn pendulum(&self, cell: usize) -> Pendulum {
         let mut pendulum = self.base.clone();
-        for (axis, at) in self.axes.iter().zip(self.place(cell)) {
-            pendulum.set_parameter(axis.index, axis.values[at]);
+        let [i, j] = self.place(cell);
+        let [columns, rows] = self.axes;
+        for (index, values) in &columns.parameters {
+            pendulum.set_parameter(*index, values[i]);
+        }
+        for (index, values) in &rows.parameters {
+            let other = columns.parameters.iter().find(|(known, _)| known == index);
+            let factor = other.map_or(1.0, |(_, values)| values[i]);
+            pendulum.set_parameter(*index, factor * values[j]);
         }
         pendulum
     }

@@ -366,7 +366,7 @@ impl BasinPlan {
         Ok(Some(Uncertainty { eps: array(py, eps), uncertain, tried }))
     }
 
-    /// The attractors with the number of starts that end on each, after sets at rest that no start
+    /// The attractors with the number of starts that end on each, after sets at rest of further turns that no start
     /// reaches are left out; with the new label of what has been labelled k + 1 before.
     fn finish(
         &mut self,
@@ -375,7 +375,7 @@ impl BasinPlan {
     ) -> PyResult<(Vec<Py<Attractor>>, Array<i16>)> {
         let counts = counts.as_slice()?.to_vec();
         let count = |label: i16| counts.get(label as usize - 1).copied().unwrap_or(0);
-        let moved = self.plan.drop_unreached_rests(|label| count(label) > 0);
+        let moved = self.plan.drop_unreached_turns(|label| count(label) > 0);
         let all = self.starts.len().max(1) as f64;
         let mut fractions = vec![0.0; self.plan.catalogue.attractors.len()];
         for (label, now) in (1..).zip(&moved) {

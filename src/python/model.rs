@@ -99,7 +99,15 @@ impl GivenParameter {
     }
 }
 
-/// The range of the parameter `name` of a pendulum.
-pub fn range(pendulum: &Pendulum, (name, values): (String, Vec<f64>)) -> PyResult<Range> {
-    Ok(Range { index: pendulum.place(&name).map_err(raise)?, values })
+/// The range of parameters of a pendulum, each with as many values.
+pub fn range(pendulum: &Pendulum, along: Vec<(String, Vec<f64>)>) -> PyResult<Range> {
+    let one = |(name, values): (String, Vec<f64>)| Ok((pendulum.place(&name)?, values));
+    let parameters = along.into_iter().map(one).collect::<Result<Vec<_>, Error>>().map_err(raise)?;
+    let found = Range { parameters };
+    let uneven = found.parameters.iter().find(|(_, values)| values.len() != found.places());
+    if let Some((_, values)) = uneven {
+        let (value, allowed) = (values.len() as f64, "the same for all parameters of an axis");
+        return Err(raise(Error::Range { name: "number of values", value, allowed }));
+    }
+    Ok(found)
 }

@@ -14,8 +14,8 @@ use super::long_calls::watched;
 use super::model::{Model, range};
 use super::raise;
 
-/// `(name of a parameter, values)`.
-pub type RangeTuple = (String, Vec<f64>);
+/// Names of parameters, each with its values at the places of an axis.
+pub type RangeTuple = Vec<(String, Vec<f64>)>;
 
 /// The attractors over a plane of two parameters: arrays over all attractors of all cells, one cell after
 /// the other, and over cells.

@@ -62,7 +62,7 @@ impl Survey {
                 })?;
                 let first = None;
                 let line = DiagramRequest { axis, starts, each, first, tol, bound, threads };
-                line.of_map(&pendulum)
+                line.of_map()
             }
         };
         let own = pooled(py, threads, None, |_| match state {

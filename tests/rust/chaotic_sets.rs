@@ -162,7 +162,7 @@ fn chaotic_attractors_do_not_depend_on_the_starts() {
 fn libration_chaos_is_followed_to_its_crisis() {
     let values: Vec<f64> = (0..16).map(|k| 1.3413 + 0.0001 * f64::from(k)).collect();
     let request = Request {
-        axis: Range { index: P, values: values.clone() },
+        axis: Range::of(P, values.clone()),
         starts: plane(1000).sampled_states(549, 1),
         each: 9,
         first: None,

@@ -27,7 +27,7 @@ fn starts(count: usize) -> Vec<State> {
 }
 
 fn asked(p: Vec<f64>, omega: Vec<f64>, count: usize, threads: usize) -> Request {
-    let axes = [Range { index: P, values: p }, Range { index: OMEGA, values: omega }];
+    let axes = [Range::of(P, p), Range::of(OMEGA, omega)];
     let starts = starts(61 * count);
     Request { axes, starts, each: count, tol: 1e-6, bound: None, kept: 1, threads }
 }
@@ -44,7 +44,7 @@ fn mapped(
 }
 
 fn diagram(base: &Pendulum, p: Vec<f64>) -> Diagram {
-    let axis = Range { index: P, values: p };
+    let axis = Range::of(P, p);
     let (starts, each, first) = (starts(549), 9, None);
     let request =
         bifurcation::Request { axis, starts, each, first, tol: 1e-6, bound: None, threads: 0 };

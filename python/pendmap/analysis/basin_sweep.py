@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis import result, varied
+from pendmap.analysis import along, result, varied
 from pendmap.analysis.basins import choices_of
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
@@ -25,14 +26,14 @@ from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweeps.table import Numbers
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
 
@@ -65,6 +66,7 @@ SCHEMA = Schema(
     Found(
         "failed", "1", "share of all starts that failed or diverged", None, variable="failed_share"
     ),
+    *along.DRIVE,
     *result.TIMED,
     Found("reached_error", "1", "largest error after 5 periods that was reached", None),
     *result.END,
@@ -171,8 +173,8 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     if analysis not in ANALYSES:
         raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
-    if not isinstance(ranges, dict) or len(ranges) not in {1, 2}:
-        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+    if not isinstance(ranges, Mapping) or len(ranges) not in {1, 2}:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
         raise InputError(
             "ranges must have one or two parameters, like {'p': (0.5, 2.0, 25)}, or on the command "
             f"line --p 0.5:2:25; got {given or 'nothing'}"
@@ -205,6 +207,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
             **numerics.provenance(),
+            **along.kept(pendulum, axes),
             "analysis": analysis,
             "varied": " ".join(axis.name for axis in axes),
             "models": models,
@@ -218,7 +221,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         replaced = [name for axis in axes for name in axis.replaced]
         SCHEMA.complete(dataset, pendulum, values, None, replaced)
         dataset.attrs["title"] = varied.title(pendulum, *axes)
-        lines = [*report.summary(dataset), *varied.without_damping(pendulum, *axes)]
+        lines = [*report.summary(dataset), *varied.remarks(pendulum, *axes)]
         summarised(dataset, lines, pendulum, "basins are")
         return dataset, ["label"]
 

@@ -66,7 +66,7 @@ SCHEMA = Schema(
         "attractors",
         "",
         "attractors with their shares of the starts",
-        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr"),
+        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr", "ci95"),
     ),
     Found("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Found("failed", "1", "share of the starts that failed or diverged"),
@@ -398,12 +398,10 @@ def _complete(
     """Add the table of attractors, all facts and the summary to the cells."""
     count, attractors = dataset["label"].size, raw.attractors
     fraction = np.array([a.fraction for a in attractors], dtype=float)
-    stderr = np.sqrt(fraction * (1 - fraction) / max(count, 1))
     dataset = dataset.assign(
         {
             **orbit_table.table(attractors, model.units, "attractor"),
-            "fraction": variable("attractor", fraction, "1", "share of the starts"),
-            "stderr": variable("attractor", stderr, "1", "standard error of the share"),
+            **result.shares(("attractor",), fraction, count),
         }
     )
     values = {

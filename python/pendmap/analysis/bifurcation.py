@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.ndimage import find_objects, label
 
 from pendmap import _core
-from pendmap.analysis import cell_search, result, varied
+from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
 from pendmap.analysis.stored import Kept
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Indices, Mask
@@ -95,7 +95,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float, int) or array_like
-        One parameter; as for :func:`pendmap.parameter_map`.
+        One parameter; as for :func:`pendmap.parameter_map`. Several with arrays are a curve.
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
@@ -154,12 +154,13 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset = _dataset(raw, axis, units)
         values = {
             **search.attributes(raw, units),
+            **along.kept(pendulum, (axis,)),
             "varied": axis.name,
             "points": dataset.sizes["point"],
         }
         SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
         dataset.attrs["title"] = varied.title(pendulum, axis)
-        lines = [*_summary(dataset), *varied.without_damping(pendulum, axis)]
+        lines = [*_summary(dataset), *varied.remarks(pendulum, axis)]
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
@@ -226,6 +227,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
+    lines.append(cell_search.missed(a, values.size, "value"))
     lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
     where = dataset["undecided"].values > 0
     if where.any():

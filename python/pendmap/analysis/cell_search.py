@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import find_objects, label
 
 from pendmap.analysis import result
+from pendmap.analysis.along import DRIVE
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.result import Field, Found, point, variable
 from pendmap.errors import (
@@ -18,7 +19,7 @@ from pendmap.errors import (
     check_type,
     check_whole,
 )
-from pendmap.formatting import counted
+from pendmap.formatting import counted, percent
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ class CellSearch:
             **self.numerics.provenance(),
             **self.within(units).attributes,
             "starts": self.starts,
+            "missed": result.missed(self.starts),
             "undecided": float(raw.undecided.mean()),
             "chaos_periods": min((int(n) for n in raw.chaos_periods if n), default=0),
             "failed": float(raw.failed.mean()),
@@ -197,6 +199,16 @@ def shares(
     }
 
 
+def missed(attributes: Mapping[str, Any], cells: int, cell: str) -> str:
+    """Return a summary line on the attractors that the starts may have missed."""
+    starts = attributes["starts"]
+    one, every = (percent(100 * result.missed(count)) for count in (starts, starts * cells))
+    return (
+        f"{counted(starts, 'start')} a {cell} may miss attractors with {one} of the box, those of "
+        f"all, which exchange what they find, with {every} (95 %)."
+    )
+
+
 def chaos(attributes: Mapping[str, Any]) -> list[str]:
     """Return a summary line on how long chaos was followed, if there is any."""
     periods = attributes["least_chaos_periods"]
@@ -220,6 +232,7 @@ def undecided(attributes: Mapping[str, Any]) -> list[str]:
 
 SEARCH = (
     Field("starts", "1", "initial conditions of each pendulum"),
+    Found("missed", "1", "share of the box that all starts of a cell miss at a chance of 5 %"),
     Found(
         "undecided",
         "1",
@@ -233,6 +246,7 @@ SEARCH = (
         "least time for which chaos was not captured; 0: no chaos",
         variable="least_chaos_periods",
     ),
+    *DRIVE,
     *result.TIMED,
     result.REACHED,
     Field("undecided_at", "", "groups of cells with undecided starts", read=undecided_cells),

@@ -191,8 +191,8 @@ def evenly(values: Floats) -> bool:
     return not steps.size or bool(np.allclose(steps, steps.mean(), atol=0))
 
 
-def ascending(name: str, given: ArrayLike, *, falling: bool = False) -> Floats:
-    """Return values as an ascending array; they may be given ``falling`` where that is allowed."""
+def ascending(name: str, given: ArrayLike, *, any_order: bool = False) -> Floats:
+    """Return values as an array; each must be greater than the one before, unless in any order."""
     try:
         values = np.atleast_1d(np.array(given, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
@@ -201,11 +201,8 @@ def ascending(name: str, given: ArrayLike, *, falling: bool = False) -> Floats:
         raise InputError(
             f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
         )
-    if falling and values[0] > values[-1]:
-        values = values[::-1].copy()
-    if not (np.diff(values) > 0).all():
-        which = "ascending or descending" if falling else "ascending"
-        raise InputError(f"{name} must be {which} values, got {short_repr(given)}")
+    if not any_order and not (np.diff(values) > 0).all():
+        raise InputError(f"{name} must be ascending values, got {short_repr(given)}")
     return values
 
 

@@ -83,7 +83,7 @@ def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
         exponent_stderr="exponent_stderr",
         period="period",
         twin="twin",
-        **{name: name for name in more},
+        **{name: name for name in more if name in dataset},  # files of earlier versions lack some
     )
     for own, points in zip(found, points_of(dataset, one), strict=True):
         own["points"] = points.tolist()

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import cell_search, result, varied
+from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.numerics import part as progress_part
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.draws import Draws, Run
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.numerics import Progress
-    from pendmap.analysis.varied import Varied
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
@@ -141,9 +141,11 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Two parameters, columns, then rows, each with an array of monotonic values, evenly spaced or
         not, or a tuple of first value, last value (both included) and how many. Any of ``p``,
         ``omega``, ``gamma``, ``theta_r``, ``torque``, ``phase`` without dimensions, with a rig also
-        ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI, ``frequency_hz`` (``p`` is kept) and
-        ``stroke_mm`` (``Omega`` is kept); or ``EFFECT.PARAMETER`` of an effect that the model has,
-        or that has no other parameter.
+        ``Omega``, ``c_over_m``, ``Tr``, ``phi`` in SI, ``frequency_hz`` and ``stroke_mm``; or
+        ``EFFECT.PARAMETER`` of an effect that the model has, or that has no other parameter. Where
+        the frequency varies, a rig that gives its stroke keeps it, and ``p`` varies; else ``p`` is
+        constant (``kept``). A mapping of arrays of one length, under any name, is a curve: the
+        dimension is its first parameter, the others are coordinates along it.
     starts : int
         Initial conditions of each cell.
     box : Grid, optional
@@ -226,6 +228,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset = _dataset(raw, (columns, rows), units).assign(over)
         values = {
             **search.attributes(raw, units),
+            **along.kept(pendulum, (columns, rows)),
             "columns": columns.name,
             "rows": rows.name,
             "cells": columns.values.size * rows.values.size,
@@ -233,7 +236,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         replaced = [*columns.replaced, *rows.replaced]
         SCHEMA.complete(dataset, pendulum, values, raw, replaced)
         dataset.attrs["title"] = varied.title(pendulum, columns, rows)
-        lines = [*_summary(dataset), *varied.without_damping(pendulum, columns, rows)]
+        lines = [*_summary(dataset), *varied.remarks(pendulum, columns, rows)]
         summarised(dataset, lines, pendulum, "attractors are")
         return dataset, []
 
@@ -341,6 +344,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if count > _LISTED:
         rest = float(dataset["regime_share"][_LISTED:].sum())
         lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
+    lines.append(cell_search.missed(a, a["cells"], "cell"))
     lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
     places = cell_search.undecided_cells(dataset)
     if places:

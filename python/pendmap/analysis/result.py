@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 
     import xarray as xr
+    from numpy.typing import NDArray
 
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 OF_TIME: Final = "1/w0 or s"  # Unit of times: without dimensions or in SI, as the model is
@@ -261,6 +263,34 @@ def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
 def rows(dataset: xr.Dataset, *names: str) -> Iterator[tuple[Any, ...]]:
     """Return an iterator over the values of variables, index by index of a dimension."""
     return zip(*(dataset[name].values.tolist() for name in names), strict=True)
+
+
+def missed(starts: int) -> float:
+    """Return the share that no start of this number hits with a probability of 5 %."""
+    return 1 - math.pow(0.05, 1 / starts)
+
+
+def binomial_ci95(share: Any, starts: int) -> NDArray[Any]:  # noqa: ANN401 (an array)
+    """Return 95 % intervals of shares, one-sided of 0 and 1 (Clopper & Pearson 1934)."""
+    from scipy.special import betaincinv  # noqa: PLC0415 (heavy)
+
+    def low(hits: Floats) -> Floats:
+        some = betaincinv(np.maximum(hits, 1), starts - hits + 1, 0.025)
+        return np.select([hits < 1, hits == starts], [0.0, 1 - missed(max(starts, 1))], some)
+
+    hits = np.rint(np.asarray(share, dtype=float) * starts)
+    return np.stack([low(hits), 1 - low(starts - hits)], axis=-1)
+
+
+def shares(dims: tuple[str, ...], share: Any, starts: int) -> dict[str, Any]:  # noqa: ANN401
+    """Return shares of the starts as variables, with standard errors and 95 % intervals."""
+    stderr = np.sqrt(share * (1 - share) / max(starts, 1))
+    ci95, text = binomial_ci95(share, starts), "95 % interval of the share, binomial"
+    return {
+        "fraction": variable(dims, share, "1", "share of the starts", "0 where no start ends"),
+        "stderr": variable(dims, stderr, "1", "standard error of the share"),
+        "ci95": variable((*dims, "bound"), ci95, "1", text),
+    }
 
 
 def none_below_0(value: float) -> float | None:

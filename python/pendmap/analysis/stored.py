@@ -216,7 +216,8 @@ def merge(
         elif key == "ranges":
             # A number of values is whole; values themselves are not.
             arguments[key] = {
-                name: tuple(own) if isinstance(own[-1], int) else own for name, own in value.items()
+                name: tuple(own) if isinstance(own, list) and isinstance(own[-1], int) else own
+                for name, own in value.items()
             }
     run = getattr(pendmap, mark["analysis"])
     model = parse_model(mark["model"], place.address)

@@ -9,9 +9,9 @@ import numpy as np
 
 from pendmap.analysis import adaptive
 from pendmap.analysis.grid import FASTEST
-from pendmap.analysis.result import of_model, rows
+from pendmap.analysis.result import missed, of_model, rows
 from pendmap.files import facts
-from pendmap.formatting import counted, with_error, written
+from pendmap.formatting import counted, percent, with_error, written
 from pendmap.model.pendulum import effects_of, is_driven
 from pendmap.units import TIME, VELOCITY, Units
 
@@ -160,13 +160,12 @@ def _only_chaos(dataset: xr.Dataset) -> str:
     a = dataset.attrs
     name = str(dataset["attractor"].values[0])
     exponent, error = (float(dataset[k].values[0]) for k in ("exponent", "exponent_stderr"))
-    # Upper end of the one-sided exact interval for no hit (Clopper & Pearson 1934, Biometrika 26).
-    missed = 1 - math.pow(0.05, 1 / a["searched_starts"])
+    most = 100 * missed(a["searched_starts"])
     return (
         f"One chaotic attractor captures all starts: {name}, exponent "
         f"{with_error(exponent, error)} {Units.of(a).per_time}; no sampled trajectory "
         f"settled within {a['chaos_bound']} periods. All {a['searched_starts']} sampled starts "
-        f"end there: another attractor has at most {100 * missed:.2g} % of them (95 %).\n"
+        f"end there: another attractor has at most {most:.2g} % of them (95 %).\n"
         "Labels carry no information here: net turns and the finite-time exponent after "
         f"{counted(a['layer_periods'], 'period')} are shown instead."
     )
@@ -177,19 +176,29 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
     names = dataset["attractor"].values.tolist()
     units = Units.of(facts(dataset))
     unit = f" {units.of_rate}" if units.si else ""
+    starts = facts(dataset)["cells"]
     columns = ("fraction", "stderr", "twin", "exponent", "exponent_stderr")
     for k, (share, error, twin, exponent, spread) in enumerate(rows(dataset, *columns)):
         mirror = f", mirror image of {names[twin - 1]}" if twin not in {0, k + 1} else ""
         value = f"exponent {with_error(exponent, spread)}{unit}"
         rate = value if math.isfinite(exponent) else "held by friction"
-        lines.append(
-            f"{names[k]}: {100 * share:.2f} +- {100 * error:.2f} % of the starts, {rate}{mirror}."
-        )
+        bound = bound_said(share, starts)
+        said = f"{100 * share:.2f}" + ("" if bound else f" +- {100 * error:.2f}")
+        lines.append(f"{names[k]}: {said} % of the starts{bound}, {rate}{mirror}.")
     if len(lines) > 1:
         lines.append("These shares are the basin stability in this window.")
     if not lines:
         lines.append("No attractor was found.")
     return lines
+
+
+def bound_said(share: float, starts: int) -> str:
+    """Return what no start, or every start, tells of the share of the plane; else no text."""
+    if 0 < share < 1 or not starts:
+        return ""
+    most = 100 * missed(starts)
+    bound = f"at least {written(100 - most, most)} %" if share else f"at most {percent(most)}"
+    return f", {bound} of the plane (95 %)"
 
 
 def _settling(dataset: xr.Dataset) -> list[str]:

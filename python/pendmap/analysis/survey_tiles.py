@@ -31,7 +31,7 @@ class SurveyTiles:
     """The job of a map over two parameters, or of a diagram over one."""
 
     pendulum: Pendulum
-    axes: tuple[tuple[str, list[float]], ...]
+    axes: tuple[list[tuple[str, list[float]]], ...]
     initial: tuple[Floats, Floats, int]
     limits: tuple[float, int | None, int]
     """Tolerance, bound and threads as passed to the core: a block has one thread."""

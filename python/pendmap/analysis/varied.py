@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis.grid import ascending, coordinate, evenly
-from pendmap.analysis.result import variable
+from pendmap.analysis.along import Varied, drive_said, with_stroke
+from pendmap.analysis.grid import ascending
 from pendmap.errors import (
     MOST_CELLS,
     InputError,
@@ -26,7 +27,7 @@ from pendmap.model.quantities import COUNTERPARTS, check
 from pendmap.model.rig import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike
@@ -35,68 +36,18 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-@dataclasses.dataclass(frozen=True)
-class Varied:
-    """A parameter and its values: ascending, evenly spaced unless they were listed."""
-
-    name: str
-    """Name of the parameter, one of those of :func:`pendmap.parameter_map`."""
-    values: Floats
-    """Values in the units of the parameter."""
-    parameter: str
-    """Name of the parameter in the core."""
-    bare: Floats
-    """The values without dimensions."""
-    unit: str
-    """Unit of the values; empty where they have none."""
-    meaning: str
-    """Meaning of the parameter."""
-
-    @property
-    def kernel(self) -> tuple[str, list[float]]:
-        """Name and values as passed to the core."""
-        return self.parameter, self.bare.tolist()
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of a quantity with these values."""
-        return variable((), 0.0, self.unit or "1", self.meaning)[2]
-
-    @property
-    def coordinates(self) -> dict[str, Any]:
-        """Coordinate of a dataset; with more than one value also their bounds."""
-        x = self.values
-        if x.size == 1:
-            return {self.name: (self.name, x, self.attributes)}
-        if self.even:
-            half = 0.5 * (x[-1] - x[0]) / (x.size - 1)
-            edges = np.linspace(x[0] - half, x[-1] + half, x.size + 1)
-        else:
-            middle = 0.5 * (x[1:] + x[:-1])
-            edges = np.array([2 * x[0] - middle[0], *middle, 2 * x[-1] - middle[-1]])
-        return coordinate(self.name, x, edges, **self.attributes)
-
-    @property
-    def even(self) -> bool:
-        """Whether the values are evenly spaced."""
-        return evenly(self.values)
-
-    @property
-    def replaced(self) -> tuple[str, ...]:
-        """Names of the model's own parameter that this one replaces."""
-        return self.parameter, COUNTERPARTS.get(self.parameter, ("",))[0]
-
-
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` parameters that vary.
+    """Return the ``count`` axes along which parameters vary.
 
-    A tuple has the first value, the last and their number; anything else is an array of values.
-    Values that fall are turned round: no result depends on their direction.
+    A tuple has the first value, the last and their number; a mapping has arrays of one length, one
+    axis of several parameters; anything else is an array of values. Values that fall are turned
+    round: no result depends on their direction.
     """
-    if not isinstance(ranges, dict) or len(ranges) != count:
-        given = ", ".join(map(str, ranges)) if isinstance(ranges, dict) else short_repr(ranges)
+    curves = _curves(ranges, count)
+    if len(curves) != count:
+        given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
         example = {"p": (0.5, 2.0, 100), "omega": (0.5, 3.0, 100)}
         few = dict(list(example.items())[:count])
         options = " ".join(f"--{name} {low:g}:{high:g}:{n}" for name, (low, high, n) in few.items())
@@ -104,32 +55,45 @@ def varied(
             f"ranges must be a mapping like {few}, or on the command line {options}; "
             f"got {given or 'nothing'}"
         )
-    found = tuple(_one(model, name, given) for name, given in ranges.items())
+    found = tuple(_axis(model, curve) for curve in curves)
+    every = [one for axis in found for one in axis.every]
+    first = {one.parameter: one for one in reversed(every)}
+    for one in every:
+        if (same := first[one.parameter]) is not one:
+            raise InputError(f"{same.name} and {one.name} must be two parameters, they are one")
+    found = with_stroke(model, found)
     pendulum, _ = without_dimensions(model)
     for axis in found:
-        for value, bare in zip(axis.values[[0, -1]], axis.bare[[0, -1]], strict=True):
-            try:
-                with_values(pendulum, {axis.parameter: float(bare)})
-            except InputError as error:
-                units = "" if value == bare else f" (without dimensions, w0 is {model.units.w0:g})"
-                raise InputError(f"{axis.name} = {value:g}: {error}{units}") from None
-    if len({one.parameter for one in found}) < len(found):
-        raise InputError(
-            f"{found[0].name} and {found[1].name} must be two parameters, they are one"
-        )
-    if "stroke_mm" in ranges and {"omega", "Omega", "frequency_hz"} & set(ranges):
-        raise InputError(
-            "stroke_mm and a frequency must not both vary: vary p = Y Omega^2 / g instead"
-        )
+        for one in axis.every:
+            for at in (one.bare.argmin(), one.bare.argmax()):
+                value, units = one.values[at], f" (without dimensions, w0 is {model.units.w0:g})"
+                try:
+                    with_values(pendulum, {n: x[at] for n, x in axis.kernel})
+                except InputError as error:
+                    said = f"{error}{'' if value == one.bare[at] else units}"
+                    raise InputError(f"{one.name} = {value:g}: {said}") from None
     return found
+
+
+def _curves(ranges: object, count: int) -> list[dict[str, Any]]:
+    """Return names and values of the parameters of each axis."""
+    if not isinstance(ranges, Mapping):
+        return []
+    if count == 1 and not any(isinstance(own, tuple | Mapping) for own in ranges.values()):
+        ranges = {"": ranges}
+    curves = (own if isinstance(own, Mapping) else {name: own} for name, own in ranges.items())
+    return [dict(curve) for curve in curves if curve]
 
 
 def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """Return ranges as a request to a store has them: tuples with the lower end first, or lists."""
-    return {
-        axis.name: (*sorted(own[:2]), own[2]) if isinstance(own, tuple) else axis.values.tolist()
-        for axis, own in zip(axes, ranges.values(), strict=True)
-    }
+    found: dict[str, Any] = {}
+    for axis in axes:
+        every = {one.name: one.values.tolist() for one in axis.every if not one.derived}
+        own = ranges.get(axis.name)
+        one = (*sorted(own[:2]), own[2]) if isinstance(own, tuple) else every[axis.name]
+        found[axis.name] = every if len(every) > 1 else one
+    return found
 
 
 def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum | Rig:
@@ -141,14 +105,17 @@ def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum |
         for one in effects()
         if one.name not in there and len(one.parameters) == 1 and one.parameters[0].name not in own
     }
-    new = (lacking[name] for name in ranges if name in lacking) if isinstance(ranges, dict) else ()
+    names = [name for curve in _curves(ranges, 0) for name in curve]
+    new = (lacking[name] for name in names if name in lacking)
     return dataclasses.replace(model, effects=(*model.effects, *new))
 
 
 def title(model: Pendulum | Rig, *axes: Varied) -> str:
     """Return one line: the ranges of the parameters that vary, and the other parameters."""
-    spans = [f"{a.name} = {a.values[0]:g} to {a.values[-1]:g} {a.unit}".rstrip() for a in axes]
-    rest = title_without(model, *(a.parameter for a in axes))
+    every = [one for axis in axes for one in axis.every]
+    ends = ((a, a.values[[0, -1]]) for a in every if a.name)
+    spans = [f"{a.name} = {low:g} to {high:g} {a.unit}".rstrip() for a, (low, high) in ends]
+    rest = title_without(model, *(a.parameter for a in every))
     return " and ".join(spans) + (f"; otherwise {rest}" if rest else "")
 
 
@@ -162,18 +129,36 @@ def title_without(model: Pendulum | Rig, *names: str) -> str:
     return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
 
 
-def without_damping(model: Pendulum | Rig, *axes: Varied) -> list[str]:
-    """Return a summary line if some of the pendulums have no damping, hence no attractors."""
+def remarks(model: Pendulum | Rig, *axes: Varied) -> list[str]:
+    """Return summary lines on what of the drive is constant, and on a lack of damping."""
+    lines = drive_said(model, axes)
     pendulum, _ = without_dimensions(model)
-    least = {axis.parameter: float(axis.bare[0]) for axis in axes}
-    if any(effect.brakes for effect in model.effects):
-        return []
-    if any(least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")):
-        return []
-    return ["Without damping (gamma = 0) there are no attractors: such starts stay undecided."]
+    least = {one.parameter: float(one.bare.min()) for axis in axes for one in axis.every}
+    damping = [least.get(name, getattr(pendulum, name)) for name in ("gamma", "theta_r")]
+    if not any([*damping, *(effect.brakes for effect in model.effects)]):
+        lines.append(
+            "Without damping (gamma = 0) there are no attractors: such starts stay undecided."
+        )
+    return lines
 
 
-def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN401
+def _axis(model: Pendulum | Rig, curve: Mapping[str, Any]) -> Varied:
+    """Return the parameters of one dimension; the first of a curve rises, or is turned round."""
+    name, given = next(iter(curve.items()))
+    if len(curve) == 1 and isinstance(given, tuple):
+        return _one(model, name, _values(name, given))
+    arrays = {one: ascending(one, own, any_order=True) for one, own in curve.items()}
+    count, order = arrays[name].size, -1 if arrays[name][0] > arrays[name][-1] else 1
+    for one, own in arrays.items():
+        if own.size != count:
+            raise InputError(f"{one} must have as many values as {name}, {count}, got {own.size}")
+    first, *along = (_one(model, one, own[::order]) for one, own in arrays.items())
+    if not (np.diff(first.values) > 0).all():
+        raise InputError(f"{name} must be ascending or descending values, got {short_repr(given)}")
+    return dataclasses.replace(first, along=tuple(along))
+
+
+def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     # Name in the core, factor and power of w0 of each quantity.
@@ -183,8 +168,7 @@ def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN40
             si, power = COUNTERPARTS[bare]
             own[si] = (bare, 1.0, power)
         own["frequency_hz"] = ("omega", math.tau, 1)
-        if model.Omega > 0:  # a stroke is an acceleration only at a known frequency
-            own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
+        own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
     if name not in own and name not in shared:
@@ -193,12 +177,10 @@ def _one(model: Pendulum | Rig, name: str, given: Any) -> Varied:  # noqa: ANN40
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
             f"{_of_effect(name)}"
         )
-    listed = not isinstance(given, tuple)
-    values = ascending(name, given, falling=True) if listed else _values(name, given)
     if name in own:
         bare, factor, power = own[name]
         if name in {"frequency_hz", "stroke_mm"}:
-            check(name, values[0])
+            check(name, values.min())
         plain = units.bare(factor * values, power)
         # ``torque`` has no dimensions here, also for a rig.
         unit = "" if name == "torque" else LABELS[name].unit.replace("^", "")

@@ -32,7 +32,7 @@ _MOSTLY: Final = 95
 _NEAR: Final = 12.0  # Range of an axis over its linear part up to which it is linear
 _WIDE: Final = 8.0  # Ratio of positive values above which their axis is logarithmic
 _BARE: Final = ("gamma", "p", "omega", "phase", "torque", "theta_r", "lab_time")
-_SI: Final = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
+_SI: Final = ("w0", "c_over_m", "p", "stroke_mm", "Omega", "phi", "torque", "Tr", "lab_time_s")
 """Parameters of a nondimensional model and of one in SI, in the order of a subtitle."""
 _ALWAYS: Final = ("w0", "gamma", "c_over_m", "p", "omega", "Omega")
 """Parameters in a subtitle even if they are 0."""

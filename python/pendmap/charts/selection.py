@@ -12,6 +12,7 @@ import numpy as np
 
 from pendmap.analysis.adaptive import Tally
 from pendmap.analysis.basins import RELIABLE
+from pendmap.analysis.result import shares
 from pendmap.charts import plane
 from pendmap.errors import InputError
 from pendmap.files import facts, with_facts
@@ -179,8 +180,7 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
         tally.add({name: values[rows] for name, values in cells.items()})
     share = counts / label.size
     fraction = share[ids + 1]
-    error = np.sqrt(fraction * (1 - fraction) / label.size)
-    part = dataset.assign(fraction=("attractor", fraction), stderr=("attractor", error))
+    part = dataset.assign(shares(("attractor",), fraction, label.size))
     gone = [name for name in facts(part) if name.startswith(_OF_THE_WHOLE)]
     part = part.drop_vars(gone, errors="ignore")
     part.attrs = {name: value for name, value in part.attrs.items() if name not in gone}

@@ -219,6 +219,9 @@ def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
     numbers = {name: getattr(model, name) for name in model.numbers()}
     if numbers.get("Omega") == 0:
         del numbers["Omega"]  # nothing is driven
+    if getattr(model, "given_stroke", None) is not None:
+        numbers["Y"] = model.given_stroke
+        del numbers["p"]
     content: dict[str, Any] = {"format_version": FORMAT, "pendulum": numbers}
     formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
     if formulas:

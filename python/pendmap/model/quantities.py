@@ -59,6 +59,18 @@ def natural_frequency(given: Mapping[str, float]) -> float:
     return one("w0", ways)
 
 
+def amplitude(stroke: float, omega: float, gravity: float) -> float:
+    """Return ``p`` of a stroke in m at an angular frequency in rad/s."""
+    return stroke * omega**2 / gravity
+
+
+def stroke_of(given: Mapping[str, float]) -> float | None:
+    """Return the stroke in m where it is given in the place of ``p``, else None."""
+    if "p" in given or not {"Y", "stroke_mm"} & set(given):
+        return None
+    return given["Y"] if "Y" in given else given["stroke_mm"] * 1e-3
+
+
 def resolve(given: Mapping[str, float]) -> dict[str, float]:
     """Return the numbers of a :class:`pendmap.Rig` from the quantities given.
 
@@ -86,7 +98,7 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
             raise InputError(f"{name} needs a frequency: Omega or frequency_hz must be given")
         omega = one("Omega", ways["Omega"])
         said = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
-        ways["p"][f"Y Omega^2/g of {said}"] = checked[name] * metre * omega**2 / gravity
+        ways["p"][f"Y Omega^2/g of {said}"] = amplitude(checked[name] * metre, omega, gravity)
     result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
     return result | {name: one(name, known) for name, known in ways.items() if known}
 

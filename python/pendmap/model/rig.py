@@ -65,6 +65,9 @@ class Rig(Dynamics):
         Further terms, parameters in SI; kept as a tuple.
     notes : mapping
         Those of :class:`Pendulum`.
+    given_stroke : float, optional
+        Amplitude ``Y`` in m where :meth:`of` or a model file gives it in the place of ``p``: where
+        the frequency varies it stays, else ``p``. None as soon as ``p`` is not ``Y Omega**2 / g``.
 
     Raises
     ------
@@ -90,6 +93,9 @@ class Rig(Dynamics):
     notes: Mapping[str, Any] = dataclasses.field(
         default_factory=dict, repr=False, compare=False, kw_only=True
     )
+    given_stroke: float | None = dataclasses.field(
+        default=None, repr=False, compare=False, kw_only=True
+    )
 
     def __post_init__(self) -> None:
         for name in self.numbers():
@@ -97,6 +103,10 @@ class Rig(Dynamics):
             idle = name == "Omega" and value == 0
             number = check_number(name, value) if idle else quantities.check(name, value)
             object.__setattr__(self, name, number)
+        if self.given_stroke is not None:
+            stroke = check_number("given_stroke", self.given_stroke)
+            if not self.Omega or self.p != quantities.amplitude(stroke, self.Omega, self.gravity):
+                object.__setattr__(self, "given_stroke", None)
         own = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
         object.__setattr__(self, "effects", checked_effects(self.effects, own))
         if self.Omega == 0 and (self.p != 0 or any(effect.drives for effect in self.effects)):
@@ -149,7 +159,8 @@ class Rig(Dynamics):
         (6.2642, 0.2906, 0.02)
         """
         check_keys("", given, SI_KEYS)
-        return cls(**quantities.resolve(given), effects=effects, notes=notes or {})
+        numbers, stroke = quantities.resolve(given), quantities.stroke_of(given)
+        return cls(**numbers, effects=effects, notes=notes or {}, given_stroke=stroke)
 
     @classmethod
     def from_pendulum(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -120,3 +122,95 @@ def test_a_selected_value_is_in_the_model() -> None:
     assert braked.pendulum.torque == pytest.approx(0.02)
     with pytest.raises(InputError, match="dataset must be a result of pendmap"):
         pendmap.pendulum_of(3)  # type: ignore[arg-type]
+
+
+STROKE: dict[str, Any] = {"w0": 6.2, "c_over_m": 0.62, "Tr": 0.1, "stroke_mm": 30.0}
+UNEVEN = (1.9, 2.0, 2.3)  # Hz
+
+
+def same_as_alone(swept: xr.Dataset, at: dict[str, int], model: Pendulum | Rig) -> None:
+    """Compare one map of a sweep with the basins of its model alone, by shares and attractors."""
+    here, alone = swept.isel(at), pendmap.basins(model, 20, check=False)
+    shares = here.fraction.values[here.exists.values > 0]
+    assert np.sort(shares) == pytest.approx(np.sort(alone.fraction.values), abs=0.004)
+    assert pendmap.pendulum_of(here) == model
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"), [("frequency_hz", 1.0), ("Omega", math.tau), ("omega", math.tau / 6.2)]
+)
+def test_a_given_stroke_stays_where_the_frequency_varies(name: str, factor: float) -> None:
+    rig = Rig.of(**STROKE, frequency_hz=1.5)
+    found = pendmap.sweep(rig, {name: factor * np.array(UNEVEN)}, grid=20, check=False)
+    for k, hertz in enumerate(UNEVEN):
+        one = Rig.of(**STROKE, frequency_hz=hertz)
+        assert found.p.values[k] == pytest.approx(one.p, rel=1e-14)
+        if name == "frequency_hz":
+            same_as_alone(found, {name: k}, one)
+    assert float(found.fraction.isel({name: 2}).max()) < 0.9  # rotations exist
+    assert (
+        "The stroke Y = 30 mm is constant: p = 0.4358 to 0.6387 by p = Y Omega^2/g"
+        in found.attrs["summary"]
+    )
+    wide = {name: factor * np.array(UNEVEN), "c_over_m": [0.5, 0.6]}
+    for result in (
+        found,
+        pendmap.bifurcation(rig, {name: [1.0]}),
+        pendmap.parameter_map(rig, wide),
+    ):
+        known = pendmap.files.facts(result)
+        assert (known["kept"], known["stroke_mm"]) == ("stroke_mm", 30.0)
+        assert result.p.dims == (name,)
+
+
+def test_a_given_p_stays_where_the_frequency_varies() -> None:
+    fixed = dataclasses.replace(Rig.of(**STROKE, frequency_hz=1.9), p=0.4)
+    assert fixed.given_stroke is None
+    found = pendmap.sweep(fixed, {"frequency_hz": [1.9, 2.3]}, grid=20, check=False)
+    assert found.p.values == 0.4
+    assert found.attrs["kept"] == "p"
+    assert "p = 0.4 is constant, as the model gives it: not the stroke" in found.attrs["summary"]
+    same_as_alone(found, {"frequency_hz": 1}, dataclasses.replace(fixed, Omega=2.3 * math.tau))
+    for ranges in ({"p": [0.2, 0.4]}, {"stroke_mm": [10.0, 20.0]}):
+        assert "kept" not in pendmap.bifurcation(fixed, ranges).attrs
+
+
+def test_stroke_and_frequency_vary_together() -> None:
+    ranges = {"stroke_mm": [20.0, 30.0], "frequency_hz": [*UNEVEN]}
+    found = pendmap.sweep(Rig(w0=6.2, c_over_m=0.62, Tr=0.1), ranges, grid=20, check=False)
+    for j, stroke in enumerate(ranges["stroke_mm"]):
+        for k, hertz in enumerate(UNEVEN):
+            one = Rig.of(**{**STROKE, "stroke_mm": stroke}, frequency_hz=hertz)
+            same_as_alone(found, {"stroke_mm": j, "frequency_hz": k}, one)
+
+
+def test_an_axis_may_be_any_curve(tmp_path: Path) -> None:
+    source = np.random.default_rng(4)
+    curve = {"p": np.sort(source.uniform(0.2, 1.2, 4)), "omega": source.uniform(1.6, 2.4, 4)}
+    found = pendmap.sweep(
+        Pendulum(),
+        {"any": curve, "gamma": [0.1, 0.14]},
+        grid=20,
+        check=False,
+        store=tmp_path / "a.zarr",
+    )
+    assert found.omega.dims == ("p",)
+    for k in range(4):
+        one = Pendulum(gamma=0.14, **{name: float(x[k]) for name, x in curve.items()})
+        same_as_alone(found, {"p": k, "gamma": 1}, one)
+    diagram = pendmap.bifurcation(Pendulum(), curve, store=tmp_path / "b.zarr")
+    assert diagram.omega.values == pytest.approx(curve["omega"])
+    turned = {name: own[::-1] for name, own in curve.items()}
+    again = pendmap.bifurcation(Pendulum(), {"c": turned}, store=tmp_path / "b.zarr", resume=True)
+    assert again.identical(diagram)
+    map_ = pendmap.parameter_map(Pendulum(), {"c": curve, "gamma": [0.1]})
+    kinds = sorted(map_.kind.values[map_.entry_kind.values])
+    assert kinds == sorted(diagram.kind.values[diagram.entry_kind.values])
+    for bad, text in (
+        ({"p": [0.1, 0.2], "omega": [2.0]}, "omega must have as many values as p, 2, got 1"),
+        ({"p": [0.1, 0.3, 0.2], "omega": [1, 2, 3]}, "p must be ascending"),
+        ({"p": [0.1, 0.2], "omega": [1, -2]}, "p = 0.2: omega must be a number above 0, got -2"),
+        ({"c": {"p": [1, 2], "omega": np.zeros((2, 2))}}, r"omega must be an array \(N,\)"),
+    ):
+        with pytest.raises(InputError, match=text):
+            pendmap.bifurcation(Pendulum(), bad)

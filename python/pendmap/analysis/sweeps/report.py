@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.result import binomial_ci95
+from pendmap.analysis.summary import bound_said
 from pendmap.analysis.sweeps.table import COUNTS, KINDS, MEASURES
 from pendmap.analysis.sweeps.tiles import PLANES
 from pendmap.files import facts
@@ -84,6 +86,7 @@ def _entry(dataset: xr.Dataset, place: Place, k: int) -> dict[str, Any]:
         "n": n or None,
         "w": w if n else None,
         **{name: None if math.isnan(value) else value for name, value in values.items()},
+        "ci95": binomial_ci95(values["fraction"], int(dataset.attrs["cells"])).tolist(),
     }
 
 
@@ -98,7 +101,8 @@ def summary(dataset: xr.Dataset) -> list[str]:
     for one in most[:_LISTED]:
         ends = [span(dim, *own) for dim, own in one["ranges"].items()]
         share = percent(100 * one["largest_fraction"])
-        lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts.")
+        bound = bound_said(one["largest_fraction"], a["cells"])
+        lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts{bound}.")
     if len(every) > _LISTED:
         lines.append(f"{len(every) - _LISTED} more attractors are in the result.")
     chaos = int((dataset["plane"].values == PLANES.index("only_chaos")).sum())

@@ -19,9 +19,9 @@ from pendmap.units import RATE, VELOCITY
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.sweeps.tiles import Mapped, Place
-    from pendmap.analysis.varied import Varied
     from pendmap.units import Units
 
     Maps = Mapping[Place, Mapped]
@@ -163,7 +163,6 @@ def _table(
     speeds = np.asarray(units.given(closed[..., 1], VELOCITY))
     rate, error = (np.asarray(units.given(one, RATE)) for one in real.values())
     exists = (whole["kind"] > 0).astype(np.int8)
-    stderr = np.sqrt(fraction * (1 - fraction) / cells)
     none = "0: no meaning"
     kinds = dict(enumerate(KINDS))
     table = {
@@ -184,10 +183,7 @@ def _table(
         "kind": flag(dims, whole["kind"], "kind of attractor", kinds),
         "n": variable(dims, whole["n"], "periods", "period n", none),
         "w": variable(dims, whole["w"], "turns", "net turns w over a period"),
-        "fraction": variable(
-            dims, fraction, "1", "share of the starts", "0 where it does not exist"
-        ),
-        "stderr": variable(dims, stderr, "1", "standard error of the share"),
+        **result.shares(dims, fraction, cells),
         "exponent": variable(dims, rate, units.of_rate, "largest Lyapunov exponent"),
         "exponent_stderr": variable(dims, error, units.of_rate, "standard error of the exponent"),
         **result.point(dims, closed[..., 0], speeds, units.of_velocity, "{}_point"),

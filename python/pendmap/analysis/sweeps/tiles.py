@@ -71,8 +71,8 @@ class SweepTiles:
     """The job of a sweep."""
 
     pendulum: Pendulum
-    varied: tuple[tuple[str, list[float]], ...]
-    """Names and values of the parameters, as passed to the core."""
+    varied: tuple[list[tuple[str, list[float]]], ...]
+    """Names and values of the parameters along each axis, as passed to the core."""
     axes: Axes
     choices: _core._Choices
     at_once: int
@@ -87,7 +87,7 @@ class SweepTiles:
     @property
     def shape(self) -> Place:
         """Number of values of each parameter."""
-        return tuple(len(values) for _, values in self.varied)
+        return tuple(len(axis[0][1]) for axis in self.varied)
 
     @property
     def side(self) -> Place:
@@ -117,10 +117,11 @@ class SweepTiles:
 
     def model(self, place: Sequence[float]) -> Pendulum:
         """Return the model at a place; between two values where it is no whole number."""
-        values = {
-            name: float(np.interp(at, np.arange(len(own)), own))
-            for at, (name, own) in zip(place, self.varied, strict=True)
-        }
+        values: dict[str, float] = {}
+        for at, axis in zip(place, self.varied, strict=True):
+            for name, own in axis:  # what two axes have is a product, as in the core
+                here = float(np.interp(at, np.arange(len(own)), own))
+                values[name] = values.get(name, 1.0) * here
         return with_values(self.pendulum, values)  # type: ignore[return-value]
 
     def inputs(self, store: Store, step: str, tile: int) -> None:

@@ -54,13 +54,10 @@ def varied_model_options(function: Command) -> Command:
                 ranges[other] = span
         given.pop("vary")
         frequency = next((n for n in ("omega", "Omega", "frequency_hz") if n in ranges), None)
-        if frequency is not None and given["stroke_mm"] is not None:
-            raise click.UsageError(
-                f"--stroke-mm must be left out if {frequency} varies, got both: --p stays constant"
-            )
-        typed = {name for name in ("p", "omega", "frequency_hz") if given[name] is not None}
-        if frequency is not None and typed == {"p"}:
-            # p needs a frequency, which a model without drive lacks.
+        drive = ("p", "stroke_mm", "omega", "frequency_hz")
+        typed = {name for name in drive if given[name] is not None}
+        if frequency is not None and typed in ({"p"}, {"stroke_mm"}):
+            # A drive needs a frequency, which a model without drive lacks.
             first = ranges[frequency].low
             which = "omega" if frequency == "omega" else "frequency_hz"
             given[which] = first / math.tau if frequency == "Omega" else first
@@ -70,8 +67,8 @@ def varied_model_options(function: Command) -> Command:
         "--vary",
         (str, RANGE),
         "A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
-        " model in SI also Omega, c_over_m, Tr, phi, frequency_hz (p is kept), stroke_mm (Omega"
-        " is).",
+        " model in SI also Omega, c_over_m, Tr, phi, stroke_mm, and frequency_hz, where the stroke"
+        " is constant if the model gives it, else p.",
         nargs=2,
         multiple=True,
         metavar="NAME A:B:N",
