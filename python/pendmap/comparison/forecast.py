@@ -214,6 +214,28 @@ class Gap:
     held_out_after: float  # Residual of the selected model in the held-out records
     by_run: tuple[RunGap, ...]  # Residuals of each record
 
+    @property
+    def closed(self) -> float:
+        """Share of the squared gap above the noise that the selected model closes."""
+        return share_closed(self.before, self.after, self.noise_floor)
+
+
+def share_closed(before: float, after: float, noise: float) -> float:
+    """Return the share of a squared gap above the noise that a better model closes.
+
+    ``(before^2 - after^2) / (before^2 - noise^2)`` of root mean squares. It is 1 where nothing is
+    left above the noise, 0 where the gap was not above the noise before.
+    """
+    gap, left = (rms**2 - noise**2 for rms in (before, after))
+    if left <= 0:
+        return 1.0
+    return 1.0 - left / gap if gap > 0 else 0.0
+
+
+def noise_rms(runs: Sequence[FitRun]) -> float:
+    """Return the root mean square noise of the included readings of runs, rad."""
+    return math.sqrt(float(np.mean(np.concatenate([run.sigmas[run.counted] for run in runs]) ** 2)))
+
 
 def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     """Return the root mean square residuals of a baseline and of a model."""
@@ -222,15 +244,13 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     for held_out in (False, True):
         runs = data.held if held_out else data.fitted
         before, after = ((f.held if held_out else f.fitted) for f in (base, best))
-        squares = [np.square(run.sigmas[run.counted]) for run in runs]
-        noise = [float(np.sqrt(np.mean(each))) for each in squares]
         rows += [
-            RunGap(run.name, held_out, noise[k], _rms([run], before, k), _rms([run], after, k))
+            RunGap(
+                run.name, held_out, noise_rms([run]), _rms([run], before, k), _rms([run], after, k)
+            )
             for k, run in enumerate(runs)
         ]
-        sizes = [each.size for each in squares]
-        total = sum(size * floor**2 for size, floor in zip(sizes, noise, strict=True))
-        floors.append(math.sqrt(total / sum(sizes)))
+        floors.append(noise_rms(runs))
         rms += [_rms(runs, before), _rms(runs, after)]
     return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
 

@@ -46,7 +46,8 @@ def fit_baseline(
     if model is not None:
         own = _unfolded(model)
         free = ["w0", "c_over_m", *(n for n in ("Tr", "torque") if getattr(own, n) != 0)]
-        sizes = [f"{effect.name}.{size}" for effect in own.effects for size in effect.sizes]
+        acting = [effect for effect in own.effects if data.forced or not effect.drives]
+        sizes = [f"{effect.name}.{size}" for effect in acting for size in effect.sizes]
         base = fit_model(data, own, [*free, *sizes])
     else:
         free = ["w0", "c_over_m", "Tr"]

@@ -12,7 +12,6 @@ from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.fitted_model import impose_physics
 from pendmap.diagnosis.functions import check_functions, score_functions, separate_functions
 from pendmap.diagnosis.named import name_effects
 from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
@@ -118,17 +117,26 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     state = State(data, base, thresholds or Thresholds(), max_effects, without, own=own)
     state.moved = lambda: moved(1, 1)
     with _refuse_divergence(experiment):
-        nearest = state.scored(search(state, core))
-        begin = state.scored(impose_physics(state.data, state.base) or state.base)
+        last = search(state, core)
+        begin = state.scored(state.begun)
         if not unit_wrong(experiment, *data.runs):
-            refuse_astray(experiment.path, data.fitted, nearest.fitted.fit)
-        last, fitted = nearest.fitted, state.data.fitted
-        runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
-        after = residual_torque(fitted, last.fit, last.noise)
-    assessment = decide_verdict(state, nearest, runs, after.chance)
-    claimed = assessment.verdict in {"named", "partial", "ambiguous"}
+            refuse_astray(experiment.path, data.fitted, last.fit)
+        fitted = state.data.fitted
+        while True:
+            nearest = state.scored(last)
+            runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
+            after = residual_torque(fitted, last.fit, last.noise)
+            assessment = decide_verdict(state, nearest, runs, after.chance)
+            claimed = assessment.verdict in {"named", "partial", "ambiguous"}
+            reasons: Reasons = {}
+            named = name_effects(state, nearest, assessment, runs, reasons) if claimed else ()
+            doubtful = {effect.name for effect in named if effect.reaches_0}
+            if not doubtful:
+                break
+            # An effect whose interval contains 0 is no name: the last one found is left out.
+            weakest = next(c for c in reversed(last.chosen) if c.name in doubtful)
+            last = state.leave_out(last, weakest)
     best = nearest if claimed else begin
-    reasons: Reasons = {}
     before = after
     if nearest.fitted.chosen:
         before = compute_part(
@@ -146,7 +154,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         best,
         nearest,
         assessment,
-        name_effects(state, best, assessment, runs, reasons) if claimed else (),
+        named,
         compute_gap(data, begin.fits, best.fits),
         before,
         after if claimed else before,

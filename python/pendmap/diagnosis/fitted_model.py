@@ -12,7 +12,6 @@ import numpy as np
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.valley import refine_exponent
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
@@ -233,27 +232,51 @@ def impose_physics(
 ) -> FittedModel | None:
     """Return a fit with physically possible coefficients; None if an effect is impossible.
 
-    Negative viscous damping and Coulomb friction are fixed at 0, and the others fitted again. An
-    added effect must oppose the motion where its kind does, must not drive it by a drift or an
+    A coefficient that opposes the motion and is estimated below 0, whatever its error, is held at
+    0, and the others are fitted again: damping, friction and given effects are fixed, an added
+    effect is no longer in the model. An added effect must not drive the motion by a drift or an
     asymmetry greater than the coefficient, must last longer than a swing and no longer than the
     records, and must have a width near its typical range. A fit far above ``target`` is abandoned.
     """
-    while negative := [n for n in OPPOSING if n in fitted.fit.estimates and fitted.fit[n] < 0]:
-        zeros: dict[str, Any] = dict.fromkeys(negative, 0.0)
-        again = fit_again(
-            data,
-            fitted,
-            model=dataclasses.replace(fitted.fit.model, **zeros),
-            free=[name for name in fitted.free if name not in negative],
-            start=fitted.start_without(negative),
-            zeroed=(*fitted.zeroed, *negative),
-            least_gain=LITTLE * fitted.level,
-            target=target,
-        )
+    while name := fitted.fit.negative:
+        start = fitted.start_without([name])
+        again = fit_without(data, fitted, name, start, least=LITTLE * fitted.level, target=target)
         if again is None:
             return None
         fitted = again
     return fitted if all(_possible(data, fitted, c) for c in fitted.chosen) else None
+
+
+def fit_without(  # noqa: PLR0913 (what is left out, and how the rest is fitted)
+    data: DataSplit,
+    fitted: FittedModel,
+    name: str,
+    start: Mapping[str, float],
+    *,
+    least: float,
+    target: float = math.inf,
+    freed: Sequence[str] = (),
+) -> FittedModel | None:
+    """Return a fit with a coefficient at 0: of an added effect without the effect, else fixed.
+
+    ``freed`` are coefficients fixed at 0 that are fitted again. None if the fit diverges.
+    """
+    model = fitted.fit.model
+    dropped = {c.name: {*c.free, *c.adapted} for c in fitted.chosen if c.free[0] == name}
+    gone = {name}.union(*dropped.values())
+    effects = tuple(e.held([name]) for e in model.effects if e.name not in dropped)
+    zeros: dict[str, Any] = {} if "." in name else {name: 0.0}
+    return fit_again(
+        data,
+        fitted,
+        model=dataclasses.replace(model, effects=effects, **zeros),
+        free=[n for n in (*fitted.free, *freed) if n not in gone],
+        chosen=tuple(c for c in fitted.chosen if c.name not in dropped),
+        zeroed=[n for n in fitted.zeroed if n not in freed] + [name] * (not dropped),
+        start={n: value for n, value in start.items() if n not in gone},
+        least_gain=least,
+        target=target,
+    )
 
 
 def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> bool:
@@ -263,8 +286,6 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
     if size is None:
         return True
     error = ERRORS * math.sqrt(fitted.level) * (size.stderr or 0.0)
-    if candidate.definition.opposes and size.value < -error:
-        return False
     end = max(run.lab_time_s + float(run.time[-1]) for run in data.fitted)
     span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
     entries = {entry.name: entry for entry in candidate.definition.parameters}
@@ -312,18 +333,28 @@ def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
     It is 0 if noise explains it: if the mean of squared residuals over squared standard errors is
     at most ``1 + 4 sqrt(2 / N + 4 r^2)``, with the relative error ``r`` of the noise.
     """
-    errors = []
+    residuals = zip(data.fitted, fitted.fit.residuals, noise_ratios(data, fitted), strict=True)
+    return tuple(
+        float(np.sqrt(np.mean(residual[run.counted] ** 2))) if ratio > allowed else 0.0
+        for run, residual, (ratio, allowed) in residuals
+    )
+
+
+def noise_ratios(data: DataSplit, fitted: FittedModel) -> list[tuple[float, float]]:
+    """Return the mean of squared residuals over squared standard errors in each fitted run.
+
+    The second number is the greatest one that noise explains.
+    """
+    ratios = []
     for run, residual, of in zip(data.fitted, fitted.fit.residuals, data.fitted_of, strict=True):
         good = np.isfinite(residual) & run.counted
         sigma = run.sigmas[good]
         if run.count is not None:
             sigma = np.hypot(sigma, run.count / math.sqrt(12))
-        squares = residual[good] ** 2
+        ratio = float(np.mean((residual[good] / sigma) ** 2)) if good.any() else 0.0
         doubt = data.readings[of].doubt
-        allowed = 1 + 4 * math.sqrt(2 / max(squares.size, 1) + 4 * doubt**2)
-        beyond = squares.size > 0 and float(np.mean(squares / sigma**2)) > allowed
-        errors.append(math.sqrt(float(np.mean(squares))) if beyond else 0.0)
-    return tuple(errors)
+        ratios.append((ratio, 1 + 4 * math.sqrt(2 / max(sigma.size, 1) + 4 * doubt**2)))
+    return ratios
 
 
 def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:

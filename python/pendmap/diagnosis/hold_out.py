@@ -38,16 +38,16 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     """
     model, free = fitted.fit.model, fitted.free
     known = {name: value for name, value in fitted.start.items() if "[" not in name}
+    if not any(run.drive for run in data.held):
+        # Effects of the drive do not act without a harmonic drive.
+        drives = {e.name for e in model.effects if e.drives}
+        free = tuple(name for name in free if name.partition(".")[0] not in drives)
     search: dict[str, Any] = {"steps": FEW_STEPS, "least_gain": LITTLE}
     if data.inside:
         free = tuple(name for name in free if name in known)
         places = {of: k for k, of in enumerate(data.held_of)}
         windows = tuple((places[w[0]], *w[1:]) for w in fitted.fit.windows if w[0] in places)
         search = {"steps": 0, "windows": windows}
-    elif not any(run.forced for run in data.held):
-        # Effects of the drive do not act in free decays.
-        drives = {e.name for e in model.effects if e.drives}
-        free = tuple(name for name in free if name.partition(".")[0] not in drives)
     fit = fit_runs(data.held, model, free, start=known, profiled=(), hold=True, **search)
     adapted = 0
     if not data.inside:

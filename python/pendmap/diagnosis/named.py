@@ -45,6 +45,13 @@ class NamedEffect:
         return self.effect.definition
 
     @property
+    def reaches_0(self) -> bool:
+        """Whether the interval of its size contains 0, or values below where it opposes."""
+        size = next(each.name for each in self.definition.parameters if each.role == "size")
+        low, high = self.ci95.get(size, (math.nan, math.nan))
+        return low <= 0 <= high or (self.definition.opposing == size and low <= 0)
+
+    @property
     def effect(self) -> Effect:
         """The effect as part of a model."""
         sure = self.probability, self.approximate

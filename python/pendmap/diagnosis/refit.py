@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.fitted_model import (
     LITTLE,
     FittedModel,
     fit_again,
     fit_with_candidates,
+    fit_without,
     impose_physics,
 )
 from pendmap.identification.fit import fit_runs
@@ -89,7 +90,9 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     if found is None or found.chi2 > fitted.chi2:
         return None
     found = impose_physics(data, try_mirrored_places(data, found), fitted.chi2)
-    return found if found is not None and found.chi2 <= fitted.chi2 else None
+    if found is None or found.chi2 > fitted.chi2 or not {c.name for c in added} <= {*found.names}:
+        return None
+    return found
 
 
 def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
@@ -121,23 +124,11 @@ def drop_effect(
     The fit starts at the fitted motion, the other parameters moved by the covariance if the effect
     is small.
     """
-    gone = {*dropped.free, *dropped.adapted}
-    model = fitted.fit.model
-    own: dict[str, Any] = {name: 0.0 for name in gone if name in {"Tr", "torque"}}
-    effects = tuple(e for e in model.effects if e.name != dropped.name)
-    faint = _is_faint(fitted, dropped)
-    start = fitted.start_without([dropped.free[0]]) if faint else fitted.start
+    size = dropped.free[0]
+    start = fitted.start_without([size]) if _is_faint(fitted, dropped) else fitted.start
     start = dict.fromkeys(fitted.zeroed, 0.0) | start
-    reduced = fit_again(
-        data,
-        fitted,
-        model=dataclasses.replace(model, effects=effects, **own),
-        free=[name for name in (*fitted.free, *fitted.zeroed) if name not in gone],
-        chosen=tuple(c for c in fitted.chosen if c.name != dropped.name),
-        start={name: value for name, value in start.items() if name not in gone},
-        least_gain=LITTLE * level,
-        target=target,
-    )
+    least, freed = LITTLE * level, fitted.zeroed
+    reduced = fit_without(data, fitted, size, start, least=least, target=target, freed=freed)
     if reduced is None or reduced.fit.given_up:
         return None
     return impose_physics(data, reduced, target)
@@ -198,7 +189,7 @@ def find_equivalents(
             starts.append(shape | score.start)
         fits = [_fit_from(data, fitted, candidate, start, EQUIVALENT_STEPS) for start in starts]
         for other in sorted((f for f in fits if f is not None), key=lambda f: -f.chi2):
-            if other.chi2 - fitted.chi2 >= Z95**2 * fitted.widening:
+            if other.fit.negative or other.chi2 - fitted.chi2 >= Z95**2 * fitted.widening:
                 continue
             for key in starts[0]:
                 here, there = fitted.fit.estimates[key], other.fit.estimates[key]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.forecast import noise_rms, share_closed
 from pendmap.comparison.replay import Fits
 from pendmap.diagnosis.candidates import ZERO, commonness, count_choices, list_candidates
 from pendmap.diagnosis.fitted_model import (
@@ -79,6 +80,7 @@ class State:
         own: Collection[Formula] = (),
     ) -> None:
         self.records = self.data = data
+        self.noise = noise_rms(data.fitted)
         self.thresholds, self.most = thresholds, most
         self.left_out, self.own = without, own
         self.errors = (0.0,) * len(data.fitted)
@@ -89,6 +91,7 @@ class State:
     def _begin(self, base: FittedModel) -> None:
         """Discard all fits except that of a baseline."""
         self.base = self._best = base
+        self._begun: FittedModel | None = None
         self._fits: dict[Key, FittedModel] = {key_of(()): base}
         self._reduced: set[tuple[Key, str]] = set()
         self._refits: dict[tuple[FittedModel, Key], FittedModel | None] = {}
@@ -123,6 +126,13 @@ class State:
         if found is None or not fitted.chosen:
             return found
         return impose_physics(self.data, found) or found
+
+    @property
+    def begun(self) -> FittedModel:
+        """The baseline within physical limits; as it is where no such fit is found."""
+        if self._begun is None:
+            self._begun = impose_physics(self.data, self.base) or self.base
+        return self._begun
 
     @property
     def level(self) -> float:
@@ -290,12 +300,10 @@ class State:
         """Return whether further effects close their share of the gap, or all of it."""
         return self.explains(full) or self.closed(reduced, full) >= self.thresholds.closes
 
-    @staticmethod
-    def closed(reduced: FittedModel, full: FittedModel) -> float:
+    def closed(self, reduced: FittedModel, full: FittedModel) -> float:
         """Return the share of the squared gap above the noise that further effects close."""
-        noise = min(full.noise.level, full.chi2 / max(full.fit.degrees, 1))
-        gap = reduced.chi2 - noise * reduced.fit.degrees
-        return (reduced.chi2 - full.chi2) / gap if gap > 0 else 1.0
+        before = reduced if reduced.chosen else self.begun
+        return share_closed(before.fit.rms, full.fit.rms, self.noise)
 
     def keeps_hold_out(self, reduced: FittedModel, full: FittedModel) -> bool:
         """Return whether further effects worsen no held-out set.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from pendmap.diagnosis.candidates import count_choices
+from pendmap.diagnosis.fitted_model import noise_ratios
 from pendmap.diagnosis.scores import CONTAINS
 from pendmap.diagnosis.search import fit_alternatives
 
@@ -183,9 +184,10 @@ class Assessment:
     verdict: Verdict
     identified: tuple[Identifiability, ...]  # The effects found, among their alternatives
     left: float  # Slow part of the residuals beyond noise, over its standard error
-    ratio: float  # Sum of squares over degrees of freedom
-    # Greatest such ratio allowed by chance and by the error ``r`` of the noise:
-    # ``1 + 4 sqrt(2 / N + 4 r^2)``.
+    # Mean of squared residuals over squared noise, in the run that exceeds what is allowed most.
+    ratio: float
+    # Greatest such ratio of noise, by chance, by the error ``r`` of its level and by its colour:
+    # ``1 + 4 sqrt(2 / N + 4 r^2)``, times ``swell`` of the residuals.
     ratio_allowed: float
     ratio_held: float  # Sum of squares over degrees of freedom on the records held back
     closed: float  # Share of the squared gap above the noise that the effects close
@@ -202,14 +204,17 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
 
     limits, fitted, held = state.thresholds, best.fitted, best.hold_out
     noise, degrees = fitted.noise, max(fitted.fit.degrees, 1)
-    allowed = 1 + 4 * math.sqrt(2 / degrees + 4 * state.data.doubt**2)
-    ratio = fitted.chi2 / degrees
+    # The run that exceeds its noise most; the colour of residuals swells what white noise allows.
+    ratios = noise_ratios(state.records, fitted)
+    ratio, white = max(ratios, key=lambda pair: pair[0] / pair[1])
+    allowed = white * noise.swell
     # The largest of several excesses is larger by chance.
     left = max(noise.z, max(noise.by_run) - SEVERAL)
     held_out = 1.0
     if fitted.chosen:
         # Probability that noise of the greatest accepted ratio leaves the held-out residuals.
-        most = limits.forecast * max(ratio, allowed)
+        scatter = 1 + 4 * math.sqrt(2 / degrees + 4 * state.data.doubt**2)
+        most = limits.forecast * max(fitted.chi2 / degrees, scatter)
         readings = max(held.degrees / fitted.level, 1.0)
         held_out = float(chdtrc(readings, held.chi2 / most / fitted.level))
     others = {
@@ -219,15 +224,16 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         "held_out": held_out,
     }
     form = assess_fit(state.scores(fitted), noise.chance_of, others)
-    lacks = form.chance < limits.rest
-    closed = _closed(state, best)
+    chance_left = form.chance if ratio <= allowed else 0.0
+    lacks = chance_left < limits.rest
+    closed = state.closed(state.base, fitted)
     identified = tuple(
         sorted(
             (compare_alternatives(state, fitted, candidate) for candidate in fitted.chosen),
             key=lambda s: -s.gain,
         )
     )
-    sure = probabilities(form.chance, [s.gain for s in identified])
+    sure = probabilities(chance_left, [s.gain for s in identified])
     verdict: Verdict
     if not identified:
         verdict = "unknown" if lacks else "none"
@@ -251,21 +257,6 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         verdict == "partial" or min(sure, default=1.0) < limits.sure,
         limits,
     )
-
-
-def _closed(state: State, best: ScoredModel) -> float:
-    """Return the share of the gap that the best model closes in the fitted records.
-
-    The gap is the sum of squares above that of the best model's noise; the share is 1 if the gap is
-    within the scatter of noise.
-    """
-    fitted, base = best.fitted, state.base
-    degrees = max(fitted.fit.degrees, 1)
-    noise = min(fitted.noise.level, fitted.chi2 / degrees)
-    gap = base.chi2 - noise * degrees
-    if gap <= noise * math.sqrt(2 * degrees):
-        return 1.0
-    return float(np.clip(1 - max(fitted.chi2 - noise * degrees, 0.0) / gap, -1.0, 1.0))
 
 
 def features(chance: float, gains: Sequence[float]) -> list[tuple[float, ...]]:

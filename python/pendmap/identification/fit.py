@@ -17,6 +17,7 @@ from pendmap.identification.parameters import (
     Conversion,
     free_quantities,
     interval,
+    opposing,
 )
 from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.units import Units
@@ -60,6 +61,12 @@ class TrajectoryFit:
     def __getitem__(self, name: str) -> float:
         """Return the value of one estimate."""
         return self.estimates[name].value
+
+    @property
+    def negative(self) -> str | None:
+        """First coefficient that opposes the motion and is estimated below 0."""
+        names = (name for name in opposing(self.model.effects) if name in self.estimates)
+        return next((name for name in names if self[name] < 0), None)
 
     def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
         """Return a run's drive, with an unknown phase replaced by its fit (run ``place``), or 0."""

@@ -12,12 +12,12 @@ from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import COUNTERPARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
     from pendmap.identification.runs import FitRun
-    from pendmap.model import Rig
+    from pendmap.model import Effect, Rig
     from pendmap.signal import Floats
     from pendmap.units import Units
 
@@ -32,6 +32,12 @@ SENSOR: Final = ("bias", "tilt")
 
 OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run
+
+
+def opposing(effects: Iterable[Effect]) -> list[str]:
+    """Return the coefficients that are at least 0: those of damping, and sizes of effects."""
+    sizes = [f"{e.name}.{size}" for e in effects if (size := e.definition.opposing) is not None]
+    return [*OPPOSING, *sizes]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -127,10 +127,11 @@ class EffectDefinition:
         return {parameter.name: parameter for parameter in self.parameters}[name]
 
     @property
-    def opposes(self) -> bool:
-        """Whether it is damping whose size is 0 or more."""
-        sizes = (parameter for parameter in self.parameters if parameter.role == "size")
-        return self.group == "damping" and all(size.typical[0] >= 0 for size in sizes)
+    def opposing(self) -> str | None:
+        """Name of the size if the effect is damping whose size is 0 or more."""
+        size = next((each for each in self.parameters if each.role == "size"), None)
+        opposes = size is not None and self.group == "damping" and size.typical[0] >= 0
+        return size.name if size is not None and opposes else None
 
 
 @functools.cache
@@ -258,6 +259,11 @@ class Effect:
     def values(self) -> list[float]:
         """The parameters in the library's order."""
         return list(self.parameters.values())
+
+    def held(self, names: Collection[str]) -> Effect:
+        """Return it with its parameters among ``names`` (``EFFECT.PARAMETER``) at 0."""
+        zeros = {n: 0.0 for n in self.parameters if f"{self.name}.{n}" in names}
+        return dataclasses.replace(self, parameters={**self.parameters, **zeros})
 
     @property
     def drives(self) -> bool:

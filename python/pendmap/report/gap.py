@@ -64,9 +64,9 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
     judged = found.assessment
     form, limits = judged.form, judged.thresholds
     yield (
-        f"Chi-squared over degrees of freedom is {number(judged.ratio, 4)}, where noise alone has "
-        f"1; the uncertainty of the noise allows up to {number(judged.ratio_allowed, 4)}. On "
-        f"held-out data it is {number(judged.ratio_held, 4)}."
+        f"The mean of squared residuals over squared noise is {number(judged.ratio, 4)} in the run "
+        "that exceeds its noise most, where noise alone has 1; the uncertainty and the colour of "
+        f"the noise allow up to {number(judged.ratio_allowed, 4)}."
     )
     left = {
         "slow": "as much in the slow part of the residuals",
@@ -77,8 +77,7 @@ def _statistics(found: Discrepancy) -> Iterator[str]:
     if form.further is not None:
         left["effects"] += f" ({code(form.further)} would explain most)"
     if judged.identified:
-        most = limits.forecast * max(judged.ratio, judged.ratio_allowed)
-        left["held_out"] = f"{number(most, 3)} of chi-squared over degrees of freedom held out"
+        left["held_out"] = "as large residuals in what was held out"
     rare = f"below {number(RARE, 1)}"
     for key, what in left.items():
         chance_of = form.chances[key]
@@ -215,8 +214,8 @@ def noise_of(found: Discrepancy) -> Iterator[str]:
         quiet, floor = (float(np.sqrt(np.mean(x[still] ** 2))) for x in (residual, sigma))
         yield (
             "Root mean squares are dominated by the fast readings, which have the most noise; "
-            "chi-squared takes each residual over the noise at its own speed. Thus chi-squared "
-            f"over degrees of freedom is {number(judged.ratio)}, although the residual as a whole "
+            "the mean above takes each residual over the noise at its own speed. Thus it is "
+            f"{number(judged.ratio)}, although the residual as a whole "
             "is as large as the noise: in the fifth of the readings that have the least noise, the "
             f"residual is {mrad(quiet)} and the noise {mrad(floor)}."
         )

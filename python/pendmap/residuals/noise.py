@@ -39,6 +39,8 @@ from scipy import stats
 from scipy.fft import dct
 from scipy.special import fdtr, fdtrc
 
+from pendmap.signal.local_polynomial import POINTS, even_weights
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -101,6 +103,8 @@ class ResidualNoise:
     # Effective number of readings ``3 (sum P)^2 / sum P^2``, with squared amplitudes ``P``: all for
     # white noise, a few for residuals that oscillate.
     independent: float
+    # Variance over that which local fits to readings of this colour show; 1 for white noise.
+    swell: float = 1.0
 
     def chance_of(self, gain: float, count: int, least: float = 0.0) -> float:
         """Return the probability of at least this gain from noise with ``count`` parameters.
@@ -149,6 +153,7 @@ def estimate_noise(
         np.stack([levels, laws.weights]),
         float(spectra.quick_sizes.sum()),
         spectra.independent,
+        float(laws.weights @ (1 / (laws.shapes @ _local_shares()))),
     )
 
 
@@ -168,6 +173,15 @@ def _posterior(laws: Laws, left: Floats, degrees: Floats, sizes: Floats) -> Laws
     if not weights.sum() > 0:
         return laws
     return dataclasses.replace(laws, weights=weights / weights.sum())
+
+
+@functools.cache
+def _local_shares() -> Floats:
+    """Return the share of each bin in the variance of white noise that a local fit shows."""
+    weights, _ = even_weights(4, POINTS)
+    lags = np.arange(POINTS) - POINTS // 2
+    response = (np.cos(np.outer(PHASES, lags)) @ weights) ** 2
+    return np.asarray(response / response.sum(), np.float64)
 
 
 def _denominator_degrees(sizes: Floats, quick: Floats) -> float:

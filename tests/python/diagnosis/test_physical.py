@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import pendmap
 from driven_decays import motion
 from hidden import diagnosed
 from pendmap import InputError, report, virtual_rig
@@ -19,7 +22,11 @@ from pendmap.diagnosis.fitted_model import FittedModel, fit_model, impose_physic
 from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.summary import as_json
 from pendmap.model import Effect, Rig, save_model
+from pendmap.model.rig import own_name
 from pendmap.records import Experiment, Run, read_experiment
+
+if TYPE_CHECKING:
+    from pendmap.model.effects import EffectDefinition
 
 W0, TR, Q = 6.2, 0.05, 0.02
 BASE = ("w0", "c_over_m", "Tr")
@@ -68,12 +75,43 @@ def test_a_physical_model_is_unchanged() -> None:
     assert impose_physics(data, fitted) is fitted
 
 
-def test_a_drag_that_adds_energy_is_refused() -> None:
+def test_a_drag_that_adds_energy_is_left_out() -> None:
     # The damping falls with velocity: a drag of the wrong sign fits best.
     data = split_records(decay(c_over_m=0.15, drag=-0.01))
     fitted = with_effect(data, "quadratic_drag", q=0.01)
     assert fitted.fit["quadratic_drag.q"] == pytest.approx(-0.01, rel=0.1)
-    assert impose_physics(data, fitted) is None
+    held = impose_physics(data, fitted)
+    assert held is not None
+    assert held.chosen == () == held.fit.model.effects
+    assert set(held.fit.estimates) == set(BASE)
+
+
+OPPOSING = [e for e in pendmap.effects() if e.opposing and own_name(e.name) is None]
+
+
+@pytest.mark.parametrize("effect", OPPOSING, ids=lambda effect: effect.name)
+def test_what_opposes_the_motion_is_never_below_0(effect: EffectDefinition) -> None:
+    # The damping falls with velocity. Sizes just below 0 are far within their errors.
+    experiment = decay(c_over_m=0.15, drag=-0.01)
+    data, (size, *shape) = split_records(experiment), [each.name for each in effect.parameters]
+    begin = Effect.blank(effect.name, Rig(W0).units).parameters
+    fitted = with_effect(data, effect.name, steps=0, **{**begin, size: -1e-9})
+    key = f"{effect.name}.{size}"
+    assert fitted.fit[key] < 0
+    held = impose_physics(data, fitted)
+    assert held is not None
+    assert key not in held.fit.estimates
+    assert held.chosen == () == held.fit.model.effects
+    given = impose_physics(data, dataclasses.replace(fitted, chosen=()))
+    assert given is not None
+    assert key in given.zeroed
+    assert given.fit.model.effects[0].parameters[size] == 0
+    found = pendmap.identify(experiment, effects=[effect.name], methods=["trajectory"])
+    assert found.joint is not None
+    model = {e.name: e.parameters for e in found.joint.fit.model.effects}
+    assert model[effect.name][size] >= 0
+    assert all(found.parameters[n].value >= 0 for n in (key, "c_over_m", "Tr"))
+    assert not found.joint.fit.negative
 
 
 @pytest.mark.parametrize(

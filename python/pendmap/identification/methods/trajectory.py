@@ -18,7 +18,7 @@ from pendmap.formatting import Estimate, counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.start import TooShortError, starting_values
-from pendmap.identification.parameters import OPPOSING, SENSOR
+from pendmap.identification.parameters import OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
@@ -137,11 +137,8 @@ def _reaches_0(estimate: Estimate) -> bool:
 
 def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
     fit, readings, found = joint.fit, joint.readings, []
-    opposing = [
-        f"{e.name}.{size}" for e in fit.model.effects if e.definition.opposes for size in e.sizes
-    ]
     every = {**estimates, **joint.negative}
-    for name in (*OPPOSING, *opposing):
+    for name in opposing(fit.model.effects):
         if name in every and every[name].value < 0:
             reaches = _reaches_0(every[name])
             why = "its interval reaches 0" if reaches else "an effect is missing in the model"
@@ -193,15 +190,15 @@ def fit_from_start(
     of the first record; TooShortError is raised if that has too few. If the fit is poor and
     ``start`` is not a Rig, a second one starts from the methods of peaks, or a global search over
     their envelope; the better one is returned. Readings whose noise grows with speed are weighted
-    accordingly, unless the model lacks an effect: then weights are equal. Damping coefficients that
-    are ``held`` are 0; further ``effects`` (SI) begin small if given by name; all their parameters
+    accordingly, unless the model lacks an effect: then weights are equal. Coefficients that are
+    ``held`` are 0; further ``effects`` (SI) begin small if given by name; all their parameters
     except exponents, orders and widths are fitted.
     """
     first = runs[0]
     time, theta = first.time[first.counted], first.angle[first.counted]
     doubt = max(reading.doubt for reading in readings)
     names = ["w0", *(name for name in OPPOSING if name not in held)]
-    zeros: dict[str, Any] = dict.fromkeys(held, 0.0)
+    zeros: dict[str, Any] = {name: 0.0 for name in held if "." not in name}
     # A sensor on the rod has a bias instead of a zero error.
     zeroed = any(run.rod_sensor is None for run in runs)
 
@@ -211,8 +208,11 @@ def fit_from_start(
         known = [*model.effects, *named]
         if zeroed and OFFSET not in {e.name for e in known}:
             known.append(Effect(OFFSET, {"d": 0.0}))
-        sizes = [f"{effect.name}.{size}" for effect in known for size in effect.sizes]
-        model = dataclasses.replace(model, effects=tuple(known))
+        # Nothing determines the other parameters of an effect that is held at 0.
+        still = {name.partition(".")[0] for name in held}
+        loose = [effect for effect in known if effect.name not in still]
+        sizes = [f"{effect.name}.{size}" for effect in loose for size in effect.sizes]
+        model = dataclasses.replace(model, effects=tuple(e.held(held) for e in known))
         return fit_runs(runs, model, [*names, *sizes], sigma_doubt=doubt)
 
     found = fitted(start)
@@ -252,8 +252,8 @@ def _start_of(
 class JointFit:
     """Fit of a pendulum to several runs, in the order of its curves and residuals.
 
-    ``negative`` are damping coefficients that a fit made negative, as it gave them: they are held
-    at 0 in ``fit``.
+    ``negative`` are coefficients that oppose the motion and that a fit made negative, as it gave
+    them: they are held at 0 in ``fit``.
     """
 
     fit: TrajectoryFit
@@ -281,7 +281,7 @@ def fit_together(
 
     Starting values are ``start``, with its effects, or ``known`` parameters, else estimated from
     the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted;
-    damping that is ``held`` is 0.
+    coefficients that are ``held`` are 0.
     """
     if not runs:
         raise InputError("runs must have one record or more, got none")
@@ -297,16 +297,13 @@ def fit_together(
 
 
 def physical(joint: JointFit) -> JointFit:
-    """Return a fit without negative damping: that is held at 0, and the others fitted again.
+    """Return a fit whose damping and sizes of effects do not drive the motion.
 
+    What opposes the motion and is estimated below 0 is held at 0, and the others are fitted again.
     Where no such fit is found, the fit is returned as it is.
     """
-    while negative := {
-        name: estimate
-        for name, estimate in joint.fit.estimates.items()
-        if name in OPPOSING and estimate.value < 0
-    }:
-        known = {**joint.negative, **negative}
+    while name := joint.fit.negative:
+        known = {**joint.negative, name: joint.fit.estimates[name]}
         try:
             again = fit_together(joint.runs, start=joint.fit.model, held=known)
         except FitDiverged:
