@@ -11,7 +11,7 @@ import pytest
 from decays import decay, record
 from pendmap import InputError
 from pendmap.formatting import interval
-from pendmap.identification import Estimate, identified_model, identify_experiment
+from pendmap.identification import Estimate, identified_model, identify
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Run
 
@@ -20,7 +20,7 @@ def test_a_search_that_did_not_converge_gives_no_model() -> None:
     time, angle = record(decay(release=0.5, until=40.0), seconds=30)
     run = Run("a", "a.csv", "free", time, angle, np.ones(time.size, bool))
     names = ["trajectory", "combined_repaired"]
-    report = identify_experiment(Experiment(Path("there"), (run,)), methods=names)
+    report = identify(Experiment(Path("there"), (run,)), methods=names)
     assert report.best.converged
     assert not report.passed_over
     lost = dataclasses.replace(report.best, converged=False)

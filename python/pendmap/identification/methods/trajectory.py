@@ -21,6 +21,7 @@ from pendmap.identification.methods.start import TooShortError, starting_values
 from pendmap.identification.parameters import OPPOSING, SENSOR
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
+from pendmap.identification.valley import upper_limit
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 from pendmap.records import Run
@@ -53,11 +54,10 @@ def identify(
     """Identify the damping of a free decay by fitting its whole trajectory.
 
     ``choices`` are those of :func:`fit_decay`. Results are ``w0``, ``c_over_m``, ``Tr``, ``offset``
-    and the effects' parameters. Negative damping is possible, with a warning that an effect may be
-    missing.
+    and the effects' parameters. Negative damping is held at 0.
     """
     try:
-        return identification_of(fit_decay(time, theta, **choices))
+        return identification_of(physical(fit_decay(time, theta, **choices)))
     except TooShortError as error:
         return Identification(warnings=(str(error),), applicable=False)
 
@@ -75,11 +75,8 @@ def identification_of(joint: JointFit) -> Identification:
         for e in fit.estimates.values()
     ]
     estimates = dict(zip(names, found, strict=True))
-    # What was held at 0 has the interval of the fit in which it was free, if that reaches 0.
-    for name, free in joint.negative.items():
-        estimates[name] = (
-            dataclasses.replace(free, value=0.0) if _reaches_0(free) else Estimate(0.0)
-        )
+    for name, limit in joint.limits.items():
+        estimates[name] = Estimate(0.0, None, (0.0, limit))
     first = [name for name in ("w0", *OPPOSING) if name in estimates]
     estimates = {name: estimates[name] for name in dict.fromkeys([*first, *estimates])}
     count = len(fit.windows)
@@ -253,13 +250,14 @@ class JointFit:
     """Fit of a pendulum to several runs, in the order of its curves and residuals.
 
     ``negative`` are damping coefficients that a fit made negative, as it gave them: they are held
-    at 0 in ``fit``.
+    at 0 in ``fit``, and ``limits`` are their upper 95 % limits.
     """
 
     fit: TrajectoryFit
     runs: tuple[Run, ...]
     readings: tuple[Reading, ...]
     negative: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
+    limits: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def noise(self) -> float:
@@ -307,9 +305,12 @@ def physical(joint: JointFit) -> JointFit:
         if name in OPPOSING and estimate.value < 0
     }:
         known = {**joint.negative, **negative}
+        given = [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)]
         try:
-            again = fit_together(joint.runs, start=joint.fit.model, held=known)
+            fit, worth = fit_from_start(given, joint.readings, start=joint.fit.model, held=known)
+            # An estimate below 0 is wrong by no less than its size.
+            limits = {n: max(upper_limit(fit, given, n), -e.value) for n, e in known.items()}
         except FitDiverged:
             return joint
-        joint = dataclasses.replace(again, negative=known)
+        joint = JointFit(fit, joint.runs, worth, known, limits)
     return joint
