@@ -196,13 +196,11 @@ def _frame(time: object, theta: object) -> pd.DataFrame:
     """Return the table of a record of times, s, and angles, rad."""
     import pandas as pd  # noqa: PLC0415 (deferred import)
 
-    columns = {}
-    for name, values in (("t_s", time), ("theta_rad", theta)):
-        columns[name] = np.asarray(values)
-        if columns[name].ndim != 1 or columns[name].shape != columns["t_s"].shape:
-            shapes = f"{np.shape(time)} and {np.shape(theta)}"
-            raise InputError(f"times and theta must be arrays of one shape (N,), got {shapes}")
-    return pd.DataFrame(columns)
+    columns = np.asarray(time), np.asarray(theta)
+    if columns[0].ndim != 1 or columns[1].shape != columns[0].shape:
+        shapes = " and ".join(str(values.shape) for values in columns)
+        raise InputError(f"times and theta must be arrays of one shape (N,), got {shapes}")
+    return pd.DataFrame(dict(zip(("t_s", "theta_rad"), columns, strict=True)))
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:

@@ -137,7 +137,10 @@ class IdentificationReport(FitResult):
         first = next(iter(self.methods.values()))
         reasons = "; ".join(first.warnings)
         if not first.converged:
-            raise NotFittedError(f"{self.run.name}: {first.method} did not converge: {reasons}")
+            raise NotFittedError(
+                f"{self.run.name}: must be the record of a free decay, got one to which "
+                f"{first.method} did not converge{'' if first.applicable else f': {reasons}'}"
+            )
         if self.asked:
             names = ", ".join(self.asked)
             raise NotFittedError(f"{self.run.name}: {names} could not be fitted: {reasons}")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from decays import decay, record
-from pendmap import InputError
+from pendmap.errors import NotFittedError
 from pendmap.formatting import interval
 from pendmap.identification import Estimate, identified_model, identify
 from pendmap.identification.report import as_json, as_text
@@ -24,18 +24,28 @@ def test_a_search_that_did_not_converge_gives_no_model() -> None:
     assert report.best.converged
     assert not report.passed_over
     lost = dataclasses.replace(report.best, converged=False)
-    other = dataclasses.replace(report, methods=report.methods | {"trajectory": lost})
-    assert other.best.method == "combined_repaired"
-    line = "Warning: trajectory did not converge: the model is that of combined_repaired"
+    for methods in (report.methods | {"trajectory": lost}, {"trajectory": lost}):
+        other = dataclasses.replace(report, methods=methods)
+        with pytest.raises(NotFittedError, match="trajectory did not converge"):
+            identified_model(other)
+        assert as_json(other)["best"] is None
+        assert not any(text.startswith("trajectory: 3001") for text in as_text(other))
+
+
+def test_a_method_that_cannot_be_applied_is_replaced_unless_effects_are_given() -> None:
+    time, angle = record(decay(release=0.5, until=40.0), seconds=30)
+    run = Run("a", "a.csv", "free", time, angle, np.ones(time.size, bool))
+    names = ["trajectory", "combined_repaired"]
+    report = identify(Experiment(Path("there"), (run,)), methods=names)
+    short = dataclasses.replace(report.best, applicable=False, warnings=("too short",))
+    other = dataclasses.replace(report, methods=report.methods | {"trajectory": short})
+    line = "Warning: trajectory cannot be applied: the model is that of combined_repaired"
     assert line in list(as_text(other))
     model = identified_model(other)
     assert model.w0 == report.methods["combined_repaired"]["w0"]
     assert model.notes["provenance"]["method"] == "combined_repaired"
-    alone = dataclasses.replace(report, methods={"trajectory": lost})
-    with pytest.raises(InputError, match="got one to which trajectory did not converge"):
-        identified_model(alone)
-    assert as_json(alone)["best"] is None
-    assert not any(text.startswith("trajectory: 3001") for text in as_text(alone))
+    with pytest.raises(NotFittedError, match="magnet could not be fitted: too short"):
+        identified_model(dataclasses.replace(other, asked=("magnet",)))
 
 
 @pytest.mark.parametrize(

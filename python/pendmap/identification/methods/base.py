@@ -107,7 +107,7 @@ class Identification(Parameters):
     def with_clock(self, stderr: float) -> Identification:
         """Return the result with the relative standard error of a sampling interval added."""
         every = self.estimates.items()
-        further = {n: stderr * PLACES.get(n, ("", 0.0))[1] * e.value for n, e in every}
+        further = {n: stderr * PLACES[n][1] * e.value if n in PLACES else 0.0 for n, e in every}
         estimates = {
             n: dataclasses.replace(
                 e,
