@@ -43,7 +43,6 @@ from pendmap.records.summary import unit_wrong
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    import pandas as pd
     from numpy.typing import ArrayLike
 
     from pendmap.model import Effect
@@ -142,7 +141,13 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     True
     """
     if theta is not None:
-        records = _frame(records, theta)
+        import pandas as pd  # noqa: PLC0415 (deferred import)
+
+        columns = {"t_s": np.asarray(records), "theta_rad": np.asarray(theta)}
+        shapes = [values.shape for values in columns.values()]
+        if len(shapes[0]) != 1 or shapes[1] != shapes[0]:
+            raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
+        records = pd.DataFrame(columns)
     experiment = experiment_of(records, rate_hz=rate_hz)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
@@ -190,17 +195,6 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     report(steps, steps)
     asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
     return IdentificationReport(experiment, run, peaks, found, joint, table, drag, asked)
-
-
-def _frame(time: object, theta: object) -> pd.DataFrame:
-    """Return the table of a record of times, s, and angles, rad."""
-    import pandas as pd  # noqa: PLC0415 (deferred import)
-
-    columns = np.asarray(time), np.asarray(theta)
-    if columns[0].ndim != 1 or columns[1].shape != columns[0].shape:
-        shapes = " and ".join(str(values.shape) for values in columns)
-        raise InputError(f"times and theta must be arrays of one shape (N,), got {shapes}")
-    return pd.DataFrame(dict(zip(("t_s", "theta_rad"), columns, strict=True)))
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:

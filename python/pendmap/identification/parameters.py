@@ -200,10 +200,8 @@ class Conversion:
 
 def widened(value: float, ends: tuple[float, float], further: float) -> tuple[float, float]:
     """Return the ends of a 95 % interval with a further standard error."""
-    if not further:
-        return ends
     low, high = (math.hypot(end - value, Z95 * further) for end in ends)
-    return value - low, value + high
+    return (value - low, value + high) if further else ends
 
 
 def interval(value: float, half: float, *, mixed: bool) -> tuple[float, float]:

@@ -106,19 +106,15 @@ class Identification(Parameters):
 
     def with_clock(self, stderr: float) -> Identification:
         """Return the result with the relative standard error of a sampling interval added."""
-        every = self.estimates.items()
-        further = {n: stderr * PLACES[n][1] * e.value if n in PLACES else 0.0 for n, e in every}
-        estimates = {
-            n: dataclasses.replace(
-                e,
-                stderr=None if e.stderr is None else math.hypot(e.stderr, further[n]),
-                ci95=None if e.ci95 is None else widened(e.value, e.ci95, further[n]),
-            )
-            for n, e in every
-        }
+        estimates, further = {}, {}
+        for name, e in self.estimates.items():
+            own = further[name] = stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
+            error = None if e.stderr is None else math.hypot(e.stderr, own)
+            ends = None if e.ci95 is None else widened(e.value, e.ci95, own)
+            estimates[name] = Estimate(e.value, error, ends)
         covariance = self.covariance
         if covariance is not None:
-            both = np.array([further[name] for name in covariance[0]])
+            both = [further[name] for name in covariance[0]]
             covariance = covariance[0], covariance[1] + np.outer(both, both)
         return dataclasses.replace(self, estimates=estimates, covariance=covariance)
 
@@ -145,9 +141,10 @@ class Identification(Parameters):
             scale = 1 / (2 * w0.value) if power == 1 else 1 / w0.value**2
             value = over.value * scale
             if over.stderr is None or w0.stderr is None:
-                low, high = over.ci95 or (None, None)
-                known = low is not None and high is not None
-                made[name] = Estimate(value, None, (scale * low, scale * high) if known else None)
+                ends = over.ci95
+                made[name] = Estimate(
+                    value, None, None if ends is None else (scale * ends[0], scale * ends[1])
+                )
                 continue
             lever = -power * value / w0.value
             names, matrix = self.covariance or ((), np.empty((0, 0)))

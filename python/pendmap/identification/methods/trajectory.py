@@ -51,11 +51,7 @@ def identify(
     theta: ArrayLike,
     **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
-    """Identify the damping of a free decay by fitting its whole trajectory.
-
-    ``choices`` are those of :func:`fit_decay`. Results are ``w0``, ``c_over_m``, ``Tr``, ``offset``
-    and the effects' parameters. Negative damping is held at 0.
-    """
+    """Identify the damping of a free decay, for the choices of :func:`fit_decay`."""
     try:
         return identification_of(physical(fit_decay(time, theta, **choices)))
     except TooShortError as error:
@@ -106,11 +102,7 @@ def fit_decay(
     trusted: ArrayLike | None = None,
     **choices: Any,  # noqa: ANN401 (those of fit_from_start)
 ) -> JointFit:
-    """Return the fit to a free decay (s, and rad from the downward rest).
-
-    ``sigma`` (rad) is by default the noise estimated without a model; ``choices`` are those of
-    :func:`fit_from_start`.
-    """
+    """Return the fit to a free decay (s, rad), for the choices of :func:`fit_from_start`."""
     t, x = (np.ascontiguousarray(values, dtype=np.float64) for values in (time, theta))
     if t.shape != x.shape or t.ndim != 1:
         raise InputError(f"time has {t.shape} values and theta {x.shape}: they must be as many")
