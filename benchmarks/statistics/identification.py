@@ -22,8 +22,9 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
+from pendmap.identification import Estimate, Identification, Peaks, find_peaks
 from pendmap.identification.methods import combined, de_paula, log_decrement
+from pendmap.identification.methods.registry import identify_record
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
@@ -229,7 +230,7 @@ def against_truth(path: Motion, count: int) -> None:
         times, angles = record(path, seed, OFFSET)
         start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
         begin = time.perf_counter()
-        everything = identify(times, angles)
+        everything = identify_record(times, angles)
         seconds.append(time.perf_counter() - begin)
         for name, each in everything.items():
             if not each.applicable:
@@ -278,7 +279,7 @@ def spoilers(path: Motion, count: int) -> None:
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
                 start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
-                found = identify(times, angles, methods=[name])[name]
+                found = identify_record(times, angles, methods=[name])[name]
                 if found.applicable:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")

@@ -200,8 +200,13 @@ def interval(estimate: Estimate) -> str:
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012."""
+    """Return a number with its error in the last digits, ``6.2047(12)`` for +- 0.0012.
+
+    A number that is held at the end of its interval has the other end: ``0 (below 0.0012)``.
+    """
     value, error = estimate.value, estimate.stderr
+    if error is None and estimate.ci95 is not None and estimate.ci95[0] == value:
+        return f"{value:.{DIGITS}g} (below {estimate.ci95[1]:.{ERROR_DIGITS}g})"
     text = f"{value:.{DIGITS}g}"
     if error is not None and math.isfinite(error) and error > 0:
         places = _places(error)

@@ -64,10 +64,10 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
     (folder / "formula.toml").write_text(FORMULA, encoding="utf-8")
     free = pendmap.read_experiment(folder / "r.csv")
     both = pendmap.read_experiment(folder)
-    report = identification.identify_experiment(free)
+    report = identification.identify(free)
     model = identification.identified_model(report)
     found = diagnosis.diagnose(free, max_effects=0)
-    methods = identification.identify(time, theta)
+    methods = identification.identify(time, theta).methods
     pendulum = pendmap.Pendulum(p=0.6)
     small = pendmap.Grid.square(12)
     basins = pendmap.basins(pendulum, small)
@@ -96,7 +96,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "find_peaks": lambda: identification.find_peaks(time, theta),
         "identified_model": lambda: identification.identified_model(report),
         "identify": lambda: identification.identify(time, theta),
-        "identify_experiment": lambda: identification.identify_experiment(free),
         "lifetime": lambda: pendmap.lifetime(pendmap.Pendulum(p=1.2), starts=100),
         "load": lambda: pendmap.load(folder / "given.nc"),
         "load_formulas": lambda: pendmap.load_formulas(folder / "formula.toml"),

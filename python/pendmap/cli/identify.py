@@ -69,7 +69,7 @@ def command(
     every other command, identify.png and identify.rrd if no output is named; a .nc has all of the
     result, for plot and pendmap.load.
     """
-    from pendmap.identification import identified_model, identify_experiment
+    from pendmap.identification import identified_model, identify
     from pendmap.identification.report import as_json, in_short
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
@@ -78,9 +78,7 @@ def command(
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("identify") as progress:
-        report = identify_experiment(
-            experiment, methods=methods or None, effects=effects, progress=progress
-        )
+        report = identify(experiment, methods=methods or None, effects=effects, progress=progress)
 
     def finish(written: Written) -> None:
         more = {"model": written.name(outputs.out), "simd": instruction_set()}

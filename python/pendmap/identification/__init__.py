@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pendmap.formatting import Estimate
-from pendmap.identification.experiment import identified_model
-from pendmap.identification.experiment import identify as identify_experiment
+from pendmap.identification.experiment import identified_model, identify
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import METHODS, identify
+from pendmap.identification.methods.registry import METHODS
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.report import IdentificationReport
 from pendmap.identification.table1 import PeakErrors, Table1, table1
@@ -22,6 +21,5 @@ __all__ = [
     "find_peaks",
     "identified_model",
     "identify",
-    "identify_experiment",
     "table1",
 ]

@@ -18,8 +18,12 @@ from pendmap.errors import (
 )
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import BEST, check_names, identify_peaks
-from pendmap.identification.methods.registry import identify as identify_record
+from pendmap.identification.methods.registry import (
+    BEST,
+    check_names,
+    identify_peaks,
+    identify_record,
+)
 from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
     JointFit,
@@ -38,6 +42,8 @@ from pendmap.records.summary import unit_wrong
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
 
     from pendmap.model import Effect
     from pendmap.records import Experiment, Run
@@ -61,7 +67,8 @@ def decay_of(experiment: Experiment) -> Run:
 
 
 def identify(  # noqa: PLR0913 (each is asked for by name)
-    records: Records | Sequence[Records],
+    records: Records | Sequence[Records] | ArrayLike,
+    theta: ArrayLike | None = None,
     *,
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
@@ -77,9 +84,11 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    records : path, DataFrame, Experiment, Run, or a sequence of these
+    records : path, DataFrame, Experiment, Run, or a sequence of these; array, shape (N,)
         Free decays of one rig: files, folders and DataFrames as for
-        :func:`pendmap.read_experiment`, or what it returns.
+        :func:`pendmap.read_experiment`, or what it returns; with ``theta`` the times, s.
+    theta : array, shape (N,), optional
+        Angles from the downward rest, rad, of one free decay.
     methods : iterable of str, optional
         Names of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
@@ -100,8 +109,8 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     Raises
     ------
     InputError
-        If a method or an effect is unknown, an effect acts on the drive, there is no free decay,
-        or the best fit does not follow the records.
+        If a method or an effect is unknown, an effect acts on the drive or cannot be fitted, there
+        is no free decay, or the best fit does not follow the records.
     OSError
         If a file cannot be read.
 
@@ -131,6 +140,14 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     >>> again.model == report.model
     True
     """
+    if theta is not None:
+        import pandas as pd  # noqa: PLC0415 (deferred import)
+
+        columns = {"t_s": np.asarray(records), "theta_rad": np.asarray(theta)}
+        shapes = [values.shape for values in columns.values()]
+        if len(shapes[0]) != 1 or shapes[1] != shapes[0]:
+            raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
+        records = pd.DataFrame(columns)
     experiment = experiment_of(records, rate_hz=rate_hz)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
@@ -144,6 +161,9 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
                 "damping, torque or reading"
             )
     run = decay_of(experiment)
+    if effects and (run.peaks_only or BEST not in names):
+        got = "turning points alone" if run.peaks_only else f"the method {names[0]}"
+        raise InputError(f"effects must be left out without a fit of every sample, got {got}")
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
         found = identify_peaks(peaks, names)
@@ -160,7 +180,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     report(before - 1, steps)
     peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
     report(before, steps)
-    found |= identify_record(
+    rest = identify_record(
         run.time,
         run.theta,
         sigma=sigma,
@@ -169,10 +189,12 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
         peaks=peaks,
         progress=lambda done, _total: report(before + done, steps),
     )
+    found |= {name: one.with_clock(run.clock_stderr) for name, one in rest.items()}
     table = table_of_run(run, peaks, found)
     drag = None if joint is None or start is not None or effects else _with_drag(joint)
     report(steps, steps)
-    return IdentificationReport(experiment, run, peaks, found, joint, table, drag)
+    asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
+    return IdentificationReport(experiment, run, peaks, found, joint, table, drag, asked)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
@@ -204,6 +226,8 @@ def _best(
     try:
         joint = physical(fit_together(runs, start=start, known=known, effects=effects))
     except TooShortError as error:
+        if effects:
+            raise
         return None, Identification(BEST, warnings=(str(error),), applicable=False)
     except FitDiverged as error:
         if start is not None or effects:
@@ -237,7 +261,8 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
     Raises
     ------
     InputError
-        If no method gives a model.
+        If no method gives a model, the trajectory method did not converge, or a requested effect
+        was not fitted.
     """
     best = report.best
     sha256 = report.experiment.sha256

@@ -18,6 +18,7 @@ from pendmap.identification.parameters import (
     free_quantities,
     interval,
     opposing,
+    widened,
 )
 from pendmap.identification.runs import bare_run, bare_windows, rig_of, tolerance_of
 from pendmap.units import Units
@@ -130,7 +131,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     begun = None if windows is None else bare_windows(windows, units)
     with core_errors(FitDiverged):
         found = _core.fit_runs(given, unknown.start, choices, begun)
-    return _result(found, model, unknown, chosen)
+    return _result(found, model, unknown, chosen, max(run.clock_stderr for run in runs))
 
 
 def prepared(
@@ -146,11 +147,14 @@ def prepared(
 
 
 def _result(
-    found: _core.Fit, model: Rig, unknown: Conversion, chosen: Sequence[int]
+    found: _core.Fit, model: Rig, unknown: Conversion, chosen: Sequence[int], clock: float
 ) -> TrajectoryFit:
     units, bare = unknown.units, found.values
     values = unknown.given(bare)
+    # An error of the clock's rate changes all parameters together by their power of time.
+    by_clock = clock * unknown.powers(bare) * values
     covariance = unknown.covariance(found.covariance, bare)
+    covariance += np.outer(by_clock, by_clock) / found.widening
     errors = [math.sqrt(variance) for variance in np.diag(covariance)]
     # Sizes with a free exponent have no profile: their intervals follow from the covariance.
     wide = math.sqrt(LEVEL * found.widening)
@@ -165,7 +169,7 @@ def _result(
         # The unit of a bias may be negative; an end that is not found is NaN.
         low = next((end for end in both if end < values[k]), math.nan)
         high = next((end for end in both if end > values[k]), math.nan)
-        intervals[k] = low, high
+        intervals[k] = widened(float(values[k]), (low, high), float(by_clock[k]))
     estimates, ends = {}, {}
     for k, name in enumerate(unknown.names):
         low, high = intervals.get(k, (math.nan, math.nan))

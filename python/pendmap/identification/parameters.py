@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import COUNTERPARTS
+from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -190,13 +191,23 @@ class Conversion:
         places = {name: k for k, name in enumerate(self.names)}
         return {k: places[q.less] for k, q in enumerate(self.quantities) if q.less is not None}
 
-    def _scales(self, values: ArrayLike) -> Floats:
-        """Return the SI value of each parameter's unit in the core."""
+    def powers(self, values: ArrayLike) -> Floats:
+        """Return the power of 1/s in each parameter's unit."""
         powers = np.array([q.power for q in self.quantities], np.float64)
         for size, exponent in self._exponents.items():
             powers[size] -= np.asarray(values, np.float64)[exponent]
+        return powers
+
+    def _scales(self, values: ArrayLike) -> Floats:
+        """Return the SI value of each parameter's unit in the core."""
         units = np.array([q.unit for q in self.quantities], np.float64)
-        return np.asarray(units * self.units.w0**powers, np.float64)
+        return np.asarray(units * self.units.w0 ** self.powers(values), np.float64)
+
+
+def widened(value: float, ends: tuple[float, float], further: float) -> tuple[float, float]:
+    """Return the ends of a 95 % interval with a further standard error."""
+    low, high = (math.hypot(end - value, Z95 * further) for end in ends)
+    return (value - low, value + high) if further else ends
 
 
 def interval(value: float, half: float, *, mixed: bool) -> tuple[float, float]:

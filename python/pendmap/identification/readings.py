@@ -114,6 +114,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         name=run.name,
         rod_sensor=_rod_sensor(run),
         count=reading.interval,
+        clock_stderr=run.clock_stderr,
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, NotFittedError
 from pendmap.formatting import counted, estimate_text, interval, percent
 from pendmap.identification.methods.trajectory import OFFSET, identification_of
 from pendmap.identification.parameters import SENSOR
@@ -68,6 +68,8 @@ class IdentificationReport(FitResult):
     with_drag : JointFit or None
         Fit with quadratic drag, if the residual of ``joint`` exceeds the noise and no effects were
         given.
+    asked : tuple of str
+        Names of the effects that were given.
     """
 
     KIND: ClassVar[str] = "identification"
@@ -79,6 +81,7 @@ class IdentificationReport(FitResult):
     joint: JointFit | None
     table: Table1
     with_drag: JointFit | None = None
+    asked: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         best = "no method gives a model" if self.sound is None else self.sound.short
@@ -117,7 +120,13 @@ class IdentificationReport(FitResult):
 
     @property
     def sound(self) -> Identification | None:
-        """Result of the first method that is applicable and converged; None if there is none."""
+        """Result of the first method that gives a model; None if there is none.
+
+        Other methods do not replace a search that did not converge, or a fit of effects.
+        """
+        first = next(iter(self.methods.values()))
+        if not first.sound and (self.asked or not first.converged):
+            return None
         return next((found for found in self.methods.values() if found.sound), None)
 
     @property
@@ -125,13 +134,16 @@ class IdentificationReport(FitResult):
         """Result of :attr:`sound`; InputError is raised if there is none."""
         if self.sound is not None:
             return self.sound
-        lost = [name for name, found in self.methods.items() if not found.converged]
-        if lost:
-            raise InputError(
+        first = next(iter(self.methods.values()))
+        reasons = "; ".join(first.warnings)
+        if not first.converged:
+            raise NotFittedError(
                 f"{self.run.name}: must be the record of a free decay, got one to which "
-                f"{lost[0]} did not converge and no other method can be applied"
+                f"{first.method} did not converge{'' if first.applicable else f': {reasons}'}"
             )
-        reasons = "; ".join(self.methods[next(iter(self.methods))].warnings)
+        if self.asked:
+            names = ", ".join(self.asked)
+            raise NotFittedError(f"{self.run.name}: {names} could not be fitted: {reasons}")
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
 
     @property
@@ -145,8 +157,7 @@ class IdentificationReport(FitResult):
         first = next(iter(self.methods.values()))
         if first.sound or self.sound is None:
             return ""
-        why = "cannot be applied" if first.converged else "did not converge"
-        return f"{first.method} {why}: the model is that of {self.sound.method}"
+        return f"{first.method} cannot be applied: the model is that of {self.sound.method}"
 
     @property
     def model(self) -> Rig:

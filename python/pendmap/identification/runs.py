@@ -74,6 +74,7 @@ class FitRun:
     name: str = ""
     rod_sensor: RodSensor | None = None  # effects on the reading do not act on it
     count: float | None = None  # sensor's step, rad, if readings are intervals
+    clock_stderr: float = 0.0  # relative standard error of the sampling interval
 
     @property
     def angle(self) -> Floats:

@@ -180,7 +180,7 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     time, theta : array, shape (N,)
         Times, s, and angles from the downward rest, rad, unwrapped.
     identifications : mapping of str to Identification
-        Results of :func:`pendmap.identification.identify`; inapplicable ones are ignored.
+        ``methods`` of :func:`pendmap.identify`; inapplicable ones are ignored.
     sigma : float, optional
         Noise of a sample, rad; by default estimated.
     trusted : array of bool, shape (N,), optional

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged
+from pendmap.identification.fit import LEVEL
 from pendmap.identification.sensitivity import sensitivities
 
 if TYPE_CHECKING:
@@ -92,6 +93,12 @@ def _step(
     if information <= 0:
         return 0.0, 0.0, {}
     return pull / information, pull**2 / information, dict(zip(names, follow, strict=True))
+
+
+def upper_limit(fit: TrajectoryFit, runs: Sequence[FitRun], name: str) -> float:
+    """Return the upper end of the 95 % interval that a parameter held at 0 has about 0."""
+    step, gain, _ = _step(fit, runs, name)
+    return abs(step) * math.sqrt(LEVEL * fit.widening / gain) if gain else math.inf
 
 
 def _with(model: Rig, exponent: str, step: float) -> Rig:

@@ -67,7 +67,7 @@ def report(seed: int = 0) -> IdentificationReport:
     """Return the damping identified from the virtual rig's record, written and read as a file."""
     import numpy as np  # noqa: PLC0415 (names are checked without it)
 
-    from pendmap.identification import identify_experiment  # noqa: PLC0415
+    from pendmap.identification import identify  # noqa: PLC0415
     from pendmap.records import read_experiment  # noqa: PLC0415
     from pendmap.virtual_rig import paper_decay  # noqa: PLC0415
 
@@ -75,7 +75,7 @@ def report(seed: int = 0) -> IdentificationReport:
         path = Path(folder) / "virtual_rig.csv"
         columns = np.column_stack(paper_decay(seed))
         np.savetxt(path, columns, "%.12g", ",", header="t_s,theta_rad", comments="")
-        return identify_experiment(read_experiment(path))
+        return identify(read_experiment(path))
 
 
 def tumbling(periods: int = 6000) -> list[xr.Dataset]:

@@ -17,7 +17,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
 from pendmap.records.noise import fastest
-from pendmap.records.resolution import logs_edges, spread_stamps
+from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
 from pendmap.signal.local_polynomial import even_weights
 from pendmap.signal.robust import intervals_of, normal_scale
 
@@ -44,6 +44,7 @@ MOST_INTERVALS: Final = 4  # Longest slip, intervals
 SLOW_POWER: Final = 1e-3  # Power over its median below which motion is too slow to detect a slip
 OFF_INTERVAL: Final = 0.25  # Relative tolerance for slips by whole intervals
 MOST_OTHER_JUMPS: Final = 0.2  # Greatest share of jumps that are not slips
+EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
 _BLOCK: Final = 4000  # Windows that are solved at a time
 
 
@@ -146,29 +147,92 @@ def _restarted(work: Work) -> None:
 
 
 def _coarse(work: Work) -> None:
-    """Space stamps evenly if several samples share each of them."""
+    """Space readings evenly if stamps are in coarse ticks: over the record, else over each tick."""
     steps = np.diff(work.time)
-    same = np.mean(steps == 0) if steps.size else 0.0
-    if not 0 < same < 1 or np.any(steps < 0):
+    same = float(np.mean(steps == 0)) if steps.size else 0.0
+    if work.peaks_only or same == 1 or np.any(steps < 0):
         return
     if logs_edges(work.theta):
-        work.time = spread_stamps(work.time)
-        text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
-        work.report("time-coarse", text, mended=True)
+        if same:
+            work.time = spread_stamps(work.time)
+            text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
+            work.report("time-coarse", text, mended=True)
         return
-    rows = np.diff(np.stack([work.theta, *work.extra.values(), *work.pivot.values()]), axis=1)
-    repeated = np.mean(np.all(rows[:, steps == 0] == 0, axis=0)) > 0.9  # samples and stamps
-    if same < COARSE_STAMPS or repeated:
+    rise = steps - steps.min(initial=0.0 if same else math.inf)
+    usual = float(np.median(steps[steps > 0]))
+    rise = rise[rise > REPORTED_JITTER * usual]
+    channels = np.stack([work.theta, *work.extra.values(), *work.pivot.values()])
+    again = np.all(np.diff(channels, axis=1)[:, steps == 0] == 0, axis=0)  # samples and stamps
+    if not rise.size or (same and np.mean(again) > 0.9):
         return
+    rise = rise[rise < 1.5 * rise.min()]
+    # Written digits round the ticks.
+    tick = 2 * rise.max() - rise.min() + 4 * float(np.spacing(np.max(np.abs(work.time))))
     place = np.arange(work.time.size)
-    slope, start = np.polyfit(place, work.time - work.time[0], 1)
-    tick = float(np.median(steps[steps > 0]))
-    away = work.time - work.time[0] - (start + slope * place)
-    if slope > 0 and np.max(np.abs(away)) <= 1.5 * tick:  # no samples are missing
-        work.time = work.time[0] + start + slope * place
-        share = f"{100 * same:.0f} % of the stamps repeat the one before"
-        text = f"{share}: spread evenly, {1 / slope:.6g} Hz"
-        work.report("time-coarse", text, mended=True)
+    even = _even(work.time, place, tick)
+    if same < COARSE_STAMPS:
+        other = np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * tick) + 1
+        smooth = any(_smoother(values, other) for values in channels)
+        rival = even.missed > EXACT * tick or tick > 1.5 * usual
+        if rival or steps.size < FEWEST_EDGES or not smooth:
+            return
+    slips = slips_of(even.times, work.theta, fewest=1)
+    if slips is not None:  # readings are lost where the others jump, if the stamps allow it
+        lost = np.round((slips.time - even.times) / even.interval).astype(np.intp)
+        if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
+            even = whole
+            text = f"{counted(int(lost[-1]), 'reading')} lost, where the others jump"
+            work.report("time-slips", text, mended=True, at=slips.places)
+    work.clock_stderr = even.stderr / even.interval
+    text = f"stamps in ticks of {tick:.3g} s: the readings are spread evenly"
+    if even.missed <= even.interval:
+        rate, error = 1 / even.interval, work.clock_stderr / even.interval
+        work.report("time-coarse", f"{text}, {rate:.7g} +- {error:.1g} Hz", mended=True)
+        work.time = even.times
+        return
+    work.report("time-coarse", f"{text} over each tick, no rate fits all", mended=True)
+    _, number = np.unique(work.time, return_counts=True)
+    few = np.repeat(number < np.median(number) - 1, number)
+    work.time = spread_stamps(work.time)
+    work.leave_out(few, "time-coarse", "reading", "in ticks that lack readings left out")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Even:
+    """Even times, each in the tick of its stamp."""
+
+    interval: float  # s
+    stderr: float  # standard error of the interval, s
+    times: Floats  # s
+    missed: float  # sum of the least distances of an early and a late reading from its tick, s
+
+
+def _even(time: Floats, place: Indices, tick: float) -> _Even:
+    """Return the mean of all even times for which each reading is in the tick after its stamp.
+
+    A reading that is in its tick for no interval may miss it by half an interval more than the
+    least distance. ``stamp_k <= t_0 + k dt < stamp_k + tick`` is a convex region of ``(t_0, dt)``,
+    in which all points are equally likely; only corners of the stamps' convex hull bound it.
+    """
+    from scipy.spatial import ConvexHull
+
+    usual = float((time[-1] - time[0]) / place[-1])
+    off = time - time[0] - usual * place
+    scaled = np.column_stack((place / place[-1], off / tick))
+    corners = ConvexHull(scaled, qhull_options="QbB").vertices
+    x, y = place[corners], off[corners]
+    sides = (np.roll(y, -1) - y) / (np.roll(x, -1) - x)
+    missed = float(np.min(np.ptp(y - np.outer(sides, x), axis=1))) - tick
+    wide = tick if missed < -EXACT * tick else tick + max(missed, 0.0) + usual
+    after = x[:, None] > x
+    run, up = (x[:, None] - x)[after], (y[:, None] - y)[after]
+    slopes = np.linspace(np.max((up - wide) / run), np.min((up + wide) / run), 400)
+    room = np.maximum(wide - np.ptp(y - np.outer(slopes, x), axis=1), 1e-9 * tick)
+    slope = float(np.average(slopes, weights=room))
+    spread = math.sqrt(float(np.average((slopes - slope) ** 2, weights=room)))
+    left = y - slope * x
+    times = time[0] + (left.max() + left.min() + tick) / 2 + (usual + slope) * place
+    return _Even(usual + slope, spread, times, missed)
 
 
 def _ordered(work: Work) -> None:
@@ -272,10 +336,12 @@ class Slips:
     stderr: float  # standard error of the mean size, s
 
 
-def slips_of(time: Floats, theta: Floats) -> Slips | None:
+def slips_of(time: Floats, theta: Floats, fewest: int = FEWEST_SLIPS) -> Slips | None:
     """Return the slips of a clock by whole intervals; None if the readings show none."""
     from scipy.interpolate import CubicSpline
 
+    if not np.all(np.isfinite(theta)):
+        return None
     interval = float(np.median(np.diff(time)))
     reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
     if reach < SHORTEST_SIDE or time.size < 20 * reach:
@@ -293,7 +359,7 @@ def slips_of(time: Floats, theta: Floats) -> Slips | None:
         each = lag / shown[number - 1]
         good = np.abs(each - 1) < OFF_INTERVAL
         if not places:
-            if np.count_nonzero(good) < FEWEST_SLIPS or np.mean(~good) > MOST_OTHER_JUMPS:
+            if np.count_nonzero(good) < fewest or np.mean(~good) > MOST_OTHER_JUMPS:
                 return None
             slip = interval * float(np.mean(each[good]))
             stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))

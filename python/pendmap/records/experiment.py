@@ -119,6 +119,8 @@ class Run:
         Resolution of the readings, rad; 0 if none is found.
     sha256 : str
         SHA-256 of the file.
+    clock_stderr : float
+        Relative standard error of the sampling interval, by coarse time stamps; 0 if they are fine.
     """
 
     name: str
@@ -143,6 +145,7 @@ class Run:
     unused: tuple[str, ...] = ()
     count_rad: float = 0.0
     sha256: str = ""
+    clock_stderr: float = 0.0
 
     @property
     def moves(self) -> bool:

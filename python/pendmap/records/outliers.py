@@ -227,7 +227,7 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
 
 def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
     """Correct the clock for jumps that are its slips; return the other jumps."""
-    found = slips_of(work.time, theta) if jumps else None
+    found = slips_of(work.time, theta) if jumps and not work.clock_stderr else None
     if found is None:
         return jumps
     text = (

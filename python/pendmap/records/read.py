@@ -316,4 +316,5 @@ def _run(work: Work, name: str, digest: str) -> Run:
         unused=work.unused,
         count_rad=0.0 if work.edges else work.count,
         sha256=digest,
+        clock_stderr=work.clock_stderr,
     )

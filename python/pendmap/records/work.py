@@ -57,6 +57,7 @@ class Work:
     middle: float = 0.0  # middle of the swing, rad
     period: float = math.nan  # period of small swings, s
     noise: float = 0.0  # standard deviation of a reading, rad
+    clock_stderr: float = 0.0  # relative standard error of the sampling interval
     limit: float = 0.0  # range of readings below which there is no motion, rad
 
     @property

@@ -62,7 +62,7 @@ def record_identification(report: IdentificationReport, path: str | os.PathLike[
     Parameters
     ----------
     report : IdentificationReport
-        Result of :func:`pendmap.identification.identify_experiment`.
+        Result of :func:`pendmap.identify`.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 

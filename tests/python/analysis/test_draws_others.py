@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 import pendmap
 from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, render, viewer
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.identification.experiment import identified_model, provenance
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def test_identify_writes_the_residual_of_its_model_and_the_noise(tmp_path: Path)
     table = np.c_[time, swing.y[0] + noise]
     path = tmp_path / "run.csv"
     np.savetxt(path, table, delimiter=",", header="t_s,theta_rad", comments="")
-    report = identify_experiment(pendmap.read_experiment(path), methods=["trajectory"])
+    report = identify(pendmap.read_experiment(path), methods=["trajectory"])
     said = identified_model(report).notes["provenance"]
     assert said["rms"] == pytest.approx(1e-3, rel=0.05)
     assert said["noise"] == pytest.approx(1e-3, rel=0.1)

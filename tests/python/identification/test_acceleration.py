@@ -14,7 +14,8 @@ from decays import decay, record
 from pendmap import InputError, render
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
-from pendmap.identification import identified_model, identify, identify_experiment
+from pendmap.identification import identified_model, identify
+from pendmap.identification.methods.registry import identify_record
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment
 
@@ -27,7 +28,7 @@ TANGENTIAL = '{ name = "acc", unit = "m/s2", direction = "tangential", distance_
 
 
 def identified(folder: Path) -> IdentificationReport:
-    return identify_experiment(pendmap.read_experiment(folder), methods=["trajectory"])
+    return identify(pendmap.read_experiment(folder), methods=["trajectory"])
 
 
 def agrees(report: IdentificationReport, truth: dict[str, float], sigmas: float = 3.5) -> None:
@@ -87,7 +88,7 @@ def test_errors_equal_those_of_an_angle_of_the_same_relative_noise(tmp_path: Pat
     gain = GRAVITY - 0.1 * TRUTH["w0"] ** 2
     angle = theta + 0.02 / gain * np.random.default_rng(1).standard_normal(time.size)
     best = identified(experiment(tmp_path, TANGENTIAL % 0.1, time, force)).best
-    other = identify(time, angle, methods=["trajectory"])["trajectory"]
+    other = identify_record(time, angle, methods=["trajectory"])["trajectory"]
     for name in TRUTH:
         one, two = best.estimates[name].stderr, other.estimates[name].stderr
         assert one is not None
@@ -121,7 +122,7 @@ def test_strong_friction_makes_the_reading_jump(tmp_path: Path) -> None:
 
 def test_figure_text_and_model_of_an_accelerometer(tmp_path: Path) -> None:
     time, _, force = readings(bias=0.05)
-    report = identify_experiment(
+    report = identify(
         pendmap.read_experiment(experiment(tmp_path / "a", TANGENTIAL % 0.1, time, force))
     )
     fields = as_json(report)
@@ -170,5 +171,5 @@ def test_an_angle_and_an_accelerometer_are_fitted_together(tmp_path: Path) -> No
         comments="",
     )
     other = pendmap.read_experiment(tmp_path / "angle.csv").runs[0]
-    both = identify_experiment(Experiment(folder, (one, other)), methods=["trajectory"])
+    both = identify(Experiment(folder, (one, other)), methods=["trajectory"])
     agrees(both, TRUTH | {"offset": 0.01, "bias[0]": 0.05})

@@ -9,7 +9,8 @@ import pytest
 
 from decays import decay, record
 from pendmap.comparison import compare
-from pendmap.identification import find_peaks, identify, identify_experiment
+from pendmap.identification import find_peaks, identify
+from pendmap.identification.methods.registry import identify_record
 from pendmap.records import Experiment, Run
 
 STAMP = 1.7e9
@@ -17,7 +18,7 @@ STAMP = 1.7e9
 
 def test_time_stamps_change_nothing() -> None:
     time, angle = record(decay(), seconds=60)
-    plain, stamped = identify(time, angle), identify(time + STAMP, angle)
+    plain, stamped = identify_record(time, angle), identify_record(time + STAMP, angle)
     for name, found in plain.items():
         other = stamped[name]
         assert other.applicable == found.applicable
@@ -35,7 +36,7 @@ def test_reports_keep_the_time_of_the_record() -> None:
         Run("a", "a.csv", "free", t, angle, np.ones(t.size, bool)) for t in (time, time + STAMP)
     ]
     plain, stamped = (
-        identify_experiment(Experiment(Path("there"), (run,)), methods=["trajectory", "de_paula"])
+        identify(Experiment(Path("there"), (run,)), methods=["trajectory", "de_paula"])
         for run in runs
     )
     assert np.allclose(stamped.peaks.time - STAMP, plain.peaks.time, atol=1e-5)

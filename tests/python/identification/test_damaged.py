@@ -10,7 +10,8 @@ import pytest
 
 from decays import decay, record
 from pendmap import InputError
-from pendmap.identification import find_peaks, identify, table1
+from pendmap.identification import find_peaks, table1
+from pendmap.identification.methods.registry import identify_record
 from pendmap.identification.methods.start import starting_values
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def test_a_damaged_record_gives_a_result_or_an_error_of_one_line(name: str) -> N
         counts = int(rng.choice([0, 64, 4096]))
         clean = record(made, seconds=seconds, rate=rate, counts=counts, noise_deg=0.3, seed=k)
         time, angle = DAMAGES[name](*clean, rng)
-        found = identify(time, angle)
+        found = identify_record(time, angle)
         for each in found.values():
             assert each.applicable or each.warnings
             assert all(math.isfinite(e.value) for e in each.estimates.values())

@@ -9,7 +9,7 @@ import pytest
 
 import pendmap
 from damages import DAMAGES, one_line, sound
-from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification import identified_model, identify
 from pendmap.identification.report import as_json, as_text, methods_table, table1_table
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def test_damage_gives_a_result_with_its_warning_or_an_error_of_one_line(
     path.write_bytes(made if isinstance(made, bytes) else made.encode())
     experiment = pendmap.read_experiment(path)
     try:
-        report = identify_experiment(experiment, methods=["trajectory", "combined_repaired"])
+        report = identify(experiment, methods=["trajectory", "combined_repaired"])
         model = identified_model(report)
     except pendmap.InputError as error:
         one_line(str(error))

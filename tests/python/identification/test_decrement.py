@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decays import decay, record
-from pendmap.identification import Peaks, identify
+from pendmap.identification import Peaks
 from pendmap.identification.methods import combined, de_paula, log_decrement, repaired
-from pendmap.identification.methods.registry import identify_peaks, scatter
+from pendmap.identification.methods.registry import identify_peaks, identify_record, scatter
 from pendmap.identification.period import frequency, mean_period
 
 WIDE = decay()
@@ -123,7 +123,7 @@ def test_mean_periods_of_wide_swings_give_a_low_w0(truths: dict[str, Any]) -> No
 @pytest.mark.parametrize("offset_deg", [0.0, 0.05, -0.3])
 def test_the_repaired_method_on_a_noisy_record(offset_deg: float) -> None:
     time, angle = record(WIDE, counts=4096, offset=math.radians(offset_deg), seed=5)
-    found = identify(time, angle, methods=["combined_repaired"])["combined_repaired"]
+    found = identify_record(time, angle, methods=["combined_repaired"])["combined_repaired"]
     assert found.applicable
     assert found["offset"] == pytest.approx(math.radians(offset_deg), abs=5e-4)
     assert found["w0"] == pytest.approx(6.2, rel=3e-4)
@@ -139,7 +139,7 @@ def test_errors_of_the_repaired_method_match_the_scatter() -> None:
     off = []
     for seed in range(60):
         time, angle = record(small, seconds=25, noise_deg=0.1, seed=seed)
-        found = identify(time, angle, methods=["combined_repaired"])["combined_repaired"]
+        found = identify_record(time, angle, methods=["combined_repaired"])["combined_repaired"]
         true = {"w0": 6.2, "c_over_m": 0.05, "Tr": 0.05, "offset": 0.0}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
     scatter = np.std(off, axis=0)
@@ -163,17 +163,19 @@ def test_an_offset_makes_triplets_alternate_and_readings_differ() -> None:
 def test_a_record_that_ends_above_12_degrees_is_not_for_the_printed_method() -> None:
     time, angle = record(WIDE, seconds=30)
     for name in ("combined", "combined_odd_ends", "combined_repaired"):
-        found = identify(time, angle, methods=[name])[name]
+        found = identify_record(time, angle, methods=[name])[name]
         assert not found.applicable
         assert not found.estimates
         assert "not applicable" in found.warnings[-1]
         assert "12 degrees" in found.warnings[-1]
-    assert "ends above" in identify(time, angle, methods=["combined"])["combined"].warnings[-1]
+    assert (
+        "ends above" in identify_record(time, angle, methods=["combined"])["combined"].warnings[-1]
+    )
 
 
 def test_negative_damping_is_reported_and_kept() -> None:
     time, angle = record(WIDE, offset=math.radians(0.05), counts=4096)
-    found = identify(time, angle, methods=["combined_odd_triplets"])["combined_odd_triplets"]
+    found = identify_record(time, angle, methods=["combined_odd_triplets"])["combined_odd_triplets"]
     assert found["c_over_m"] < 0
     assert any(text.startswith("unphysical: c_over_m") for text in found.warnings)
     assert found.rig.c_over_m == 0
@@ -182,9 +184,9 @@ def test_negative_damping_is_reported_and_kept() -> None:
 def test_a_missing_peak_is_not_bridged() -> None:
     time, angle = record(WIDE)
     trusted = (time < 70) | (time > 71.2)
-    found = identify(time, angle, trusted=trusted, methods=["combined"])["combined"]
+    found = identify_record(time, angle, trusted=trusted, methods=["combined"])["combined"]
     assert any("peaks are missing" in text for text in found.warnings)
-    whole = identify(time, angle, methods=["combined"])["combined"]
+    whole = identify_record(time, angle, methods=["combined"])["combined"]
     assert not any("peaks are missing" in text for text in whole.warnings)
 
 

@@ -13,7 +13,8 @@ from decays import decay, record
 from driven_decays import motion
 from pendmap import InputError
 from pendmap.diagnosis import diagnose
-from pendmap.identification import find_peaks, identify, identify_experiment
+from pendmap.identification import find_peaks, identify
+from pendmap.identification.methods.registry import identify_record
 from pendmap.identification.report import left_out
 from pendmap.records import Experiment, Run
 
@@ -31,18 +32,18 @@ def test_an_experiment_gives_its_longest_free_run() -> None:
         return Experiment(Path("there"), runs)
 
     runs = run(10), run(84), run(85, hold_out=True), run(85, "forced")
-    report = identify_experiment(experiment(*runs), methods=["combined_repaired"])
+    report = identify(experiment(*runs), methods=["combined_repaired"])
     assert report.run is runs[1]
     assert report.model == report.best.rig
     time, angle = record(WIDE, seconds=84)
-    same = identify(time, angle, methods=["combined_repaired"])
+    same = identify_record(time, angle, methods=["combined_repaired"])
     assert report.best.estimates == same["combined_repaired"].estimates
     with pytest.raises(InputError, match="no run is free"):
-        identify_experiment(experiment(*runs[2:]))
+        identify(experiment(*runs[2:]))
     with pytest.raises(
         InputError, match=r"method must be one of trajectory, combined, .*, got 'best'"
     ):
-        identify(time, angle, methods=["best"])
+        identify_record(time, angle, methods=["best"])
 
 
 def test_free_runs_are_fitted_together() -> None:
@@ -51,8 +52,8 @@ def test_free_runs_are_fitted_together() -> None:
         return Run(f"{seed}", f"{seed}.csv", "free", time, angle, np.ones(time.size, bool))
 
     runs = run(1, 2.5), run(2, 1.0)
-    both = identify_experiment(Experiment(Path("there"), runs), methods=["trajectory"])
-    alone = identify_experiment(Experiment(Path("there"), runs[:1]), methods=["trajectory"])
+    both = identify(Experiment(Path("there"), runs), methods=["trajectory"])
+    alone = identify(Experiment(Path("there"), runs[:1]), methods=["trajectory"])
     assert both.joint is not None
     assert len(both.joint.fit.curves) == 2
     assert "2 free runs" in both.best.used
@@ -76,7 +77,7 @@ def test_peaks_alone_are_enough_for_methods_of_peaks() -> None:
         np.ones(len(peaks), bool),
         peaks_only=True,
     )
-    report = identify_experiment(Experiment(Path("there"), (run,)))
+    report = identify(Experiment(Path("there"), (run,)))
     assert not report.methods["trajectory"].applicable
     assert report.joint is None
     found = report.methods["combined_repaired"]
@@ -90,9 +91,7 @@ def test_a_decay_that_begins_with_rotations(tmp_path: Path) -> None:
     noise = np.random.default_rng(5).normal(0, 2e-3, time.size)
     table = np.stack([time, theta + noise], axis=1)
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t_s,theta_rad", comments="")
-    report = identify_experiment(
-        pendmap.read_experiment(tmp_path / "a.csv"), methods=["trajectory"]
-    )
+    report = identify(pendmap.read_experiment(tmp_path / "a.csv"), methods=["trajectory"])
     assert report.best.method == "trajectory", report.best.warnings
     for name, true in {"w0": 6.2, "c_over_m": 0.08, "Tr": 0.1}.items():
         found = report.best.estimates[name]
@@ -127,7 +126,7 @@ def test_a_long_hold_before_the_release_does_no_harm(tmp_path: Path) -> None:
     rows = np.column_stack([np.arange(1500 + time.size) * 0.01, np.concatenate([held, angle])])
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
     experiment = pendmap.read_experiment(tmp_path / "a.csv")
-    report = identify_experiment(experiment, methods=["trajectory"])
+    report = identify(experiment, methods=["trajectory"])
     assert report.best.converged
     for name, true in BOTH.items():
         found = report.best.estimates[name]
@@ -146,5 +145,5 @@ def test_gravity_of_the_rig_goes_into_every_model(tmp_path: Path) -> None:
     )
     experiment = pendmap.read_experiment(tmp_path)
     for method in ("trajectory", "combined_repaired"):
-        assert identify_experiment(experiment, methods=[method]).model.gravity == 1.62
+        assert identify(experiment, methods=[method]).model.gravity == 1.62
     assert diagnose(experiment, max_effects=0).best.fitted.fit.model.gravity == 1.62

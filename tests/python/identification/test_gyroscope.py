@@ -16,7 +16,7 @@ from decays import decay, record
 from pendmap import InputError, render
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
-from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification import identified_model, identify
 from pendmap.identification.methods.trajectory import fit_together
 from pendmap.records import Experiment, Run
 from pendmap.records.summary import as_json, as_text
@@ -60,7 +60,7 @@ def read(folder: Path, time: Floats, rate: Floats, name: str = "Gyroscope z (rad
 
 
 def fit_model(*runs: Run) -> Identification:
-    best = identify_experiment(Experiment(Path(), runs), methods=["trajectory"]).best
+    best = identify(Experiment(Path(), runs), methods=["trajectory"]).best
     assert best.method == "trajectory", best.warnings
     return best
 
@@ -97,11 +97,11 @@ def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
     (said,) = [each.text for each in run.findings if each.what == "angle-scale"]
     assert "--effect encoder_gain fits it" in said
     experiment = Experiment(Path(), (run,))
-    best = identify_experiment(experiment, methods=["trajectory"], effects=["encoder_gain"]).best
+    best = identify(experiment, methods=["trajectory"], effects=["encoder_gain"]).best
     agrees(best, {**TRUTH, "encoder_gain.e": -0.25, "bias": 0.01})
     # A drag that adds energy would compensate a part of it.
-    assert identify_experiment(experiment, methods=["trajectory"]).with_drag is None
-    best = identify_experiment(experiment, methods=["trajectory"], effects=["quadratic_drag"]).best
+    assert identify(experiment, methods=["trajectory"]).with_drag is None
+    best = identify(experiment, methods=["trajectory"], effects=["quadratic_drag"]).best
     assert any(w.startswith("quadratic_drag.q is -") for w in best.warnings)
 
 
@@ -259,7 +259,7 @@ def test_an_angle_and_a_gyroscope_are_fitted_together(tmp_path: Path) -> None:
 
 def test_figure_model_and_comparison_of_a_gyroscope(tmp_path: Path) -> None:
     there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates(release=1.0, seconds=40)))
-    report = identify_experiment(there)
+    report = identify(there)
     assert report.best.method == "trajectory"
     render.draw(report, tmp_path / "sheet.png")
     assert "bias" not in identified_model(report).notes["covariance"]["names"]

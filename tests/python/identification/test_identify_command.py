@@ -139,6 +139,21 @@ def test_drag_is_tried_where_the_residual_exceeds_the_noise(
     assert "\nWith quadratic_drag (q = 0.0" in pendmap_command("identify", "dragged").stdout
 
 
+def test_no_model_is_written_where_the_search_did_not_converge(
+    tmp_path: Path, pendmap_command: Run
+) -> None:
+    time = np.arange(0, 20, 0.02)
+    chirp = 0.6 * np.cos(3 * time + 0.2 * time**2)
+    rows = np.column_stack((time, chirp + np.random.default_rng(0).normal(0, 1e-3, time.size)))
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    for words in ((), ("--effect", "quadratic_drag")):
+        run = pendmap_command("identify", "a.csv", *words, "--out", "a.toml")
+        assert run.returncode == 1
+        assert run.stderr.count("\n") == 1
+        assert "trajectory did not converge" in run.stderr
+        assert not (tmp_path / "a.toml").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

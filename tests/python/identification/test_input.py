@@ -11,7 +11,8 @@ import pytest
 from decays import decay, record
 from pendmap import InputError, Pendulum, Rig
 from pendmap.comparison import compare
-from pendmap.identification import identify, identify_experiment
+from pendmap.identification import identify
+from pendmap.identification.methods.registry import identify_record
 from pendmap.records import Experiment
 
 THERE = Experiment(Path("there"), ())
@@ -21,13 +22,13 @@ TIME = np.arange(50) / 10
 @pytest.mark.parametrize(
     ("call", "given", "complaint"),
     [
-        (identify_experiment, (3,), "records must be paths, DataFrames .*, got 3"),
-        (identify_experiment, ([],), r"records must be paths, .*, got \[\]"),
+        (identify, (3,), "records must be paths, DataFrames .*, got 3"),
+        (identify, ([],), r"records must be paths, .*, got \[\]"),
         (compare, ("model.toml", THERE), "model must be a Rig, like .*, got 'model.toml'"),
         (compare, (Pendulum(), THERE), "model must be a Rig"),
         (compare, (Rig(w0=6.2), [THERE, 3]), "records must be .*, got 3"),
-        (identify, ([], []), "time must have samples"),
-        (identify, (TIME[::-1], np.cos(TIME)), "time must increase"),
+        (identify_record, ([], []), "time must have samples"),
+        (identify_record, (TIME[::-1], np.cos(TIME)), "time must increase"),
     ],
 )
 def test_bad_input_is_refused(call: Any, given: tuple[Any, ...], complaint: str) -> None:  # noqa: ANN401
@@ -38,21 +39,23 @@ def test_bad_input_is_refused(call: Any, given: tuple[Any, ...], complaint: str)
 
 def test_methods_must_be_a_list() -> None:
     with pytest.raises(InputError, match=r"methods must be a list of names, .*, got 'trajectory'"):
-        identify(TIME, np.cos(TIME), methods="trajectory")
+        identify_record(TIME, np.cos(TIME), methods="trajectory")
 
 
 def test_few_samples_a_period_give_a_warning() -> None:
     names = ["energy_balance", "combined"]
-    coarse = identify(*record(decay(), seconds=60, rate=16), methods=names)
+    coarse = identify_record(*record(decay(), seconds=60, rate=16), methods=names)
     assert any("samples a period" in text for text in coarse["energy_balance"].warnings)
-    fine = identify(*record(decay(), seconds=60), methods=names)
+    fine = identify_record(*record(decay(), seconds=60), methods=names)
     assert not any("samples a period" in text for text in fine["energy_balance"].warnings)
     # Four samples a period are enough for peaks; two are not.
-    few = identify(*record(decay(), seconds=90, rate=4), methods=names)["combined"]
+    few = identify_record(*record(decay(), seconds=90, rate=4), methods=names)["combined"]
     for name, truth in {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}.items():
         assert abs(few[name] - truth) < 3 * (few.estimates[name].stderr or 0.0)
-    lost = identify(*record(decay(), seconds=90, rate=2), methods=names)["combined"]
+    lost = identify_record(*record(decay(), seconds=90, rate=2), methods=names)["combined"]
     assert not lost.applicable
     assert "the record ends above it" not in lost.warnings[-1]
-    short = identify(*record(decay(), seconds=6, rate=1000), methods=["combined"])["combined"]
+    short = identify_record(*record(decay(), seconds=6, rate=1000), methods=["combined"])[
+        "combined"
+    ]
     assert "the record ends above it" in short.warnings[-1]

@@ -11,7 +11,7 @@ import pytest
 import pendmap
 import recorded
 from pendmap.comparison import compare
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,7 +132,7 @@ def test_a_copy_held_out_tests_nothing(tmp_path: Path) -> None:
     assert found.mended
     assert "copy is a copy of one" in found.text
     assert "is no independent test" in found.text
-    report = identify_experiment(read)
+    report = identify(read)
     assert [run.name for run in report.runs] == ["one", "two"]
     assert any("copies another" in line for line in report.text_parts()[1])
     model = pendmap.Rig(w0=recorded.W0, c_over_m=recorded.C, Tr=recorded.TR)
@@ -149,7 +149,7 @@ def test_runs_of_several_pendulums_are_reported_first(tmp_path: Path) -> None:
     read = experiment(tmp_path, files)
     assert [found.what for found in read.findings] == ["rigs-differ"]
     with pytest.raises(pendmap.InputError, match="no model can be fitted to these records"):
-        identify_experiment(read)
+        identify(read)
     # Runs of one pendulum give no finding; periods are those of the small swing.
     same = experiment(
         tmp_path / "same",

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import pendmap
 from decays import Decay, decay
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.identification.report import as_json
 from recorded import clean, found, read, text
 
@@ -82,7 +82,7 @@ def test_a_decay_is_identified_from_edges(
     values = shown[order] * math.tau / counts
     path.write_text(text((time[order], values), form=f"%.{digits}f"), encoding="utf-8")
     experiment = pendmap.read_experiment(path)
-    report = identify_experiment(experiment, methods=("trajectory",))
+    report = identify(experiment, methods=("trajectory",))
     intervals = as_json(report)["methods"]["trajectory"]["ci95"]
     for name, true in (("w0", W0), ("c_over_m", C_OVER_M), ("Tr", TR)):
         low, high = intervals[name]

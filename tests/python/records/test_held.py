@@ -14,7 +14,7 @@ from drawn import written
 from pendmap import InputError
 from pendmap.comparison import compare
 from pendmap.comparison import experiment as compared
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.identification import report as summary
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def test_a_held_accelerometer_reads_all_of_gravity(tmp_path: Path) -> None:
 def test_the_releases_together_give_the_damping(tmp_path: Path) -> None:
     time, force, _ = handled("near", ((1.2, 12.0), (0.9, 10.0), (1.4, 14.0)))
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
-    best = identify_experiment(read, methods=["trajectory"]).best
+    best = identify(read, methods=["trajectory"]).best
     for name, true in TRUTH.items():
         found = best.estimates[name]
         assert found.stderr is not None
@@ -104,7 +104,7 @@ def test_intervals_of_a_bias_are_in_order(tmp_path: Path, sensor: str) -> None:
     """The gain is negative beyond the centre of oscillation, and without gravity."""
     time, _, force = readings(**SENSORS[sensor][0], release=1.3, seconds=20)
     read = pendmap.read_experiment(experiment(tmp_path, column(sensor), time, force))
-    report = identify_experiment(read, methods=["trajectory"])
+    report = identify(read, methods=["trajectory"])
     for name, estimate in report.best.estimates.items():
         assert estimate.ci95 is not None, name
         low, high = estimate.ci95
@@ -116,7 +116,7 @@ def test_intervals_of_a_bias_are_in_order(tmp_path: Path, sensor: str) -> None:
 def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     time, _, force = readings(release=1.3, seconds=20, tilt=0.03)
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
-    report = identify_experiment(read)
+    report = identify(read)
     told = summary.as_json(report)
     assert told["table1"] == []
     assert "computed from an acceleration" in told["table1_left_out"]
@@ -138,7 +138,7 @@ def test_figures_of_a_reconstructed_angle_explain_the_missing_judgement(tmp_path
 
     time, _, force = readings(release=1.3, seconds=20)
     read = pendmap.read_experiment(experiment(tmp_path, column("near"), time, force))
-    report = identify_experiment(read)
+    report = identify(read)
     for sheet in (identification.sheet(report), comparison.sheet(compare(report.model, read))):
         made = drawing.draw(sheet, dpi=50)
         words = written(made)

@@ -15,7 +15,7 @@ from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
 from pendmap.comparison.experiment import as_json as compared
 from pendmap.errors import InputError
-from pendmap.identification import identified_model, identify_experiment
+from pendmap.identification import identified_model, identify
 from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Finding, Run
@@ -75,7 +75,7 @@ def test_all_releases_together_are_more_precise_than_the_longest(tmp_path: Path)
         there = pendmap.read_experiment(write(tmp_path, released(*THREE, seed=seed)))
         longest = dataclasses.replace(there, runs=(max(there.runs, key=length),))
         for errors, which in ((together, there), (alone, longest)):
-            best = identify_experiment(which, methods=["trajectory"]).best
+            best = identify(which, methods=["trajectory"]).best
             for name, true in TRUTH.items():
                 estimate = best.estimates[name]
                 assert estimate.stderr is not None
@@ -91,7 +91,7 @@ def test_all_releases_together_are_more_precise_than_the_longest(tmp_path: Path)
 def test_every_command_reports_the_releases(tmp_path: Path, pendmap_command: Command) -> None:
     path = write(tmp_path, released((1.2, 2.0), (12.03, 15.02)))
     there = pendmap.read_experiment(path)
-    report = identify_experiment(there, methods=["trajectory"])
+    report = identify(there, methods=["trajectory"])
     assert {run["name"] for run in as_json(report)["runs"]} == {"decay 1/2", "decay 2/2"}
     assert all(run["rms"] < 1.2 * run["noise"] for run in as_json(report)["runs"])
     model = identified_model(report)
@@ -126,7 +126,7 @@ def test_each_release_inherits_the_description_of_its_run(tmp_path: Path) -> Non
     assert [run.hold_out for run in there.runs] == [True] * 3 + [False] * 3
     assert set(there.sha256) == {"decay.csv", "a.csv"}
     assert there.runs[4].time[-1] <= 35
-    report = identify_experiment(there, methods=["trajectory"])
+    report = identify(there, methods=["trajectory"])
     assert report.joint is not None
     assert [run.name for run in report.runs] == ["a", "decay (2) 1/2", "decay (2) 2/2"]
     # Drifts refer to the laboratory's clock: a release begins at its time in the file.
@@ -193,6 +193,6 @@ def test_a_still_run_is_left_out(tmp_path: Path) -> None:
     time, theta, _ = motion()
     still = Run("b", "b.csv", "free", time, 0 * theta, np.zeros(time.size, bool))
     moving = Run("a", "a.csv", "free", time, noisy(theta), np.ones(time.size, bool))
-    report = identify_experiment(Experiment(tmp_path, (still, moving)), methods=["trajectory"])
+    report = identify(Experiment(tmp_path, (still, moving)), methods=["trajectory"])
     assert [run.name for run in report.runs] == ["a"]
     assert "1 run read; 1 run in which nothing moves is not used" in list(as_text(report))

@@ -21,7 +21,7 @@ from pendmap.charts import chart as charts
 from pendmap.charts import decrement, half_cycles, identification, marks, methods
 from pendmap.charts.names import signed
 from pendmap.formatting import estimate_text, typographic
-from pendmap.identification import Estimate, IdentificationReport, Peaks, identify_experiment
+from pendmap.identification import Estimate, IdentificationReport, Peaks, identify
 from pendmap.identification.methods.combined import recursion
 from pendmap.paper import pendulum
 from pendmap.records import Experiment, Run
@@ -37,7 +37,7 @@ OFFSET = math.radians(0.05)
 
 def as_report(time: Any, theta: Any, **given: Any) -> IdentificationReport:  # noqa: ANN401
     run = Run("run", "run.csv", "free", time, theta, np.ones(time.size, bool), **given)
-    return identify_experiment(Experiment(Path("run.csv"), (run,)))
+    return identify(Experiment(Path("run.csv"), (run,)))
 
 
 def peaks_of(count: int | None) -> IdentificationReport:

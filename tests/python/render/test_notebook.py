@@ -12,7 +12,7 @@ from decays import decay, record
 from pendmap import Rig
 from pendmap.comparison import compare
 from pendmap.formatting import Readable
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.records import Experiment, Run
 
 TIME, ANGLE = record(decay(release=1.0, until=40.0), seconds=20)
@@ -28,7 +28,7 @@ def rows(page: str) -> list[list[str]]:
 
 
 def test_an_identification_is_a_line_and_its_tables() -> None:
-    report = identify_experiment(THERE)
+    report = identify(THERE)
     line = repr(report)
     assert line.startswith("<IdentificationReport a<b: trajectory: w0 = 6.1999")
     assert line.endswith("; 8 methods, 1 run>")

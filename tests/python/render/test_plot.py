@@ -24,7 +24,7 @@ from pendmap import InputError, Pendulum, plot
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet
 from pendmap.charts.marks import Image, Points
 from pendmap.comparison import compare
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.records import Experiment, Run
 from pendmap.render import drawing, regions, style
 
@@ -65,8 +65,8 @@ def results() -> dict[str, Callable[[], Any]]:
         "trajectory": lambda: MOTION,
         "section": lambda: MOTION,
         "record": experiment,
-        "identification": lambda: identify_experiment(experiment()),
-        "comparison": lambda: compare(identify_experiment(experiment()).model, experiment()),
+        "identification": lambda: identify(experiment()),
+        "comparison": lambda: compare(identify(experiment()).model, experiment()),
     }
 
 
@@ -206,7 +206,7 @@ def test_the_accessor_is_the_function() -> None:
         (lambda: plot.draw(3), "cannot draw 3; kinds that can be: "),
         (lambda: plot.basins(MAP, layer="no"), "'no' in this map; it has labels, settle, turns"),
         (lambda: plot.record(experiment(), layer="no"), "no layer 'no' in this figure; it has"),
-        (lambda: plot.identification(identify_experiment(experiment()), layer="no"), "it has"),
+        (lambda: plot.identification(identify(experiment()), layer="no"), "it has"),
         (lambda: plot.basins(MAP, layer="settle", colormap="no"), "no colour map 'no'"),
         (
             lambda: plot.basins(MAP, cmap="magma"),
@@ -216,7 +216,7 @@ def test_the_accessor_is_the_function() -> None:
         (lambda: plot.figure(MAP, width=10), "width must be 40 to 500 mm"),
         (lambda: plot.figure(MAP, width=86, size=(3, 3)), "and no size given"),
         (
-            lambda: plot.figure(identify_experiment(experiment()), width=86),
+            lambda: plot.figure(identify(experiment()), width=86),
             "width of a sheet of several charts must be 150 mm or more, got 86",
         ),
     ],

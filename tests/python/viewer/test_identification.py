@@ -13,7 +13,7 @@ import decays
 import pendmap
 import recorded
 from pendmap import InputError, viewer
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.viewer import comparison, identification, window
 from recordings import ReadBack
 
@@ -44,7 +44,7 @@ def swings(seed: int = 0, seconds: float = 24.0) -> tuple[Floats, Floats]:
 
 
 def identified(file: Path, *methods: str) -> IdentificationReport:
-    return identify_experiment(pendmap.read_experiment(file), methods=methods or None)
+    return identify(pendmap.read_experiment(file), methods=methods or None)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ import pendmap
 import synthetic
 from pendmap import viewer
 from pendmap.charts import palette
-from pendmap.identification import identify_experiment
+from pendmap.identification import identify
 from pendmap.viewer import identification, window
 from recordings import ReadBack
 
@@ -93,7 +93,7 @@ def test_the_viewers_own_picture_of_an_identification(tmp_path: Path) -> None:
     content = "\n".join(["t_s,theta_rad", *(f"{t},{x}" for t, x in zip(*read, strict=True))])
     record = tmp_path / "a.csv"
     record.write_text(content + "\n")
-    report = identify_experiment(pendmap.read_experiment(record))
+    report = identify(pendmap.read_experiment(record))
     file = viewer.record_identification(report, tmp_path / "a.rrd")
     shares = shares_of_colours(file, tmp_path, 5.0)
     for series in (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 
 from pendmap.formatting import Estimate, counted, estimate_text
-from pendmap.identification.parameters import OPPOSING
+from pendmap.identification.parameters import OPPOSING, PLACES, widened
 from pendmap.identification.results import Parameters
 from pendmap.model import Rig
 from pendmap.signal.robust import Z95
@@ -104,6 +104,20 @@ class Identification(Parameters):
         driven = any(each.ci95 is not None and each.ci95[1] < 0 for each in damping)
         return self.applicable and self.converged and 0 < w0 < math.inf and not driven
 
+    def with_clock(self, stderr: float) -> Identification:
+        """Return the result with the relative standard error of a sampling interval added."""
+        estimates, further = {}, {}
+        for name, e in self.estimates.items():
+            own = further[name] = stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
+            error = None if e.stderr is None else math.hypot(e.stderr, own)
+            ends = None if e.ci95 is None else widened(e.value, e.ci95, own)
+            estimates[name] = Estimate(e.value, error, ends)
+        covariance = self.covariance
+        if covariance is not None:
+            both = [further[name] for name in covariance[0]]
+            covariance = covariance[0], covariance[1] + np.outer(both, both)
+        return dataclasses.replace(self, estimates=estimates, covariance=covariance)
+
     @property
     def zero(self) -> float:
         """Zero error of the sensor, rad; 0 if the method estimates none."""
@@ -127,7 +141,10 @@ class Identification(Parameters):
             scale = 1 / (2 * w0.value) if power == 1 else 1 / w0.value**2
             value = over.value * scale
             if over.stderr is None or w0.stderr is None:
-                made[name] = Estimate(value)
+                ends = over.ci95
+                made[name] = Estimate(
+                    value, None, None if ends is None else (scale * ends[0], scale * ends[1])
+                )
                 continue
             lever = -power * value / w0.value
             names, matrix = self.covariance or ((), np.empty((0, 0)))

@@ -59,7 +59,7 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
     return names
 
 
-def identify(  # noqa: PLR0913 (the record, and what is known of it)
+def identify_record(  # noqa: PLR0913 (the record, and what is known of it)
     time: ArrayLike,
     theta: ArrayLike,
     *,
@@ -69,32 +69,9 @@ def identify(  # noqa: PLR0913 (the record, and what is known of it)
     peaks: Peaks | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> dict[str, Identification]:
-    """Identify the damping of a pendulum from one free decay by several methods.
+    """Return the results of several methods for one free decay (s, rad), also inapplicable ones.
 
-    Parameters
-    ----------
-    time, theta : array, shape (N,)
-        Times, s, increasing, and angles from the downward rest, rad, unwrapped.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated from the record.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used; by default all.
-    methods : iterable of str, optional
-        Names among :data:`METHODS`; by default all.
-    peaks : Peaks, optional
-        Peaks of the record; by default found from the samples.
-    progress : callable, optional
-        Called with the numbers of methods done and in all.
-
-    Returns
-    -------
-    dict of str to Identification
-        Results by method, including inapplicable ones with the reason.
-
-    Raises
-    ------
-    InputError
-        If a method is unknown or the arrays are not a valid record.
+    ``sigma`` (rad), ``trusted`` and ``peaks`` are by default found from the record.
     """
     names = check_names(methods)
     elapsed, first = from_first(time)

@@ -21,6 +21,7 @@ from pendmap.identification.methods.start import TooShortError, starting_values
 from pendmap.identification.parameters import OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
 from pendmap.identification.turning import rough_start
+from pendmap.identification.valley import upper_limit
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 from pendmap.records import Run
@@ -50,14 +51,9 @@ def identify(
     theta: ArrayLike,
     **choices: Any,  # noqa: ANN401 (those of fit_decay)
 ) -> Identification:
-    """Identify the damping of a free decay by fitting its whole trajectory.
-
-    ``choices`` are those of :func:`fit_decay`. Results are ``w0``, ``c_over_m``, ``Tr``, ``offset``
-    and the effects' parameters. Negative damping is possible, with a warning that an effect may be
-    missing.
-    """
+    """Identify the damping of a free decay, for the choices of :func:`fit_decay`."""
     try:
-        return identification_of(fit_decay(time, theta, **choices))
+        return identification_of(physical(fit_decay(time, theta, **choices)))
     except TooShortError as error:
         return Identification(warnings=(str(error),), applicable=False)
 
@@ -75,11 +71,8 @@ def identification_of(joint: JointFit) -> Identification:
         for e in fit.estimates.values()
     ]
     estimates = dict(zip(names, found, strict=True))
-    # What was held at 0 has the interval of the fit in which it was free, if that reaches 0.
-    for name, free in joint.negative.items():
-        estimates[name] = (
-            dataclasses.replace(free, value=0.0) if _reaches_0(free) else Estimate(0.0)
-        )
+    for name, limit in joint.limits.items():
+        estimates[name] = Estimate(0.0, None, (0.0, limit))
     first = [name for name in ("w0", *OPPOSING) if name in estimates]
     estimates = {name: estimates[name] for name in dict.fromkeys([*first, *estimates])}
     count = len(fit.windows)
@@ -109,11 +102,7 @@ def fit_decay(
     trusted: ArrayLike | None = None,
     **choices: Any,  # noqa: ANN401 (those of fit_from_start)
 ) -> JointFit:
-    """Return the fit to a free decay (s, and rad from the downward rest).
-
-    ``sigma`` (rad) is by default the noise estimated without a model; ``choices`` are those of
-    :func:`fit_from_start`.
-    """
+    """Return the fit to a free decay (s, rad), for the choices of :func:`fit_from_start`."""
     t, x = (np.ascontiguousarray(values, dtype=np.float64) for values in (time, theta))
     if t.shape != x.shape or t.ndim != 1:
         raise InputError(f"time has {t.shape} values and theta {x.shape}: they must be as many")
@@ -253,13 +242,14 @@ class JointFit:
     """Fit of a pendulum to several runs, in the order of its curves and residuals.
 
     ``negative`` are coefficients that oppose the motion and that a fit made negative, as it gave
-    them: they are held at 0 in ``fit``.
+    them: they are held at 0 in ``fit``, and ``limits`` are their upper 95 % limits.
     """
 
     fit: TrajectoryFit
     runs: tuple[Run, ...]
     readings: tuple[Reading, ...]
     negative: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
+    limits: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def noise(self) -> float:
@@ -304,9 +294,12 @@ def physical(joint: JointFit) -> JointFit:
     """
     while name := joint.fit.negative:
         known = {**joint.negative, name: joint.fit.estimates[name]}
+        given = [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)]
         try:
-            again = fit_together(joint.runs, start=joint.fit.model, held=known)
+            fit, worth = fit_from_start(given, joint.readings, start=joint.fit.model, held=known)
+            # An estimate below 0 is wrong by no less than its size.
+            limits = {n: max(upper_limit(fit, given, n), -e.value) for n, e in known.items()}
         except FitDiverged:
             return joint
-        joint = dataclasses.replace(again, negative=known)
+        joint = JointFit(fit, joint.runs, worth, known, limits)
     return joint
