@@ -111,7 +111,8 @@ def member(dataset: xr.Dataset) -> xr.Dataset:
         here &= dataset[f"point_{name}"].values == float(dataset[name])
     part: xr.Dataset = dataset.isel(attractor=dataset["exists"].values.astype(bool), point=here)
     shows = str(part["plane"].attrs["flag_meanings"]).split()[int(part["plane"])]
-    part = part.drop_vars("plane")
+    kinds = np.array(str(part["kind"].attrs["flag_meanings"]).split())
+    part = part.drop_vars("plane").assign(kind=("attractor", kinds[part["kind"].values]))
     at = ", ".join(span(name, *[float(dataset[name])] * 2) for name in varied)
     told = f"One map of a sweep, {at}. The text below describes the whole sweep."
     part.attrs = dataset.attrs | {

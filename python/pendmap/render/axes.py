@@ -27,12 +27,11 @@ def into(
 ) -> None:
     """Draw the first panel of a chart into given axes, in their fonts.
 
-    The legend is below the panel; without ``legend`` one higher than half the panel is left out.
+    The legend is below the panel; without ``legend`` one higher than half its place is left out.
     Axes that show something already keep their title and their names; limits and legend grow.
     """
     figure: Any = axes.figure
-    panel = first(chart)
-    before = _named(axes)
+    panel, before = first(chart), _named(axes)
     with _growing(axes):
         drawing.panel_into(axes, panel)
     wide, high = _fitted(axes)
@@ -42,16 +41,18 @@ def into(
     drawing.turned(axes, panel)
     wide, high = _fitted(axes)
     if legend is not False:
-        lines = 0
+        lines = 0.0
         for _ in range(2):  # the legend takes its height from the panel
-            inside = regions.labelled(Chart("", "", [[panel]]), lambda _: (wide, high - lines))
+            room = (wide, high - lines)
+            inside = regions.labelled(Chart("", "", [[panel]]), {panel: room}.__getitem__)
             handles, texts = entries(inside.panels[0])
             named = before | dict(zip(texts, handles, strict=True))
             texts, columns, lines = _broken([*named], wide)
         for mark in inside.panels[0].marks[len(panel.marks) :]:
             marks.draw(axes, mark)
             axes.texts[-1].set_in_layout(False)
-    if legend is False or not texts or (legend is None and lines > high / 2):
+    half = _place(axes).height / figure.dpi / 2
+    if legend is False or not texts or (legend is None and lines > half):
         return
     down = -3.4 * style.points("font.size") / 72
     below = axes.legend(
@@ -95,7 +96,7 @@ def _fitted(axes: Axes) -> Ends:
         figure.get_layout_engine().execute(figure)
     drawn = [*axes.images, *axes.collections]
     group: list[Any] = [axes, *(one.colorbar.ax for one in drawn if one.colorbar)]
-    place, least = _place(axes).extents, drawing.LEAST * figure.dpi
+    place, least = np.asarray(_place(axes).extents), drawing.LEAST * figure.dpi
     for _ in range(3):
         box = Bbox.union([one.get_tightbbox() for one in group]).extents
         lack = np.maximum((box - place) * (-1, -1, 1, 1), 0.0) * (1, 1, -1, -1)
@@ -136,7 +137,7 @@ def entries(panel: Panel) -> tuple[list[Any], list[str]]:
     """Return the handles of a panel's legend, and their texts."""
     handles, texts = marks.legend(panel.marks)
     images = [mark for mark in panel.marks if isinstance(mark, Image)]
-    short = {style.typeset(long): text for image in images for text, long in image.labels}
+    short = {style.typeset(long): text for image in images for text, long in image.labels if text}
     return handles, [short.get(text, text).replace("\n", ", ") for text in texts]
 
 
