@@ -231,10 +231,11 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)
-    loose = np.isin(dataset["loose_value"].values, values)
+    loose = np.isin(dataset.get("loose_value", values[:0]), values)
     # The last entry is for -1, no attractor.
     new = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-    part = dataset.isel(entry=kept, point=kept[owner], loose=loose)
+    rows = {"entry": kept, "point": kept[owner], "loose": loose}
+    part = dataset.isel(rows, missing_dims="ignore")
     part = part.assign(
         point_entry=("point", new[owner[kept[owner]]]),
         up=(name, new[sweeps["up"]]),
