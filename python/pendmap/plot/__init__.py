@@ -76,7 +76,7 @@ class Look(TypedDict, total=False):
     """Options of all functions.
 
     ``title`` is False for none, or a text; ``legend`` is True or False, by default a legend higher
-    than half its place is left out; ``colormap`` is a matplotlib colour map, or the name of one,
+    than half the panel is left out; ``colormap`` is a matplotlib colour map, or the name of one,
     for layers of numbers.
     """
 
@@ -105,7 +105,7 @@ def draw(
         The part; an unknown one is answered with those of the result.
     **look
         ``title``, False or a text; ``legend``, True or False, without which one higher than half
-        its place is left out; ``colormap``, one of matplotlib or its name.
+        the panel is left out; ``colormap``, one of matplotlib or its name.
 
     Returns
     -------

@@ -27,7 +27,7 @@ def into(
 ) -> None:
     """Draw the first panel of a chart into given axes, in their fonts.
 
-    The legend is below the panel; without ``legend`` one higher than half its place is left out.
+    The legend is below the panel; without ``legend`` one higher than half the panel is left out.
     Axes that show something already keep their title and their names; limits and legend grow.
     """
     figure: Any = axes.figure
@@ -51,7 +51,9 @@ def into(
         for mark in inside.panels[0].marks[len(panel.marks) :]:
             marks.draw(axes, mark)
             axes.texts[-1].set_in_layout(False)
-    half = _place(axes).height / figure.dpi / 2
+    box: Any = axes.get_tightbbox()
+    around = box.height - axes.bbox.height
+    half = (_place(axes).height - around) / figure.dpi / 2
     if legend is False or not texts or (legend is None and lines > half):
         return
     down = -3.4 * style.points("font.size") / 72
@@ -89,7 +91,7 @@ def _fitted(axes: Axes) -> Ends:
     """Lay out a figure, make axes smaller whose texts leave their place; return their inches.
 
     Their place is the figure, or the part of a grid up to the middle of the gaps around it. Their
-    colour bar is made smaller with them.
+    colour bar is made smaller with them; upright names longer than it are broken.
     """
     figure: Any = axes.figure
     if figure.get_layout_engine() is not None:
@@ -98,6 +100,9 @@ def _fitted(axes: Axes) -> Ends:
     group: list[Any] = [axes, *(one.colorbar.ax for one in drawn if one.colorbar)]
     place, least = np.asarray(_place(axes).extents), drawing.LEAST * figure.dpi
     for _ in range(3):
+        for one in group:
+            name, high = one.yaxis.label, drawing.inches_of(one)[1]
+            name.set_text(style.broken(name.get_text(), high, name.get_fontsize()))
         box = Bbox.union([one.get_tightbbox() for one in group]).extents
         lack = np.maximum((box - place) * (-1, -1, 1, 1), 0.0) * (1, 1, -1, -1)
         boxes = [one.get_position(original=True) for one in group]
