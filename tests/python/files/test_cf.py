@@ -127,7 +127,7 @@ def test_a_file_is_read_back_identical(
     for name, each in result.variables.items():
         assert again[name].dtype == each.dtype, name
     for name, value in result.attrs.items():
-        assert type(again.attrs[name]) is type(getattr(value, "item", lambda: value)()), name
+        assert type(again.attrs[name]) is type(value), name
 
 
 def test_a_result_is_a_table_with_rows(saved: tuple[xr.Dataset, Path]) -> None:
@@ -209,7 +209,7 @@ def test_files_of_the_format_1_are_upgraded(kind: str, tmp_path: Path) -> None:
     assert old.attrs["format_version"] == 1
     assert found.attrs["format_version"] == 2
     assert set(found.variables) == set(today.variables)
-    assert set(found.attrs) == set(today.attrs)
+    assert set(found.attrs) == set(today.attrs) - {"history"}
     for name, each in found.variables.items():
         assert each.dims == today[name].dims, name
         assert each.attrs.get("units", "1") == today[name].attrs.get("units", "1"), name
