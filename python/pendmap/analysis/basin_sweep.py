@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
 
-ANALYSES: Final = ("basins",)
 DEFAULT_CELLS: Final = 100  # Default number of cells on each side of a map
 _BYTES: Final = 8  # Memory of a start during the computation
 
@@ -84,7 +83,6 @@ SCHEMA = Schema(
 def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, ArrayLike],
-    analysis: str = "basins",
     *,
     grid: Grid | int | None = None,
     tol: float = 1e-6,
@@ -125,8 +123,6 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         One or two parameters with an array of rising or falling values, or a tuple of first value,
         last value (both included) and how many; names as for :func:`pendmap.parameter_map`. The
         result is the same for both directions, its coordinates rise.
-    analysis : str
-        What is done for each model: ``basins``.
     grid : Grid or int, optional
         As for :func:`pendmap.basins`, a whole number too; by default 100 cells on each side.
     tol, max_periods, layer_periods, seed, threads
@@ -171,8 +167,6 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     >>> result.exists.sel(attractor="rotation 1:+1").values
     array([0, 1, 1, 1], dtype=int8)
     """
-    if analysis not in ANALYSES:
-        raise InputError(f"analysis must be {' or '.join(ANALYSES)}, got {short_repr(analysis)}")
     if not isinstance(ranges, Mapping) or len(ranges) not in {1, 2}:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
         raise InputError(
@@ -208,7 +202,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         values = {
             **numerics.provenance(),
             **along.kept(pendulum, axes),
-            "analysis": analysis,
+            "analysis": "basins",
             "varied": " ".join(axis.name for axis in axes),
             "models": models,
             "blocks": job.blocks,
@@ -227,7 +221,6 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
 
     request = {
         "ranges": varied.requested(axes, ranges),
-        "analysis": analysis,
         "grid": grid,
         "tol": numerics.tol,
         "max_periods": numerics.max_periods,

@@ -112,7 +112,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``entry_value`` and ``entry_branch``; ``undecided``, ``failed`` and ``chaos_periods`` over
         the parameter as for that function; branches over ``branch``: ``branch_kind``,
         ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
-        entry that the sweep is on, -1 where that is none of them; its points there over ``loose``.
+        entry that the sweep is on, -1 where that is none of them; its points there, if any, over
+        ``loose``.
 
     Raises
     ------
@@ -126,7 +127,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> pendulum = pendmap.Pendulum(gamma=0.1, omega=2.0)
     >>> result = pendmap.bifurcation(pendulum, {"p": (0.1, 0.5, 3)})
     >>> sorted(result.sizes)
-    ['bound', 'branch', 'entry', 'kind', 'loose', 'p', 'point']
+    ['bound', 'branch', 'entry', 'kind', 'p', 'point']
     """
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
@@ -179,7 +180,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         key: np.concatenate([getattr(raw.up, key), getattr(raw.down, key)])
         for key in ("value", "theta", "velocity")
     }
-    loose_speed = units.given(loose["velocity"], VELOCITY)
+    speeds = units.given(loose["velocity"], VELOCITY)
     way = np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])
     kind, meanings = which[ends[:, 0]].astype(np.int16), dict(enumerate(kinds.tolist()))
     on = "entry of the attractor that the sweep {} is on"
@@ -197,10 +198,13 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         "up": variable(axis.name, raw.up.on, "1", on.format("up"), "-1: none", missing=-1),
         "down": variable(axis.name, raw.down.on, "1", on.format("down"), "-1: none", missing=-1),
         **cell_search.shares(raw, (axis.name,), axis.values.shape),
-        "loose_sweep": variable("loose", way, "", "sweep", flags={-1: "down", 1: "up"}),
-        "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
-        **point("loose", loose["theta"], loose_speed, units.of_velocity, "loose_{}"),
     }
+    if way.size:  # a table of an empty dimension has no rows
+        data |= {
+            "loose_sweep": variable("loose", way, "", "sweep", flags={-1: "down", 1: "up"}),
+            "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
+            **point("loose", loose["theta"], speeds, units.of_velocity, "loose_{}"),
+        }
     coordinates = {
         **axis.coordinates,
         "kind": variable("kind", kinds, long_name="kind of attractor"),

@@ -130,7 +130,7 @@ class Schema:
         Those of a dataset that it was made of are removed. The parameters of the model become
         coordinates without dimensions, except those ``replaced`` by others, which vary.
         """
-        import pendmap.files.accessor  # noqa: F401, PLC0415 (dataset.pendmap, with xarray)
+        from pendmap.files.dataset import history_of  # noqa: PLC0415 (xarray takes a while)
 
         for name in [name for name in dataset.variables if not dataset[name].dims]:
             del dataset[name]
@@ -146,6 +146,7 @@ class Schema:
                 field.put(dataset, value, model.units)
         own = {n: x for n, x in known.items() if n in LABELS and n not in replaced}
         self.describe(dataset, own)
+        dataset.attrs["history"] = history_of(dataset)
 
     def describe(self, dataset: xr.Dataset, parameters: Mapping[str, Any]) -> None:
         """Set what all results have: parameters, indices of dimensions, attributes of CF."""

@@ -275,7 +275,7 @@ def _dataset(  # noqa: PLR0913 (samples and where they belong)
     theta, speed = of.theta[..., every], units.given(of.velocity, VELOCITY)
     start = ("start",) if several else ()
     wrapped = -np.remainder(math.pi - of.theta[..., once], math.tau) + math.pi
-    kinds, rate = np.array(of.event_kind, dtype="U14"), (units.of_velocity, "velocity, likewise")
+    kinds, rate = np.array(of.event_kind, dtype=str), (units.of_velocity, "velocity, likewise")
     event_time = units.given(of.event_time, TIME)
     fell = energy(theta, speed[..., every], pendulum.attributes)
     at, period, event = (*start, "time"), (*start, "period"), (*start, "event")

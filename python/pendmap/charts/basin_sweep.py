@@ -177,7 +177,7 @@ def _entropies(dataset: xr.Dataset, x: Floats) -> list[Mark]:
     error = dataset["boundary_basin_entropy_stderr"].values
     return [
         Level(math.log(2), colour=QUIET, dash=DASHED),
-        Line(x, whole, colour=QUIET, name="basin entropy", path="whole"),
+        Line(x, whole, colour=palette.CURVES[2], name="basin entropy", path="whole"),
         Line(
             x,
             edge,

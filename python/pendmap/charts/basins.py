@@ -39,8 +39,6 @@ VARIABLES = {
 
 SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to the leading ones
 FLAT: Final = 0.55  # Height over width of panels below which they are stacked
-_SHAPES: Final = {"oscillation": "sPXph8", "inverted_rest": "D"}
-"""Markers by kind; further ones are used when the colours repeat."""
 _COLOUR_MAPS: Final = {
     "settle": "viridis",
     "turns": "RdBu_r",
@@ -123,9 +121,7 @@ def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ..
 def _marker(
     entry: legend.Entry, at: npt.NDArray[np.float64], name: str = "", size: float = 5.5
 ) -> Points:
-    turn = palette.direction(entry.name, entry.kind)
-    shapes = "^>" if turn > 0 else "v<" if turn < 0 else _SHAPES.get(entry.kind, "o")
-    shape = shapes[palette.lap(entry.name, entry.kind) % len(shapes)]
+    shape = palette.marker(entry.name, entry.kind)
     look: dict[str, Any] = {"marker": shape, "size": size, "colour": entry.colour, "name": name}
     look |= {"edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
     return Points(*at.T, clip=False, order=5.0, **look)

@@ -105,10 +105,11 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     values = dataset[str(dataset.attrs["varied"])].values
     # A single point must be visible.
     size = min(3.0, max(1.3, 200.0 / values.size))
-    loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
-    grey: dict[str, Any] = {"colour": palette.UNNAMED}
-    said = "sweep, undecided" if loose[0].size else ""
-    drawn: list[Mark] = [Points(*loose, size=0.45, order=1.0, name=said, **grey)]
+    drawn: list[Mark] = []
+    if dataset.sizes.get("loose"):
+        loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
+        look: dict[str, Any] = {"colour": palette.UNNAMED, "name": "sweep, undecided"}
+        drawn.append(Points(*loose, size=0.45, order=1.0, **look))
     for k, one in reversed([*enumerate(every)]):
         of = 0.45 if "chaos" in one.name else size
         points = one.points[:, [0, column]]

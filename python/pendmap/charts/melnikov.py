@@ -42,13 +42,12 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     said["loop"] = "homoclinic, loop of upright rest"
     marks: list[Mark] = []
     for name, (colour, dash) in _LOOKS.items():
-        if name not in at or not (at[name] <= top).any():
+        if name not in at or not said[name] or not (at[name] <= top).any():
             continue
         look: dict[str, Any] = {"colour": colour, "dash": dash, "name": said[name], "path": name}
         marks.append(Line(omega, at[name], width=1.6, **look))
-        if said[name]:
-            high = np.full_like(omega, top)
-            marks.append(Band(omega, at[name], high, colour=colour, alpha=0.10))
+        high = np.full_like(omega, top)
+        marks.append(Band(omega, at[name], high, colour=colour, alpha=0.10))
     damped = np.nanmax(at.get("loop", p), initial=0.0) > 0
     follows = "fractal boundaries of basins" if damped else "chaos, no basins without damping"
     star: dict[str, Any] = {"marker": "*", "size": 9.0, "clip": False, "order": 4.0}

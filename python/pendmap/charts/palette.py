@@ -122,6 +122,9 @@ _OSCILLATION: dict[str, tuple[_Shade, ...]] = {
     ),
 }
 
+_SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}  # Markers by kind; others have a disc
+CURVES = ("#e6007e", "#19d3f3", "#5a1fd1")  # Colours of curves on maps, which no attractor has
+
 _LAPS = (
     (0, 0.35, "darker"),
     (255, 0.5, "lighter"),
@@ -134,6 +137,7 @@ _LAPS = (
 
 _KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
 _NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
+_WHERE = re.compile(" (?:at|from) ")  # between a name and the angle or parameters of an attractor
 _TURN = re.compile(r"turn ([+-]\d+)")
 _MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
 
@@ -183,14 +187,16 @@ def on_white(code: str) -> str:
     return next(one for one in dark if 1.05 / (luminance(one) + 0.05) >= CONTRAST)
 
 
+def marker(name: str, kind: str | None = None) -> str:
+    """Return the marker of an attractor by its name; further ones where the colours repeat."""
+    read = _read(name, kind)
+    shapes = {1: "^>", -1: "v<"}.get(read.direction) or _SHAPES.get(read.kind, "o")
+    return shapes[_place(read)[1] % len(shapes)]
+
+
 def describe(name: str, kind: str | None = None) -> str:
     """Return the colour's name in words, for a legend that cannot show it: ``"sky blue"``."""
     return in_words(colour(name, kind))
-
-
-def direction(name: str, kind: str | None = None) -> int:
-    """Return the direction of rotation: +1 forward (counter-clockwise), -1 backward, 0 neither."""
-    return _read(name, kind).direction
 
 
 @functools.cache
@@ -206,7 +212,8 @@ def _words() -> dict[str, str]:
         for code, name in shades
     ]
     grey = [(UNNAMED, "grey"), ("#222222", "grey"), ("#666666", "grey")]
-    return dict(reversed([*grey, *shades, *mixed]))
+    curves = zip(CURVES, ("magenta", "cyan", "indigo"), strict=True)
+    return dict(reversed([*grey, *curves, *shades, *mixed]))
 
 
 def in_words(code: str) -> str:
@@ -265,7 +272,7 @@ def _place(read: _Read) -> tuple[_Shade, int]:
 
 
 def _read(name: str, kind: str | None) -> _Read:
-    words = name.replace(MINUS, "-").replace("_", " ").lower().strip()
+    words = _WHERE.split(name.replace(MINUS, "-").replace("_", " ").lower())[0].strip()
     found = next((k for k in _KINDS if words.startswith(k.replace("_", " "))), None)
     found = found or (kind or "").lower().replace(" ", "_")
     numbers = _NUMBERS.search(words)

@@ -253,5 +253,6 @@ def _curves(dataset: xr.Dataset) -> list[Mark]:
         x, y = together(line[:, ::-1] if turned else line for line in lines)
         if np.isfinite(x + y).sum() > 1:
             look: dict[str, Any] = {"name": name, "dash": dash, "path": f"curves/{k}"}
+            look["colour"] = palette.CURVES[k]
             found.append(Line(x, y, width=1.1, halo="#ffffff", order=2.0, **look))
     return found

@@ -112,7 +112,8 @@ def member(dataset: xr.Dataset) -> xr.Dataset:
         here &= dataset[f"point_{name}"].values == float(dataset[name])
     part: xr.Dataset = dataset.isel(attractor=dataset["exists"].values.astype(bool), point=here)
     shows = str(part["plane"].attrs["flag_meanings"]).split()[int(part["plane"])]
-    part = part.drop_vars("plane")
+    kinds = np.array(str(part["kind"].attrs["flag_meanings"]).split())
+    part = part.drop_vars("plane").assign(kind=("attractor", kinds[part["kind"].values]))
     at = ", ".join(span(name, *[float(dataset[name])] * 2) for name in varied)
     told = f"One map of a sweep, {at}. The text below describes the whole sweep."
     part.attrs = dataset.attrs | {
@@ -230,10 +231,11 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
     kept = np.isin(dataset["entry_value"].values, values)
-    loose = np.isin(dataset["loose_value"].values, values)
+    loose = np.isin(dataset.get("loose_value", values[:0]), values)
     # The last entry is for -1, no attractor.
     new = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-    part = dataset.isel(entry=kept, point=kept[owner], loose=loose)
+    rows = {"entry": kept, "point": kept[owner], "loose": loose}
+    part = dataset.isel(rows, missing_dims="ignore")
     part = part.assign(
         point_entry=("point", new[owner[kept[owner]]]),
         up=(name, new[sweeps["up"]]),

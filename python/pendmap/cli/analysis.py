@@ -17,7 +17,7 @@ from pendmap.cli.parse.options import (
     store_options,
     worker_options,
 )
-from pendmap.cli.show import begin, show
+from pendmap.cli.show import begin, made_here, show
 from pendmap.cli.stored import Kept
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def analysis_command(
             if kept is not None:
                 kept.run(analysis, outputs, name, module.SCHEMA)
                 return
-            with outputs.progress(name) as progress:
+            with outputs.progress(name) as progress, made_here():
                 dataset = analysis(progress=progress)
             show(dataset, outputs, module.SCHEMA)
 

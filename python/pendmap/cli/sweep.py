@@ -33,7 +33,6 @@ _ANALYSIS = group("Analysis", "--layer-periods 10")
     window_options(_CELLS),
     tol_option,
     max_periods_option("Bound after which a start is undecided.  [default: as for basins]"),
-    option("--analysis", str, "What is done for each model: basins.", "basins", group=_ANALYSIS),
     option(
         "--layer-periods",
         whole(1, MOST_PERIODS),

@@ -193,10 +193,6 @@ class Discrepancy(FitResult):
         rows = pd.DataFrame(ranking(self), columns=["name", "score", "size", "shape"])
         return rows.set_index("name")
 
-    def unit(self, name: str) -> str:
-        """Return the unit of a parameter, of the user's formulas too."""
-        return unit_of(name, self.definition)
-
     def followed(self) -> Followed:
         """Return the fit of the best model."""
         runs = [self.data.runs[k] for k in self.data.fitted_of]

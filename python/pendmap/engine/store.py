@@ -24,7 +24,14 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import move_folder
-from pendmap.files.dataset import MARK, check_replaceable, open_zarr, restored, write_zarr
+from pendmap.files.dataset import (
+    MARK,
+    check_replaceable,
+    consolidate,
+    open_zarr,
+    restored,
+    write_zarr,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -388,6 +395,8 @@ class ZarrStore:
         written = self.group.attrs.asdict()  # among them names of coordinates
         self.group.attrs.put({**written, **_plain(attributes), MARK: dict(mark)})
         self.publish()
+        if not self.local:
+            consolidate(self.address)
 
     def publish(self) -> None:
         """Remove the records of a complete store, and move it to its name; no other is moved.
@@ -406,6 +415,7 @@ class ZarrStore:
             return
         for broken in Path(self._root).rglob("*.partial"):  # of a process killed while it wrote
             broken.unlink(missing_ok=True)
+        consolidate(self._root)
         check_replaceable(self._name)
         move_folder(Path(self._root), Path(path))
 

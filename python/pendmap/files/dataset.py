@@ -9,7 +9,9 @@ import json
 import math
 import os
 import re
+import threading
 import time
+import warnings
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -38,6 +40,7 @@ _MADE_BY: Final = contextvars.ContextVar("made_by", default="")
 _LARGE: Final = 4096  # Number of values above which a variable is compressed
 _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
+_ONE: Final = threading.RLock()  # Held while NetCDF is read or written: the library has no threads
 _UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
 # Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
 _ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
@@ -96,21 +99,19 @@ def save(
         for name, values in dataset.data_vars.items():
             if values.size > _LARGE:
                 encoding[name] = {"zlib": True, "complevel": 1, "shuffle": True}
-        with whole_file(target, SUFFIXES) as part:
+        with _ONE, whole_file(target, SUFFIXES) as part:
             dataset.to_netcdf(part, engine="netcdf4", encoding=encoding)
         return target
     check_replaceable(target)
     with whole_folder(target) as part:
         write_zarr(dataset, part)
+        consolidate(part)
     return target
 
 
 def stored_form(dataset: xr.Dataset) -> tuple[xr.Dataset, dict[Hashable, dict[str, Any]]]:
     """Return a result as files have it by CF, and the encoding of its variables."""
-    if "history" not in dataset.attrs:
-        functions = (f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
-        made_by = _MADE_BY.get() or " or ".join(functions)
-        dataset = dataset.assign_attrs(history=history(made_by))
+    dataset = dataset.assign_attrs(history=history_of(dataset))
     texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
     dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
     # Coordinates have no missing values.
@@ -131,7 +132,8 @@ def write_zarr(
     dataset, encoding = stored_form(dataset)
     attributes = dict(dataset.attrs)
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind == "U"]
-    dataset = dataset.assign({name: dataset[name].astype(object) for name in texts})
+    kinds = (object if dataset[name].size else np.dtypes.StringDType() for name in texts)
+    dataset = dataset.assign({n: dataset[n].astype(k) for n, k in zip(texts, kinds, strict=True)})
     mode: Literal["w", "a"] = "w" if beside is None else "a"
     dataset.attrs = attributes if beside is None else dict(beside)
     dataset.to_zarr(place, mode=mode, zarr_format=3, consolidated=False, encoding=encoding)
@@ -152,6 +154,15 @@ def open_zarr(
     return dataset.assign({name: dataset[name].copy(data=values) for name, values in plain.items()})
 
 
+def consolidate(place: str | os.PathLike[str]) -> None:
+    """Gather the metadata of a complete Zarr store at its root, where other tools look first."""
+    import zarr  # noqa: PLC0415 (an extra)
+
+    with _ONE, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
+        zarr.consolidate_metadata(place, zarr_format=3)
+
+
 @contextlib.contextmanager
 def made_by(command: str) -> Iterator[None]:
     """Let ``history`` name a command in the place of the function that it calls."""
@@ -162,8 +173,12 @@ def made_by(command: str) -> Iterator[None]:
         _MADE_BY.reset(token)
 
 
-def history(made_by: str) -> str:
-    """Return the line of the attribute ``history``."""
+def history_of(dataset: xr.Dataset) -> str:
+    """Return the attribute ``history``: that of a result, or time, version and what made it."""
+    if "history" in dataset.attrs:
+        return str(dataset.attrs["history"])
+    functions = (f"pendmap.{f}" for f in KINDS.get(dataset.attrs["kind"], ["save"]))
+    made_by = _MADE_BY.get() or " or ".join(functions)
     given = os.environ.get("SOURCE_DATE_EPOCH", "")
     now = time.gmtime(int(given) if given.isdecimal() else None)
     at = time.strftime("%Y-%m-%dT%H:%M:%SZ", now)
@@ -208,14 +223,15 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
-        dataset: xr.Dataset = (
-            open_zarr(source)
-            if suffix == ".zarr"
-            else xr.open_dataset(source, engine="netcdf4", **_AS_STORED)
-        )
-        with dataset:
-            _check_result(dataset, source)
-            dataset = restored(dataset.load())
+        with _ONE if suffix != ".zarr" else contextlib.nullcontext():
+            dataset: xr.Dataset = (
+                open_zarr(source)
+                if suffix == ".zarr"
+                else xr.open_dataset(source, engine="netcdf4", **_AS_STORED)
+            )
+            with dataset:
+                _check_result(dataset, source)
+                dataset = restored(dataset.load())
         dataset.attrs.pop(MARK, None)
         if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
             dataset = importlib.import_module(_UPGRADE).upgraded(dataset)
@@ -228,6 +244,10 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def restored(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset read as it is stored with the types and names that it had."""
+    dataset.attrs = {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in dataset.attrs.items()
+    }
     for each in dataset.variables.values():
         missing = each.attrs.pop("_FillValue", None)
         if missing is not None and each.dtype.kind in "iu":

@@ -14,16 +14,18 @@ from pendmap.errors import InputError, short_repr
 from pendmap.files.saved import Saved
 from pendmap.formatting import estimate_text, html_table, interval, moment
 from pendmap.identification.motion import Motion, run_forward
+from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
+    from pendmap.model.effects import EffectDefinition
     from pendmap.records import Run
     from pendmap.signal import Floats
 
@@ -56,9 +58,20 @@ class Parameters(Saved):
     def joint_covariance(self) -> Covariance | None:
         """Names and covariance matrix of jointly fitted parameters, SI; None if it is unknown."""
 
+    definition: Callable[[str], EffectDefinition] = staticmethod(definition)
+    """Function that returns the definition of an effect by its name."""
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """Units of the readings of each fitted run."""
+        return ()
+
     def unit(self, name: str) -> str:
         """Return the unit of a parameter; empty for a pure number."""
-        return unit_of(name)
+        own, _, run = name.partition("[")
+        if own == "bias" and self.sensors:
+            return self.sensors[int(run[:-1] or 0)].replace("s2", "s²")
+        return unit_of(name, self.definition)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row a parameter.
@@ -110,6 +123,12 @@ class FitResult(Parameters):
     @abc.abstractmethod
     def followed(self) -> Followed:
         """Return the fit of the whole records; InputError is raised if there is none."""
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """Units of the readings of each fitted run."""
+        sensors = (run.rod_sensor for run in self.followed().runs)
+        return ["rad" if sensor is None else sensor.unit for sensor in sensors]
 
     @property
     def residual(self) -> dict[str, xr.DataArray]:

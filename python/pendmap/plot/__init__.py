@@ -22,7 +22,7 @@ from matplotlib.axes import Axes
 from pendmap.charts import registry
 from pendmap.charts.selection import member
 from pendmap.errors import InputError, check_type, short_repr
-from pendmap.render import axes, drawing, figure_of
+from pendmap.render import axes, drawing, figure_of, style
 from pendmap.render import draw as _save
 
 if TYPE_CHECKING:
@@ -130,17 +130,18 @@ def draw(
         raise InputError(f"{name}: options must be among layer, {known}, or set on the Axes")
     if "colormap" in look:
         chart = drawing.in_colours(chart, look["colormap"])
-    if ax is None:
-        from matplotlib import pyplot as plt  # noqa: PLC0415 (a display, only where it is needed)
-
-        ax = plt.figure(layout="constrained").add_subplot()
-    check_type("ax", ax, Axes, "plt.gca()")
     title, legend = look.get("title", True), look.get("legend")
     if legend is not None:
         check_type("legend", legend, bool, "False")
-    axes.into(ax, chart, title=title is True, legend=legend)
-    if isinstance(title, str):
-        ax.set_title(title)
+    with style.DRAWING:
+        if ax is None:
+            from matplotlib import pyplot as plt  # noqa: PLC0415 (a display, only if needed)
+
+            ax = plt.figure(layout="constrained").add_subplot()
+        check_type("ax", ax, Axes, "plt.gca()")
+        axes.into(ax, chart, title=title is True, legend=legend)
+        if isinstance(title, str):
+            ax.set_title(title)
     return ax
 
 
@@ -161,7 +162,8 @@ def entries(result: Any, *, layer: str | None = None) -> tuple[list[Any], list[s
     'rotation 1:+1, 8.81 %'
     >>> plt.close(fig)
     """
-    return axes.entries(axes.first(_chart(result, layer)))
+    with style.DRAWING:
+        return axes.entries(axes.first(_chart(result, layer)))
 
 
 def _chart(result: Any, layer: str | None) -> Chart | Sheet:  # noqa: ANN401 (as of draw)

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.errors import InputError, short_repr
+from pendmap.records.experiment import Experiment, Run
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
 from pendmap.records.resolution import step_of, still_noise
 from pendmap.signal.local_polynomial import local_fit
@@ -30,7 +32,6 @@ from pendmap.signal.robust import broad_scale, widened
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pendmap.records.experiment import Run
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
@@ -97,7 +98,7 @@ class NoiseFloor:
     bound: bool = False
 
 
-def noise_floor(run: Run) -> NoiseFloor:
+def noise_floor(run: Run | Experiment) -> NoiseFloor:
     """Return the noise of a run, estimated without a model of the pendulum.
 
     Polynomials are fitted to neighbouring trusted samples; the noise is the root mean square of
@@ -105,8 +106,8 @@ def noise_floor(run: Run) -> NoiseFloor:
 
     Parameters
     ----------
-    run : Run
-        A run of :func:`read_experiment`.
+    run : Run or Experiment
+        A run of :func:`read_experiment`, or an experiment of one run.
 
     Returns
     -------
@@ -127,6 +128,11 @@ def noise_floor(run: Run) -> NoiseFloor:
     >>> round(pendmap.noise_floor(run).sigma, 4)
     0.001
     """
+    if isinstance(run, Experiment) and len(run.runs) == 1:
+        (run,) = run.runs
+    if not isinstance(run, Run):
+        what = f"{len(run.runs)} runs" if isinstance(run, Experiment) else short_repr(run)
+        raise InputError(f"run must be one run, like experiment.runs[0], got {what}")
     if run.peaks_only:
         return NoiseFloor(math.nan, math.nan)
     trusted = run.trusted if run.trusted.any() else None

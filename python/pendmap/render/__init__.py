@@ -56,7 +56,7 @@ def figure_of(  # noqa: PLR0913 (all of these a user may choose)
     if colormap is not None:
         made = drawing.in_colours(made, colormap)
     narrow = style.IN_COLUMN if width is not None and width < style.COLUMN else {}
-    with mpl.rc_context(style.RC | narrow):
+    with style.DRAWING, mpl.rc_context(style.RC | narrow):
         return drawing.draw(
             made, size=size, dpi=dpi, width=width / _INCH if width else None, title=title
         )

@@ -353,12 +353,7 @@ def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:
         warnings.simplefilter("always")
         engine.execute(figure)
         for axes, panel in panels:
-            ticks.turn(axes)
-            needed = max((marks.across(mark) for mark in panel.marks), default=0.0)
-            if panel.bare and needed > inches_of(axes)[0]:
-                for text in axes.texts:
-                    font = float(text.get_fontsize())
-                    text.set_fontsize(font * inches_of(axes)[0] / needed)
+            turned(axes, panel)
             title, room = axes.get_title(loc="left"), inches_of(axes)[0]
             if title and style.width_of(title) > room + 0.15:
                 axes.set_title(style.folded(title, room))
@@ -366,6 +361,15 @@ def settle(figure: Figure, panels: Sequence[Drawn]) -> bool:
                 _note(axes, panel)
         engine.execute(figure)
     return not any("collapsed" in str(one.message) for one in said)
+
+
+def turned(axes: Axes, panel: Panel) -> None:
+    """Turn long names below a panel; make the words of a panel without a frame narrow enough."""
+    ticks.turn(axes)
+    needed = max((marks.across(mark) for mark in panel.marks), default=0.0)
+    if panel.bare and needed > inches_of(axes)[0]:
+        for text in axes.texts:
+            text.set_fontsize(float(text.get_fontsize()) * inches_of(axes)[0] / needed)
 
 
 def _note(axes: Axes, panel: Panel) -> None:

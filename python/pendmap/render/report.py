@@ -37,7 +37,7 @@ def figures(found: Discrepancy) -> dict[str, Figure]:
 def write(found: Discrepancy, path: Path) -> Path:
     """Write the report of a diagnosis; see :func:`pendmap.render.write_report`."""
     document = report.diagnosis(found)
-    with mpl.rc_context(style.RC):
+    with style.DRAWING, mpl.rc_context(style.RC):
         drawn = figures(found)
         pictures = {name: _png(drawn[name]) for name in document.pictures if name in drawn}
     suffix = "" if path.is_dir() else path.suffix.lower()

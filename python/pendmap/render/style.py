@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import textwrap
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -41,6 +42,9 @@ FEWEST = 12  # Letters of a line below which a text is not broken
 
 DPI = (20, 1200)  # Least and greatest pixels per inch
 
+
+DRAWING: Final = threading.RLock()
+"""Held while a figure is made, drawn or written: matplotlib and its settings have no threads."""
 
 SYMBOLS: Final = {
     "E / (m g l)": "$E/(mgl)$",
@@ -174,7 +178,7 @@ def written(
     if size is not None and max(size) * pixels > PIXELS:
         said = f"at most {PIXELS} pixels a side are possible"
         raise InputError(f"size {size} at {pixels:g} dpi: {said}")
-    with whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
+    with DRAWING, whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
         figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
         figure.savefig(part, format=suffix, dpi=figure.dpi, metadata=metadata)

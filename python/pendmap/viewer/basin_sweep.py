@@ -63,6 +63,11 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     frame.summary(stream, dataset)
     lines = ["| number | attractor | colour |", "|---|---|---|"]
     lines += [f"| {one.id} | {one.name} | {palette.in_words(one.colour)} |" for one in every]
+    curves: dict[str, str] = {}
+    for panel in made.recorded:
+        curves |= chart.legend(panel.marks)
+    others = curves.keys() - {one.name for one in every}
+    lines += ["", *(f"- {name}: {shade}" for name, shade in curves.items() if name in others)]
     frame.text(stream, "legend", "\n".join(lines))
     around.log(stream, ROOT)
     classes = [(0, "failed", palette.rgb("failed")), (1, "undecided", palette.rgb("undecided"))]

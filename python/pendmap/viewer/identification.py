@@ -131,7 +131,7 @@ def _page(report: IdentificationReport) -> Iterator[str]:
         yield from (f"## By {best.method.replace('_', ' ')}", "")
         yield from ("| parameter | value | 95 % interval | unit |", "|---|---|---|---|")
         for name, each in {**best.estimates, **best.derived}.items():
-            yield f"| {name} | {_cells(each)} | {unit_of(name)} |"
+            yield f"| {name} | {_cells(each)} | {report.unit(name)} |"
     if report.joint is not None and report.joint.fit.rms:
         fit = report.joint.fit
         noise = ", ".join(f"{reading.sigma:.3g}" for reading in report.joint.readings)

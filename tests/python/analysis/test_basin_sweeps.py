@@ -180,7 +180,6 @@ def test_planes_without_basins() -> None:
 @pytest.mark.parametrize(
     ("ranges", "more", "message"),
     [
-        ({"p": (0.5, 0.6, 2)}, {"analysis": "lifetime"}, "analysis must be basins, got 'lifetime'"),
         ({"q": (0.5, 0.6, 2)}, {}, "'q' is no parameter of this model"),
         ({"magnet.dipole": (0, 1, 2)}, {}, "magnet has .* if it is in the model"),
         ({"quadratic_drag.z": (0, 1, 2)}, {}, r"; quadratic_drag has quadratic_drag\.q$"),

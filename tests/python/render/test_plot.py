@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 import pytest
+from hypothesis import given as drawing_of
+from hypothesis import strategies as st
 from matplotlib import pyplot as plt
 from matplotlib.text import Text
 
@@ -21,8 +23,10 @@ import synthetic
 from decays import decay, record
 from drawn import plain
 from pendmap import InputError, Pendulum, plot
+from pendmap.charts import palette, registry, selection
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet
-from pendmap.charts.marks import Image, Points
+from pendmap.charts.legend import entries as legend_entries
+from pendmap.charts.marks import Image, Line, Points
 from pendmap.comparison import compare
 from pendmap.identification import identify
 from pendmap.records import Experiment, Run
@@ -81,6 +85,101 @@ def test_a_result_is_drawn_into_the_axes_given(name: str) -> None:
     assert right.get_ylabel()
     assert right.get_xlabel() or right.get_xticklabels()[0].get_text()
     assert {axes for axes in figure.axes if axes.has_data()} <= {right, *figure.axes[2:]}
+
+
+def layers_of(given: Any) -> list[str]:  # noqa: ANN401
+    made = registry.of_result(given)
+    panels = (*made.panels, *getattr(made, "recorded", ()))
+    return list(dict.fromkeys(panel.name for panel in panels))
+
+
+SIZES = [(6.4, 4.8), (4.0, 3.0), (9.0, 5.0), (3.4, 2.8)]  # Figures in inches
+
+
+@pytest.mark.parametrize("name", results())
+def test_no_text_or_legend_is_cut_off_by_a_figure_without_a_layout(name: str) -> None:
+    given, drawn = results()[name](), 0
+    for k, layer in enumerate(layers_of(given)):
+        wide, high = SIZES[k % len(SIZES)]
+        count = 1 + (k + len(name)) % 2
+        figure, every = plt.subplots(1, count, figsize=(wide * count, high), squeeze=False)
+        axes = every[0, -1]
+        try:
+            plot.draw(given, axes, layer=layer)
+        except InputError:  # a panel of recordings alone
+            continue
+        drawn += 1
+        figure.canvas.draw()
+        legend = axes.get_legend()
+        boxes = [one.get_tightbbox() for one in figure.axes if one.axison]
+        boxes += [text.get_window_extent() for text in axes.texts if text.get_text()]
+        if legend is not None:
+            boxes.append(legend.get_window_extent())
+            assert all(text.get_text().strip() for text in legend.get_texts())
+            assert len(legend.legend_handles) == len(legend.get_texts()) > 0
+        for box in boxes:
+            assert -1.5 < box.x0 < box.x1 < figure.bbox.width + 1.5, (layer, box)
+            assert -1.5 < box.y0 < box.y1 < figure.bbox.height + 1.5, (layer, box)
+        assert all(text.strip() for text in plot.entries(given, layer=layer)[1]), layer
+        plt.close(figure)
+    assert drawn
+
+
+@pytest.mark.parametrize("layout", ["constrained", "tight", None])
+@pytest.mark.parametrize("later", ["tight_layout", "subplots_adjust"])
+def test_a_legend_is_kept_by_layouts_of_the_user(layout: str | None, later: str) -> None:
+    figure, every = plt.subplots(2, 2, figsize=(9.0, 7.0), layout=layout)
+    for axes in every.flat:
+        plot.trajectory(MOTION, axes, layer="phase")
+        plot.basins(MAP, axes, layer="settle", legend=True)
+    if layout is None:
+        before = every[0, 0].get_position().bounds
+        getattr(figure, later)()
+        assert every[0, 0].get_position().bounds != before  # Axes are still the layout's
+    figure.canvas.draw()
+    assert all(axes.get_tightbbox().y0 >= 0 for axes in every.flat)
+
+
+def test_recorded_curves_of_a_panel_have_names_and_colours_of_their_own() -> None:
+    model, ranges = Pendulum(), {"p": (0.3, 1.8, 6), "omega": (1.6, 2.4, 6)}
+    made = [registry.of_result(make()) for name, make in results().items() if name != "section"]
+    made.append(registry.of_result(pendmap.parameter_map(model, ranges, curves=True)))
+    for chart in made:
+        for panel in getattr(chart, "recorded", ()) or chart.panels:
+            lines = [one for one in panel.marks if isinstance(one, Line) and one.path]
+            known = {one.name: one.colour for one in panel.marks if one.name}
+            for one in lines:
+                assert len(lines) == 1 or one.colour in known.values(), (panel.name, one.path)
+            words = [palette.in_words(known[name]) for name in {one.name for one in lines} - {""}]
+            assert words.count("grey") < 2, (panel.name, known)
+
+
+@drawing_of(st.data())
+def test_an_attractor_has_one_marker_and_colour(drawn: Any) -> None:  # noqa: ANN401
+    n, w, mark = drawn.draw(
+        st.tuples(st.integers(1, 20), st.integers(-9, 9), st.sampled_from("+-"))
+    )
+    kind = drawn.draw(st.sampled_from(["oscillation", "rotation", "tumbling chaos", "rest"]))
+    name = {"oscillation": f"oscillation {n}:0 ({mark})", "rotation": f"rotation {n}:{w:+d}"}
+    plain = name.get(kind, kind)
+    at = drawn.draw(st.floats(-4, 4))
+    for place in (f" at {at:+.4f}", f" from p = {at:.4g}", f" from p = {n}, omega = 2 (2)"):
+        assert palette.colour(plain + place) == palette.colour(plain)
+        assert palette.marker(plain + place) == palette.marker(plain)
+
+
+def test_a_map_of_a_sweep_looks_like_the_map_alone() -> None:
+    swept = pendmap.sweep(Pendulum(gamma=0.05), {"p": [0.6, 1.2, 2.0]}, grid=12)
+    for p in swept.p.values:
+        alone = pendmap.basins(Pendulum(gamma=0.05, p=float(p)), 12)
+        looks = [
+            {
+                (one.name.partition(" ")[0], one.kind, one.colour, palette.marker(one.name))
+                for one in legend_entries(member)
+            }
+            for member in (selection.shown(swept.sel(p=p)), alone)
+        ]
+        assert looks[1] <= looks[0] or looks[0] <= looks[1], looks
 
 
 def test_it_is_a_module_that_lists_its_functions() -> None:

@@ -198,7 +198,7 @@ def test_a_selection_of_a_bifurcation_diagram_is_drawn(
     top = figure.axes[0].get_ylim()[1]  # recordings clip above it
     drawn = {tuple(row) for line in lines for row in line if len(row) and row[1] <= top}
     whole = zip(DIAGRAM["point_value"].values, DIAGRAM["point_theta"].values, strict=True)
-    loose = zip(DIAGRAM["loose_value"].values, DIAGRAM["loose_theta"].values, strict=True)
+    loose = zip(*(DIAGRAM.get(f"loose_{name}", []) for name in ("value", "theta")), strict=True)
     assert drawn == {pair for pair in (*whole, *loose) if pair[0] in values}
     exponents = [np.asarray(line.get_xydata()) for line in figure.axes[2].lines[1:]]
     assert {x for line in exponents for x in line[:, 0]} <= set(values)

@@ -65,6 +65,7 @@ class Identification(Parameters):
     misfit: float | None = None
     model: Rig | None = None
     converged: bool = True
+    sensors: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Identification {self.short}>"

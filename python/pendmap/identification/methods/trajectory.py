@@ -91,6 +91,7 @@ def identification_of(joint: JointFit) -> Identification:
         misfit=fit.chi2 / max(fit.degrees, 1),
         model=fit.model,
         converged=fit.converged,
+        sensors=tuple(reading.unit for reading in joint.readings),
     )
 
 

@@ -1,0 +1,105 @@
+"""Public functions from eight threads at once: what each returns, and no crash."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import pendmap
+from decays import decay, record
+from pendmap import Grid, Pendulum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+MODEL = Pendulum(p=0.6)
+MAP = pendmap.basins(MODEL, Grid.square(16))
+DIFFER = {"seconds", "history", "summary"}  # Attributes of equal results that may differ
+
+
+def swing() -> tuple[np.ndarray, np.ndarray]:
+    return record(decay(release=1.0, until=20.0), seconds=12)
+
+
+def own_axes() -> bytes:
+    figure = Figure(figsize=(3.0, 3.0), dpi=50)
+    FigureCanvasAgg(figure)
+    pendmap.plot.basins(MAP, figure.add_subplot(), layer="labels")
+    return b""
+
+
+def calls(folder: Path) -> dict[str, Callable[[], Any]]:
+    """Small requests of the public functions, each with files of its own thread."""
+
+    def file(end: str) -> Path:
+        return folder / f"{threading.get_ident()}{end}"
+
+    loaded = pendmap.save(MAP, folder / "map.nc")
+    rows = np.column_stack(swing())
+    np.savetxt(folder / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    return {
+        "load": lambda: pendmap.load(loaded),
+        "save": lambda: pendmap.load(pendmap.save(MAP, file(".nc"))),
+        "basins": lambda: pendmap.basins(MODEL, Grid.square(12)),
+        "basins_of": lambda: pendmap.basins_of(MODEL, [0.0, 1.0], [0.1, 2.5]),
+        "map": lambda: pendmap.parameter_map(
+            Pendulum(), {"p": (0.5, 0.9, 2), "omega": (1.8, 2.2, 2)}, starts=3
+        ),
+        "plot": lambda: pendmap.plot.save(MAP, file(".png"), dpi=40).read_bytes(),
+        "sweep": lambda: pendmap.sweep(MODEL, {"p": [0.5, 0.6]}, grid=8),
+        "bifurcation": lambda: pendmap.bifurcation(Pendulum(), {"p": (0.5, 0.7, 3)}, starts=2),
+        "orbit": lambda: pendmap.orbit(MODEL, 1, 1, Grid.square(12)),
+        "own axes": own_axes,
+        "lyapunov": lambda: pendmap.lyapunov(MODEL),
+        "lifetime": lambda: pendmap.lifetime(Pendulum(p=1.7), starts=100),
+        "tongues": lambda: pendmap.tongues(Pendulum(), [1.9, 2.0]),
+        "melnikov": lambda: pendmap.melnikov(Pendulum(), [1.0, 2.0]),
+        "simulate": lambda: pendmap.simulate(MODEL, 1.0, 0.0, 20.0),
+        "advance": lambda: np.asarray(pendmap.advance(MODEL, [1.0], [0.0], 3)[0]),
+        "identify": lambda: str(pendmap.identify(folder / "a.csv")),
+        "report": lambda: str(
+            pendmap.load(pendmap.identify(folder / "a.csv").save(file("_report.nc")))
+        ),
+        "noise_floor": lambda: pendmap.noise_floor(pendmap.read_experiment(folder / "a.csv")),
+    }
+
+
+def same(one: Any, other: Any) -> bool:  # noqa: ANN401 (any result)
+    if not isinstance(one, xr.Dataset):
+        return bool(np.all(one == other))
+    pairs = zip(one.variables.items(), other.variables.values(), strict=True)
+    attributes = (each.attrs.items() for each in (one, other))
+    kept = [{n: v for n, v in each if n not in DIFFER} for each in attributes]
+    return all(n in DIFFER or a.identical(b) for (n, a), b in pairs) and kept[0] == kept[1]
+
+
+@pytest.mark.parametrize("repeat", [1, pytest.param(12, marks=pytest.mark.thorough)])
+def test_public_functions_run_in_eight_threads_at_once(tmp_path: Path, repeat: int) -> None:
+    settings = dict(mpl.rcParams)
+    wanted = {name: (call, call()) for name, call in calls(tmp_path).items()}
+    with ThreadPoolExecutor(8) as pool:
+        running = [
+            (name, pool.submit(call))
+            for name, (call, _) in wanted.items()
+            for _ in range(8 * repeat)
+        ]
+    for name, future in running:
+        assert same(future.result(), wanted[name][1]), name
+    assert dict(mpl.rcParams) == settings
+
+
+def test_files_are_written_and_read_in_eight_threads_at_once(tmp_path: Path) -> None:
+    def again(k: int) -> bool:
+        return bool(pendmap.load(pendmap.save(MAP, tmp_path / f"{k}.nc")).identical(MAP))
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(again, range(80)))
