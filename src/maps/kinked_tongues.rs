@@ -2,14 +2,12 @@
 
 use super::chebyshev::Values;
 use super::tongues::{Critical, bordered, gap, is_stable};
-use crate::orbit::brackets::{below, zero};
+use crate::orbit::brackets::{below, may_touch, zero};
 
 /// Samples of a part of the range of `p`.
-const SAMPLES: usize = 48;
-/// A function that falls to less than this part of its least sample, by the parabola through three, may pass
-/// zero between them; so may one whose sample is this small.
-const FALLS: f64 = 0.5;
-const SMALL: f64 = 1e-3;
+const SAMPLES: usize = 32;
+/// Products of multipliers this near to 1 are not told from it.
+const ROUNDING: f64 = 1e-6;
 
 /// The critical amplitudes, and whether rest is stable before the first; `at` gives multipliers as
 /// a monodromy matrix.
@@ -32,9 +30,12 @@ pub(super) fn critical(
         let complex = m[0] * m[0] < m[4];
         if complex { 1.0 - m[4] } else { 1.0 }
     };
-    let of: Vec<f64> = values.iter().map(|m| turning(*m)).collect();
-    for p in zeros(&places, &of, |p| turning(at(p))) {
-        all.push((p, at(p)[0].signum()));
+    for (p, both) in places.windows(2).zip(values.windows(2)) {
+        let [left, right] = [both[0], both[1]].map(turning);
+        if left * right < 0.0 && left.abs().min(right.abs()) > ROUNDING {
+            let p = zero(|p| turning(at(p)), p[0], p[1]);
+            all.push((p, at(p)[0].signum()));
+        }
     }
     let (critical, stable_at_first) = bordered(all, p_max, |p| is_stable(at(p)));
     let changes = |c: &Critical| c.stable[0] != c.stable[1];
@@ -48,16 +49,12 @@ fn zeros(places: &[f64], values: &[f64], function: impl Fn(f64) -> f64) -> Vec<f
         let [left, right] = [values[i], values[i + 1]];
         if left * right < 0.0 {
             found.push(zero(&function, places[i], places[i + 1]));
-        } else if i > 0 && values[i - 1] * left > 0.0 && left * right > 0.0 {
-            let [low, middle, high] = [places[i - 1], places[i], places[i + 1]];
-            let [before, here, after] = [values[i - 1], left, right].map(f64::abs);
-            let slopes = [(here - before) / (middle - low), (after - here) / (high - middle)];
-            let bend = (slopes[1] - slopes[0]) / (high - low);
-            let slope = 0.5 * (slopes[0] + slopes[1]);
-            let least = here - slope * slope / (4.0 * bend);
-            if here > before || here > after || least > FALLS * here && here > SMALL {
-                continue;
-            }
+        } else if i > 0
+            && values[i - 1] * left > 0.0
+            && left * right > 0.0
+            && may_touch([values[i - 1], left, right].map(f64::abs))
+        {
+            let [low, high] = [places[i - 1], places[i + 1]];
             let sign = left.signum();
             if let Some(inner) = below(|p| sign * function(p), low, high) {
                 found.extend([zero(&function, low, inner), zero(&function, inner, high)]);

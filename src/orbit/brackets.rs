@@ -2,6 +2,8 @@
 
 /// Iterations at most.
 const ITERATIONS: usize = 60;
+/// Steps of the golden section.
+const SECTIONS: usize = 32;
 
 /// A zero between two places of opposite sign, or of which the first is a zero already passed, by false
 /// position with the value at an end that is kept twice halved (the Illinois variant).
@@ -30,13 +32,20 @@ pub fn zero(function: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     0.5 * (ends[0].0 + ends[1].0)
 }
 
+/// Whether a function with these values, in the middle its least, may pass zero between them: the parabola
+/// through them falls to less than half of it.
+pub fn may_touch([before, here, after]: [f64; 3]) -> bool {
+    let [slope, bend] = [0.5 * (after - before), before - 2.0 * here + after];
+    here < before && here < after && here - 0.5 * slope * slope / bend <= 0.5 * here
+}
+
 /// A place between two at which a function with one minimum there is negative; none if it stays above.
 pub fn below(function: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (low, high);
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
     let mut values = inner.map(&function);
-    for _ in 0..ITERATIONS {
+    for _ in 0..SECTIONS {
         if let Some(k) = (0..2).find(|k| values[*k] < 0.0) {
             return Some(inner[k]);
         }

@@ -13,7 +13,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::brackets::{below, zero};
+use super::brackets::{below, may_touch, zero};
 use super::floquet::Multipliers;
 use super::sectors::{Slopes, Step};
 use crate::integrate::reference::problem::greatest_rate;
@@ -173,8 +173,8 @@ impl KinkedRest {
             if here * next <= 0.0 && (here - next).abs() < PI {
                 found.push(zero(away, angle(k), angle(k + 1)));
             } else if here * before > 0.0
-                && here.abs() <= before.abs().min(next.abs())
-                && here.abs() < 1.0
+                && here * next > 0.0
+                && may_touch([before, here, next].map(f64::abs))
             {
                 let (low, high) = (angle(k) - TAU / DIRECTIONS as f64, angle(k + 1));
                 let sign = here.signum();

@@ -13,7 +13,7 @@ use super::brackets::{below, zero};
 /// Chebyshev points of a step.
 const NODES: usize = 12;
 /// Last coefficients, over the largest, of a resolved series.
-const RESOLVED: f64 = 1e-13;
+const RESOLVED: f64 = 1e-11;
 /// Picard's iterations at most, the change that ends them, and crossings in a step.
 const ITERATIONS: usize = 60;
 const ROUNDING: f64 = 1e-15;
