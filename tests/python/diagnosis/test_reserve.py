@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ from pendmap.residuals.by_run import RunByRun, parameters_by_run
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.diagnosis.named import NamedEffect
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
@@ -145,12 +147,35 @@ def test_the_share_of_the_gap_is_one_number() -> None:
     left, before = (x**2 - gap.noise_floor**2 for x in (gap.after, gap.before))
     share = min(1.0, 1 - left / before)
     assert 0 < share < 1 or gap.after <= gap.noise_floor
-    assert gap.closed == pytest.approx(share, rel=1e-12)
-    assert fields["gap"]["closed"] == fields["gap"]["closed_by_nearest"] == gap.closed
-    assert [effect["closes"] for effect in fields["effects"]] == [gap.closed]
-    assert f"Share of the squared gap closed: {100 * gap.closed:.0f} %" in list(as_text(found))
+    closed = found.assessment.closed
+    assert closed == pytest.approx(share, rel=1e-9)
+    assert fields["gap"]["closed"] == fields["gap"]["closed_by_nearest"] == closed
+    assert [effect["closes"] for effect in fields["effects"]] == [closed]
+    assert f"Share of the squared gap closed: {100 * closed:.0f} %" in list(as_text(found))
     assert share_closed(2.0, 1.0, 1.0) == share_closed(0.9, 0.8, 1.0) == 1.0
     assert share_closed(0.9, 1.1, 1.0) == 0.0
+
+
+def test_an_effect_whose_interval_contains_0_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = np.arange(600) * 0.02
+    theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=0.05)
+    theta = theta + np.random.default_rng(1).normal(0, 2e-3, time.size)
+    run = Run("a", "a.csv", "free", time, theta, np.ones(time.size, bool))
+    module = importlib.import_module("pendmap.diagnosis.diagnose")
+    named = module.name_effects
+    shown: list[str] = []
+
+    def widened(*given: object) -> tuple[NamedEffect, ...]:
+        effects = named(*given)
+        shown.extend(effect.name for effect in effects)
+        wide = {size: (-1.0, 1.0) for effect in effects for size in effect.ci95}
+        return tuple(dataclasses.replace(effect, ci95=wide) for effect in effects)
+
+    monkeypatch.setattr(module, "name_effects", widened)
+    found = pendmap.diagnose(run, max_effects=1)
+    assert shown
+    assert found.effects == ()
+    assert found.verdict == "unknown"
 
 
 def test_the_effect_that_closes_most_comes_first(waving: tuple[State, ScoredModel]) -> None:
