@@ -214,11 +214,6 @@ class Gap:
     held_out_after: float  # Residual of the selected model in the held-out records
     by_run: tuple[RunGap, ...]  # Residuals of each record
 
-    @property
-    def closed(self) -> float:
-        """Share of the squared gap above the noise that the selected model closes."""
-        return share_closed(self.before, self.after, self.noise_floor)
-
 
 def share_closed(before: float, after: float, noise: float) -> float:
     """Return the share of a squared gap above the noise that a better model closes.
@@ -244,26 +239,18 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     for held_out in (False, True):
         runs = data.held if held_out else data.fitted
         before, after = ((f.held if held_out else f.fitted) for f in (base, best))
-        rows += [
-            RunGap(
-                run.name, held_out, noise_rms([run]), _rms([run], before, k), _rms([run], after, k)
-            )
-            for k, run in enumerate(runs)
-        ]
+        for run, *left in zip(runs, before.residuals, after.residuals, strict=True):
+            rms_of = (_rms(run, residual) for residual in left)
+            rows.append(RunGap(run.name, held_out, noise_rms([run]), *rms_of))
         floors.append(noise_rms(runs))
-        rms += [_rms(runs, before), _rms(runs, after)]
+        rms += [before.rms, after.rms]
     return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
 
 
-def _rms(runs: Sequence[FitRun], fit: TrajectoryFit, first: int = 0) -> float:
-    """Return the root mean square residual of consecutive runs of a fit, from index ``first``."""
-    squares, count = 0.0, 0
-    for k, run in enumerate(runs, start=first):
-        residual = fit.residuals[k]
-        good = np.isfinite(residual) & run.counted
-        squares += float(np.sum(residual[good] ** 2))
-        count += int(np.count_nonzero(good))
-    return math.sqrt(squares / count) if count else math.nan
+def _rms(run: FitRun, residual: Floats) -> float:
+    """Return the root mean square residual of a run's included readings, rad."""
+    squares = residual[np.isfinite(residual) & run.counted] ** 2
+    return math.sqrt(float(np.mean(squares))) if squares.size else math.nan
 
 
 @dataclasses.dataclass(frozen=True)

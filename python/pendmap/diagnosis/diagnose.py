@@ -123,6 +123,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
             refuse_astray(experiment.path, data.fitted, last.fit)
         fitted = state.data.fitted
         while True:
+            last = last if last.chosen else state.begun
             nearest = state.scored(last)
             runs = parameters_by_run(fitted, last.fit, last.noise, last.level)
             after = residual_torque(fitted, last.fit, last.noise)

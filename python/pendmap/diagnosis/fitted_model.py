@@ -328,33 +328,27 @@ def _drains(
 
 
 def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:
-    """Return the root mean square residual of a model in each fitted run, rad, or 0.
+    """Return the root mean square residual in each fitted run, rad; 0 if noise explains it."""
+    rows = residual_ratios(data, fitted)
+    return tuple(rms if ratio > allowed else 0.0 for rms, ratio, allowed in rows)
 
-    It is 0 if noise explains it: if the mean of squared residuals over squared standard errors is
-    at most ``1 + 4 sqrt(2 / N + 4 r^2)``, with the relative error ``r`` of the noise.
+
+def residual_ratios(data: DataSplit, fitted: FittedModel) -> list[tuple[float, float, float]]:
+    """Return the rms residual (rad) of each fitted run, and the mean of squares over the noise's.
+
+    The third number is the greatest mean that noise explains: ``1 + 4 sqrt(2 / N + 4 r^2)``, with
+    the relative error ``r`` of the noise.
     """
-    residuals = zip(data.fitted, fitted.fit.residuals, noise_ratios(data, fitted), strict=True)
-    return tuple(
-        float(np.sqrt(np.mean(residual[run.counted] ** 2))) if ratio > allowed else 0.0
-        for run, residual, (ratio, allowed) in residuals
-    )
-
-
-def noise_ratios(data: DataSplit, fitted: FittedModel) -> list[tuple[float, float]]:
-    """Return the mean of squared residuals over squared standard errors in each fitted run.
-
-    The second number is the greatest one that noise explains.
-    """
-    ratios = []
+    rows = []
     for run, residual, of in zip(data.fitted, fitted.fit.residuals, data.fitted_of, strict=True):
         good = np.isfinite(residual) & run.counted
-        sigma = run.sigmas[good]
-        if run.count is not None:
-            sigma = np.hypot(sigma, run.count / math.sqrt(12))
-        ratio = float(np.mean((residual[good] / sigma) ** 2)) if good.any() else 0.0
+        rounding = (run.count or 0.0) / math.sqrt(12)
+        squares, noise = residual[good] ** 2, run.sigmas[good] ** 2 + rounding**2
+        rms, ratio = (float(np.mean(x)) if x.size else 0.0 for x in (squares, squares / noise))
         doubt = data.readings[of].doubt
-        ratios.append((ratio, 1 + 4 * math.sqrt(2 / max(sigma.size, 1) + 4 * doubt**2)))
-    return ratios
+        allowed = 1 + 4 * math.sqrt(2 / max(squares.size, 1) + 4 * doubt**2)
+        rows.append((math.sqrt(rms), ratio, allowed))
+    return rows
 
 
 def weight_records(data: DataSplit, errors: Sequence[float]) -> DataSplit:

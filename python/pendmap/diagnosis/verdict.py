@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from pendmap.diagnosis.candidates import count_choices
-from pendmap.diagnosis.fitted_model import noise_ratios
+from pendmap.diagnosis.fitted_model import residual_ratios
 from pendmap.diagnosis.scores import CONTAINS
 from pendmap.diagnosis.search import fit_alternatives
 
@@ -205,8 +205,8 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
     limits, fitted, held = state.thresholds, best.fitted, best.hold_out
     noise, degrees = fitted.noise, max(fitted.fit.degrees, 1)
     # The run that exceeds its noise most; the colour of residuals swells what white noise allows.
-    ratios = noise_ratios(state.records, fitted)
-    ratio, white = max(ratios, key=lambda pair: pair[0] / pair[1])
+    rows = residual_ratios(state.records, fitted)
+    _, ratio, white = max(rows, key=lambda row: row[1] / row[2])
     allowed = white * noise.swell
     # The largest of several excesses is larger by chance.
     left = max(noise.z, max(noise.by_run) - SEVERAL)

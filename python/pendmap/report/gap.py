@@ -36,11 +36,6 @@ RARE: Final = 1e-9  # Smallest reported probability
 UNEVEN: Final = 1.5
 """Ratio of the noise at high speed to that at low speed above which the report mentions it."""
 
-LIKE: Final = 1.3  # Root mean square residual over the noise up to which both appear equal
-
-QUIET: Final = 20
-"""Percentage of the readings, those with the least noise, whose residuals are compared."""
-
 
 def verdict(found: Discrepancy) -> Iterator[str]:
     """Yield the verdict with its probabilities and the statistics it is based on."""
@@ -191,34 +186,16 @@ def _place(row: dict[str, Any]) -> str:
 
 
 def noise_of(found: Discrepancy) -> Iterator[str]:
-    """Yield notes on the noise, and on chi-squared if it shows more than root mean squares."""
-    residuals, noise = [], []
-    for run, own in zip(found.data.fitted, found.best.fitted.fit.residuals, strict=False):
-        good = np.isfinite(own) & run.counted
-        residuals.append(own[good])
-        noise.append(run.sigmas[good])
-    residual, sigma = np.concatenate(residuals), np.concatenate(noise)
-    low, high = (float(end) for end in np.percentile(sigma, (5, 95)))
-    uneven = high > UNEVEN * low
-    if uneven:
+    """Yield notes on the noise of the readings."""
+    noise = [run.sigmas[run.counted] for run in found.data.fitted]
+    low, high = (float(end) for end in np.percentile(np.concatenate(noise), (5, 95)))
+    if high > UNEVEN * low:
         yield (
             "The noise is that of the readings used, each at its own speed: about "
             f"{mrad(low)} where they are slow and {mrad(high)} where they are fast. "
             f"({code('pendmap look')} gives one number for a whole record.)"
         )
     yield from _block_means(found)
-    judged, gap = found.assessment, found.gap
-    alike = gap.after < LIKE * gap.noise_floor
-    if uneven and alike and found.adds and judged.ratio > judged.ratio_allowed:
-        still = sigma <= np.percentile(sigma, QUIET)
-        quiet, floor = (float(np.sqrt(np.mean(x[still] ** 2))) for x in (residual, sigma))
-        yield (
-            "Root mean squares are dominated by the fast readings, which have the most noise; "
-            "the mean above takes each residual over the noise at its own speed. Thus it is "
-            f"{number(judged.ratio)}, although the residual as a whole "
-            "is as large as the noise: in the fifth of the readings that have the least noise, the "
-            f"residual is {mrad(quiet)} and the noise {mrad(floor)}."
-        )
 
 
 def _block_means(found: Discrepancy) -> Iterator[str]:

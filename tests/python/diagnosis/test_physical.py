@@ -93,7 +93,7 @@ OPPOSING = [e for e in pendmap.effects() if e.opposing and own_name(e.name) is N
 def test_what_opposes_the_motion_is_never_below_0(effect: EffectDefinition) -> None:
     # The damping falls with velocity. Sizes just below 0 are far within their errors.
     experiment = decay(c_over_m=0.15, drag=-0.01)
-    data, (size, *shape) = split_records(experiment), [each.name for each in effect.parameters]
+    data, (size, *_) = split_records(experiment), [each.name for each in effect.parameters]
     begin = Effect.blank(effect.name, Rig(W0).units).parameters
     fitted = with_effect(data, effect.name, steps=0, **{**begin, size: -1e-9})
     key = f"{effect.name}.{size}"

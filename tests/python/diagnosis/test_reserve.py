@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import pendmap
 from driven_decays import motion
 from hidden import diagnosed, once
 from pendmap.comparison.data import split_records
+from pendmap.comparison.forecast import share_closed
 from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import list_candidates
+from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import ScoredModel, State
+from pendmap.diagnosis.summary import as_json
 from pendmap.diagnosis.verdict import Alternative, Identifiability, decide_verdict, probabilities
 from pendmap.records import Experiment, Run
 from pendmap.residuals.by_run import RunByRun, parameters_by_run
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.diagnosis.named import NamedEffect
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
@@ -110,6 +116,66 @@ def test_thresholds_decide_between_partial_unknown_and_ambiguous(
     assert judged.closed > 0.5
     assert judged.verdict == verdict
     assert judged.approximate is (verdict == "partial" or min(judged.probabilities) < SURE)
+
+
+@pytest.mark.parametrize(
+    ("stated", "correlation", "verdict"),
+    [(1.0, 0.0, "none"), (0.7, 0.0, "unknown"), (0.3, 0.0, "unknown"), (1.0, 0.6, "none")],
+)
+def test_none_is_said_within_the_noise_only(
+    stated: float, correlation: float, verdict: str
+) -> None:
+    # White residuals above the stated noise are not noise; coloured noise exceeds its local fits.
+    time = np.arange(1000) * 0.02
+    theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05)
+    draw = np.random.default_rng(1).normal(0, 2e-3, time.size)
+    noise = lfilter([math.sqrt(1 - correlation**2)], [1, -correlation], draw)
+    run = Run("a", "a.csv", "free", time, theta + noise, np.ones(time.size, bool))
+    data = split_records(Experiment(Path("there"), (run,)))
+    fitted = tuple(dataclasses.replace(r, sigma=stated * r.sigmas) for r in data.fitted)
+    data = dataclasses.replace(data, fitted=fitted)
+    state = State(data, fit_baseline(data)[0], Thresholds(), 0, ())
+    best = state.scored(search(state, None))
+    judged = decide_verdict(state, best, runs_of(state, best.fitted), 1.0)
+    assert judged.verdict == verdict
+    assert (judged.ratio <= judged.ratio_allowed) is (verdict == "none")
+
+
+def test_the_share_of_the_gap_is_one_number() -> None:
+    found = once("quadratic_drag", seed=3, size=3.0, free=1, forced=0, max_effects=1)
+    fields, gap = as_json(found), found.gap
+    left, before = (x**2 - gap.noise_floor**2 for x in (gap.after, gap.before))
+    share = min(1.0, 1 - left / before)
+    assert 0 < share < 1 or gap.after <= gap.noise_floor
+    closed = found.assessment.closed
+    assert closed == pytest.approx(share, rel=1e-9)
+    assert fields["gap"]["closed"] == fields["gap"]["closed_by_nearest"] == closed
+    assert [effect["closes"] for effect in fields["effects"]] == [closed]
+    assert f"Share of the squared gap closed: {100 * closed:.0f} %" in list(as_text(found))
+    assert share_closed(2.0, 1.0, 1.0) == share_closed(0.9, 0.8, 1.0) == 1.0
+    assert share_closed(0.9, 1.1, 1.0) == 0.0
+
+
+def test_an_effect_whose_interval_contains_0_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = np.arange(600) * 0.02
+    theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=0.05)
+    theta = theta + np.random.default_rng(1).normal(0, 2e-3, time.size)
+    run = Run("a", "a.csv", "free", time, theta, np.ones(time.size, bool))
+    module = importlib.import_module("pendmap.diagnosis.diagnose")
+    named = module.name_effects
+    shown: list[str] = []
+
+    def widened(*given: object) -> tuple[NamedEffect, ...]:
+        effects = named(*given)
+        shown.extend(effect.name for effect in effects)
+        wide = {size: (-1.0, 1.0) for effect in effects for size in effect.ci95}
+        return tuple(dataclasses.replace(effect, ci95=wide) for effect in effects)
+
+    monkeypatch.setattr(module, "name_effects", widened)
+    found = pendmap.diagnose(run, max_effects=1)
+    assert shown
+    assert found.effects == ()
+    assert found.verdict == "unknown"
 
 
 def test_the_effect_that_closes_most_comes_first(waving: tuple[State, ScoredModel]) -> None:
