@@ -24,14 +24,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.files import move_folder
-from pendmap.files.dataset import (
-    MARK,
-    check_replaceable,
-    consolidate,
-    open_zarr,
-    restored,
-    write_zarr,
-)
+from pendmap.files.dataset import MARK, check_replaceable, gather, open_zarr, restored, write_zarr
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -396,7 +389,7 @@ class ZarrStore:
         self.group.attrs.put({**written, **_plain(attributes), MARK: dict(mark)})
         self.publish()
         if not self.local:
-            consolidate(self.address)
+            gather(self.address)
 
     def publish(self) -> None:
         """Remove the records of a complete store, and move it to its name; no other is moved.
@@ -415,7 +408,7 @@ class ZarrStore:
             return
         for broken in Path(self._root).rglob("*.partial"):  # of a process killed while it wrote
             broken.unlink(missing_ok=True)
-        consolidate(self._root)
+        gather(self._root)
         check_replaceable(self._name)
         move_folder(Path(self._root), Path(path))
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 import pendmap
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @xr.register_dataset_accessor("pendmap")  # type: ignore[no-untyped-call]
@@ -29,22 +26,11 @@ class Accessor:
         """Draw one part of the result into Axes; arguments are those of ``pendmap.plot.draw``."""
         return pendmap.plot.draw(self._dataset, ax, **look)
 
-    def to_dataframe(self, variable: str = "") -> pd.DataFrame:
-        """Return a variable, by default the first with values, and others of its dimensions.
-
-        >>> import pendmap
-        >>> run = pendmap.orbit(pendmap.Pendulum(p=0.6), 1, 1)
-        >>> run.pendmap.to_dataframe().kind.iloc[0]
-        'rotation'
-        """
-        whole = self._dataset
-        first = next((name for name, one in whole.data_vars.items() if one.dims and one.size), "")
-        dims = whole[variable or first].dims
-        return (
-            whole[[n for n, one in whole.data_vars.items() if one.dims == dims]]
-            .reset_coords(drop=True)
-            .to_dataframe()
-        )
+    def to_dataframe(self) -> Any:  # noqa: ANN401 (a pandas.DataFrame)
+        """Return the first variable with values, and all of its dimensions, as a table."""
+        whole = self._dataset.reset_coords(drop=True)
+        dims = next(one.dims for one in whole.data_vars.values() if one.dims and one.size)
+        return whole[[name for name in whole.data_vars if whole[name].dims == dims]].to_dataframe()
 
     def figure(self, **look: Any) -> Any:  # noqa: ANN401 (as plot.figure)
         """Return the figure of the result; arguments are those of ``pendmap.plot.figure``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
+import functools
 import importlib.util
 import json
 import math
@@ -40,6 +41,7 @@ _MADE_BY: Final = contextvars.ContextVar("made_by", default="")
 _LARGE: Final = 4096  # Number of values above which a variable is compressed
 _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
+_NETCDF: Final[Any] = functools.partial(xr.open_dataset, engine="netcdf4", **_AS_STORED)
 _ONE: Final = threading.RLock()  # Held while NetCDF is read or written: the library has no threads
 _UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
 # Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
@@ -105,7 +107,7 @@ def save(
     check_replaceable(target)
     with whole_folder(target) as part:
         write_zarr(dataset, part)
-        consolidate(part)
+        gather(part)
     return target
 
 
@@ -154,7 +156,7 @@ def open_zarr(
     return dataset.assign({name: dataset[name].copy(data=values) for name, values in plain.items()})
 
 
-def consolidate(place: str | os.PathLike[str]) -> None:
+def gather(place: str | os.PathLike[str]) -> None:
     """Gather the metadata of a complete Zarr store at its root, where other tools look first."""
     import zarr  # noqa: PLC0415 (an extra)
 
@@ -223,15 +225,10 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
-        with _ONE if suffix != ".zarr" else contextlib.nullcontext():
-            dataset: xr.Dataset = (
-                open_zarr(source)
-                if suffix == ".zarr"
-                else xr.open_dataset(source, engine="netcdf4", **_AS_STORED)
-            )
-            with dataset:
-                _check_result(dataset, source)
-                dataset = restored(dataset.load())
+        read: Any = open_zarr if suffix == ".zarr" else _NETCDF
+        with _ONE, read(source) as opened:
+            _check_result(opened, source)
+            dataset = restored(opened.load())
         dataset.attrs.pop(MARK, None)
         if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
             dataset = importlib.import_module(_UPGRADE).upgraded(dataset)

@@ -29,7 +29,7 @@ MODELS: Final = "map"  # Timeline over two parameters: maps row by row
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: the basins of one model left, the measures of all right."""
     made = shown.chart(dataset, cells=basins.CELLS)
-    views = [one.frame.view(one.panel.where, _title(one)) for one in chart.places(made)]
+    views = [one.frame.view(one.panel.where, chart.title(one.panel)) for one in chart.places(made)]
     aside = rrb.Vertical(
         rrb.Tabs(*views, active_tab=0),
         rrb.Tabs(
@@ -133,8 +133,3 @@ def _models(dataset: xr.Dataset, dims: list[str]) -> Iterator[tuple[tuple[float,
 def _frame(dataset: xr.Dataset) -> frame.Frame:
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
     return frame.Frame.phase(theta, velocity, Units.of(facts(dataset)))
-
-
-def _title(place: chart.Place) -> str:
-    text = place.panel.title or place.panel.name
-    return text[:1].upper() + text[1:]

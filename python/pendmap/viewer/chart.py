@@ -90,7 +90,7 @@ def places(chart: Chart) -> list[Place]:
 
 def blueprint(chart: Chart) -> rrb.Blueprint:
     """Return the layout: the panels, with legend and summary beside them."""
-    views = [one.frame.view(one.panel.where, _title(one.panel)) for one in places(chart)]
+    views = [one.frame.view(one.panel.where, title(one.panel)) for one in places(chart)]
     front: rrb.Container = rrb.Vertical(*views)
     if chart.tabs:
         front = rrb.Tabs(*views, active_tab=0)
@@ -103,7 +103,8 @@ def blueprint(chart: Chart) -> rrb.Blueprint:
     return frame.screen(front, aside, shares=[11, 6])
 
 
-def _title(panel: Panel) -> str:
+def title(panel: Panel) -> str:
+    """Return the title of the view of a panel."""
     text = panel.title or panel.name
     return text[:1].upper() + text[1:]
 

@@ -220,6 +220,23 @@ def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
         assert best[name] == pytest.approx(true, rel=0.02)
 
 
+def test_the_bias_of_a_sensor_has_its_unit(tmp_path: Path) -> None:
+    run = read(tmp_path, *rates(release=1.0))
+    report = identify_experiment(Experiment(Path(), (run, run)), methods=["trajectory"])
+    for found in (report, report.best):
+        units = found.to_dataframe().unit
+        assert units["w0"] == units["bias[1]"] == found.unit("bias[0]") == "rad/s"
+    assert fit_model(run).to_dataframe().unit["bias"] == "rad/s"
+
+
+def test_the_noise_of_an_experiment_is_that_of_its_run(tmp_path: Path) -> None:
+    run = read(tmp_path, *rates(release=1.0))
+    assert pendmap.noise_floor(Experiment(Path(), (run,))) == pendmap.noise_floor(run)
+    for given, said in ((Experiment(Path(), (run, run)), "got 2 runs"), ("a.csv", "got 'a.csv'")):
+        with pytest.raises(InputError, match=f"must be one run, like .*{said}"):
+            pendmap.noise_floor(given)
+
+
 def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
     there = written(tmp_path / "run.csv", *rates())
     experiment = pendmap.read_experiment(there)
