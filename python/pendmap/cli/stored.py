@@ -10,7 +10,6 @@ import click
 
 from pendmap.cli.parse.types import Address
 from pendmap.cli.show import made_here, show
-from pendmap.cli.text import say, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,8 +26,6 @@ class Kept:
     """The options of a store and of workers."""
 
     resume: bool
-    part: tuple[int, int] | None
-    mix: bool
     count: int | None
     scheduler: str | None
     dry_run: bool
@@ -36,14 +33,14 @@ class Kept:
     @property
     def goes_on(self) -> bool:
         """Whether an existing store is not replaced."""
-        return self.resume or self.part is not None or self.dry_run
+        return self.resume or self.dry_run
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Kept:
         """Remove these options from ``given``; refuse what a dry run cannot have."""
         kept = cls(**{field.name: given.pop(field.name) for field in dataclasses.fields(cls)})
         if kept.dry_run:
-            others = {"--part": kept.part, "--resume": kept.resume, "--view": given["view"]}
+            others = {"--resume": kept.resume, "--view": given["view"]}
             for option in (option for option, other in others.items() if other):
                 raise click.UsageError(f"--dry-run must be given without {option}, got both")
         return kept
@@ -51,25 +48,21 @@ class Kept:
     def run(
         self, analysis: partial[xr.Dataset], outputs: Outputs, name: str, schema: Schema
     ) -> None:
-        """Compute a result, write its files, and show it or what a part has done."""
+        """Compute a result, write its files, and show it."""
         if self.dry_run:
             self._tell_cost(analysis, outputs, schema)
             return
         store = outputs.store
         if analysis.keywords.get("draws") and not isinstance(store, Address):
             store = None  # draws are written when all are computed
-        if self.part is not None and outputs.drawings:
-            raise click.UsageError("--part must be given with --out NAME.zarr and no other output")
-        keep = {"store": store, "resume": self.resume, "part": self.part, "mix": self.mix}
+        keep = {"store": store, "resume": self.resume}
         with (
             workers(self.scheduler, self.count, quiet=outputs.quiet) as executor,
             made_here(),
             outputs.progress(name) as progress,
         ):
             dataset = analysis(progress=progress, executor=executor, **keep)
-        if self.part is not None and "parts" in dataset.attrs:
-            show_part(dataset, outputs)
-        elif store is None:
+        if store is None:
             show(dataset, outputs, schema)
         else:
             show(dataset, dataclasses.replace(outputs, out=None), schema, [str(store)])
@@ -97,12 +90,3 @@ def workers(scheduler: str | None, count: int | None, *, quiet: bool) -> Iterato
         if not quiet and not executor.nthreads():
             click.echo(f"{scheduler} has no workers yet: waiting for them.", err=True)
         yield executor
-
-
-def show_part(dataset: xr.Dataset, outputs: Outputs) -> None:
-    """Tell what a part of a run has done."""
-    title, summary, *_ = (dataset.attrs.pop(name) for name in ("title", "summary"))
-    if outputs.as_json:
-        write_json(dataset.attrs)
-    elif not outputs.quiet:
-        say(f"{title}\n{summary}")

@@ -2,13 +2,12 @@
 
 from pendmap.engine.executors import executor_of
 from pendmap.engine.store import Layout, MemoryStore, Store, ZarrStore, pack, unpack
-from pendmap.engine.work import Job, PartDone, Tile, Work, rounding
+from pendmap.engine.work import Job, Tile, Work, rounding
 
 __all__ = [
     "Job",
     "Layout",
     "MemoryStore",
-    "PartDone",
     "Store",
     "Tile",
     "Work",

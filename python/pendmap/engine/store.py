@@ -262,11 +262,8 @@ class ZarrStore:
         system, _ = self._place
         if not self.local and system.exists(self._root):
             system.rm(self._root, recursive=True)
-        # Another part of the same run may have made the store at the same moment.
-        with contextlib.suppress(zarr.errors.ContainsGroupError):
-            zarr.create_group(self._url, zarr_format=3, attributes={MARK: dict(mark)})
-        with contextlib.suppress(zarr.errors.ContainsGroupError):
-            self.group.create_group(_WORK)
+        zarr.create_group(self._url, zarr_format=3, attributes={MARK: dict(mark)})
+        self.group.create_group(_WORK)
 
     def abandon(self) -> None:
         """Remove a store in which nothing has been done."""

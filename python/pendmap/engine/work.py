@@ -61,10 +61,6 @@ class Job(Protocol):
         """Compute a tile."""
 
 
-class PartDone(Exception):  # noqa: N818 (no error)
-    """The tiles of a part of a run are in the store."""
-
-
 @dataclasses.dataclass
 class Work:
     """A job in progress."""
@@ -72,7 +68,6 @@ class Work:
     job: Job
     store: Store = dataclasses.field(default_factory=MemoryStore)
     executor: Any = None
-    part: tuple[int, int] | None = None
     progress: Progress | None = None
     tiles_done: int = 0
     """Tiles that are in the store."""
@@ -106,28 +101,20 @@ class Work:
     def each(self, step: str, state: str, tiles: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield tiles of a step with their records, computing those that are not there.
 
-        ``state`` names the record that all tiles of the step need. In a part of a run only its own
-        tiles are computed, and PartDone is raised then.
+        ``state`` names the record that all tiles of the step need.
         """
         done = self.store.done(step)
         wanted = list(tiles)
         missing = [tile for tile in wanted if tile not in done]
         self.tiles, self.tiles_done = len(wanted), len(wanted) - len(missing)
-        mine = missing
-        if self.part is not None:
-            number, parts = self.part
-            mine = [tile for tile in missing if tile % parts == number - 1]
         for tile in wanted:
             if tile in done and (record := self.store.get(f"{step}/{tile}")) is not None:
                 yield tile, record
         self._report(0)
-        for tile, record in self._computed(step, state, mine):
+        for tile, record in self._computed(step, state, missing):
             self.tiles_done += 1
             self._report(0)
             yield tile, record
-        if self.part is not None:
-            self.tiles_done = len(self.store.done(step))
-            raise PartDone
 
     def _computed(self, step: str, state: str, tiles: list[int]) -> Iterator[tuple[int, bytes]]:
         if self.executor is None:

@@ -31,14 +31,13 @@ SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
-_UPGRADE: Final = "pendmap.analysis.version_1"  # Module that knows the schemas, for old files alone
 _TEXT: Final = "_name"
 """Suffix of a coordinate of text in a file: by CF those named as their dimension are numbers."""
 _MADE_BY: Final = contextvars.ContextVar("made_by", default="")
 _LARGE: Final = 4096  # Number of values above which a variable is compressed
 _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
-_UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
+_UNFINISHED: Final = "is an unfinished run: its command completes it with --resume (resume=True)"
 # Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
 _ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
 
@@ -201,7 +200,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     suffix = PurePath(source).suffix.lower()
     if isinstance(source, Path) and not source.exists():
         if source.with_name(f"{source.name}.part").exists():
-            raise InputError(f"{source}: {_UNFINISHED.format(source)}")
+            raise InputError(f"{source}: {_UNFINISHED}")
         raise FileNotFoundError(2, "no such file", str(source))
     if suffix not in SUFFIXES:
         raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}")
@@ -217,8 +216,6 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
             _check_result(dataset, source)
             dataset = restored(dataset.load())
         dataset.attrs.pop(MARK, None)
-        if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
-            dataset = importlib.import_module(_UPGRADE).upgraded(dataset)
     except InputError:
         raise
     except Exception as error:  # a damaged file may raise any error
@@ -246,11 +243,11 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
 
 def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
     if dataset.attrs.get(MARK, {"complete": True})["complete"] is not True:
-        raise InputError(f"{source}: {_UNFINISHED.format(source)}")
+        raise InputError(f"{source}: {_UNFINISHED}")
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
-    if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:
+    if not isinstance(version, int | np.integer) or version != FORMAT_VERSION:
         known = f"this pendmap reads format {FORMAT_VERSION}"
         raise InputError(f"{source}: has format {version}, {known}")
     if not isinstance(kind, str):

@@ -71,12 +71,12 @@ def test_json_alone_needs_no_disk(pendmap_command: Run) -> None:
     assert json.loads(run.stdout)["disk_bytes"] == 0
 
 
-@pytest.mark.parametrize("other", ["--part 1/2", "--resume", "--view"])
+@pytest.mark.parametrize("other", ["--resume", "--view"])
 def test_it_is_refused_beside(pendmap_command: Run, tmp_path: Path, other: str) -> None:
     words = f"basins --grid 10 --out map.zarr --dry-run {other}"
     run = pendmap_command(*words.split())
     assert run.returncode == 2
-    assert f"--dry-run must be given without {other.split(maxsplit=1)[0]}" in run.stderr
+    assert f"--dry-run must be given without {other}" in run.stderr
     assert len(run.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, MissingExtraError, short_repr
+from pendmap.errors import MOST_CELLS, InputError, MissingExtraError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -248,15 +248,6 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
-def _part(text: str) -> tuple[int, int]:
-    """Read the number of a part and of all parts."""
-    match = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text.strip())
-    number, parts = map(int, match.groups()) if match else (0, 0)
-    if not 1 <= number <= parts <= MOST_PARTS:
-        raise InputError(f"must be K/N with K from 1 to N, like 7/64, got {short_repr(text)}")
-    return number, parts
-
-
 def _effects() -> Iterable[str]:
     from pendmap.model.effects import effects
 
@@ -276,7 +267,6 @@ RANGE = OptionType("A:B:N", _range)
 NUMBER_OR_RANGE = OptionType[float | AxisText](
     "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
 )
-PART = OptionType("K/N", _part)
 TEXT = OptionType("text", str)
 EFFECT = OptionType("name", str, _effects)
 METHOD = OptionType("name", str, _methods)
