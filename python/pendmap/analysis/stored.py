@@ -90,21 +90,22 @@ class Kept:
                 return compute(Work(job, MemoryStore(), executor, progress))[0]
             store = ZarrStore(os.fspath(self.store))
             mark = _request(name, model, arguments)
-            if self._begin(store, mark):
-                return store.result(self.chunks)
-            work = Work(job, store, executor, progress)
-            try:
-                with work.named(store.unfinished):
-                    dataset, cells = compute(work)
-                    store.complete(dataset, cells, {**mark, "complete": True})
-            except BaseException:
-                store.abandon()
-                raise
+            with store.held():
+                if self._begin(store, mark):
+                    return store.result(self.chunks, again=True)
+                work = Work(job, store, executor, progress)
+                try:
+                    with work.named(store.unfinished):
+                        dataset, cells = compute(work)
+                        store.complete(dataset, cells, {**mark, "complete": True})
+                except BaseException:
+                    store.abandon()
+                    raise
             return store.result(self.chunks)
 
     def _begin(self, store: ZarrStore, mark: dict[str, Any]) -> bool:
         """Begin a store or go on with one; return whether it is complete."""
-        old = store.mark()
+        old = store.mark(resume=self.resume)
         if old is not None and self.resume:
             self._check(store.address, old, mark)
             if not old["complete"]:
@@ -143,7 +144,7 @@ def _address(store: str | os.PathLike[str]) -> str:
             "store must be a folder NAME.zarr, or an address like s3://bucket/map.zarr, got "
             f"{short_repr(store)}"
         )
-    return name
+    return name.removeprefix("file://")
 
 
 def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -83,7 +83,7 @@ class Work:
             raise
         except OSError as error:
             if error.errno is None:
-                raise
+                raise NotWrittenError(f"{error}; {self._kept}") from error
             raise OSError(error.errno, f"{error.strerror}; {self._kept}", address) from error
 
     @property
@@ -104,12 +104,15 @@ class Work:
         ``state`` names the record that all tiles of the step need.
         """
         done = self.store.done(step)
-        wanted = list(tiles)
-        missing = [tile for tile in wanted if tile not in done]
-        self.tiles, self.tiles_done = len(wanted), len(wanted) - len(missing)
+        wanted, missing = list(tiles), []
+        self.tiles, self.tiles_done = len(wanted), 0
         for tile in wanted:
-            if tile in done and (record := self.store.get(f"{step}/{tile}")) is not None:
-                yield tile, record
+            record = self.store.get(f"{step}/{tile}") if tile in done else None
+            if record is None or not self.store.holds(step, tile):
+                missing.append(tile)
+                continue
+            self.tiles_done += 1
+            yield tile, record
         self._report(0)
         for tile, record in self._computed(step, state, missing):
             self.tiles_done += 1

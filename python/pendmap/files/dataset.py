@@ -5,10 +5,8 @@ from __future__ import annotations
 import contextlib
 import contextvars
 import importlib.util
-import json
 import math
 import os
-import re
 import time
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -19,13 +17,12 @@ import xarray as xr
 import pendmap.files.accessor  # noqa: F401 (dataset.pendmap)
 from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
-from pendmap.files import check_regular, whole_file, whole_folder
+from pendmap.files import check_regular, sealed, whole_file, whole_folder
+from pendmap.files.sealed import MARK
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
-MARK: Final = "pendmap"
-"""Attribute of a Zarr store that a run began: the request, and whether it is complete."""
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
@@ -38,8 +35,6 @@ _LARGE: Final = 4096  # Number of values above which a variable is compressed
 _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "all"}
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
 _UNFINISHED: Final = "is an unfinished run: its command completes it with --resume (resume=True)"
-# Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
-_ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
 
 
 def save(
@@ -100,7 +95,8 @@ def save(
         return target
     check_replaceable(target)
     with whole_folder(target) as part:
-        write_zarr(dataset, part)
+        write_zarr(dataset.assign_attrs({MARK: {"complete": True}}), part)
+        sealed.seal(part)
     return target
 
 
@@ -133,7 +129,10 @@ def write_zarr(
     dataset = dataset.assign({name: dataset[name].astype(object) for name in texts})
     mode: Literal["w", "a"] = "w" if beside is None else "a"
     dataset.attrs = attributes if beside is None else dict(beside)
-    dataset.to_zarr(place, mode=mode, zarr_format=3, consolidated=False, encoding=encoding)
+    checks = {"compressors": sealed.compressors()}
+    encoding = {name: encoding.get(name, {}) | checks for name in dataset.variables}
+    form: Any = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
+    dataset.to_zarr(place, mode=mode, encoding=encoding, **form)
     return attributes
 
 
@@ -143,8 +142,9 @@ def open_zarr(
     drop: Collection[str] = (),
 ) -> xr.Dataset:
     """Open a Zarr store as it is stored; variables are read when they are used, but for text."""
+    form: Any = {"zarr_format": 3, "consolidated": False, "drop_variables": list(drop)}
     dataset: xr.Dataset = xr.open_zarr(
-        place, chunks=chunks, consolidated=False, drop_variables=list(drop), **_AS_STORED
+        sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
     )
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind in "OT"]
     plain = {name: np.array(dataset[name].values.tolist(), dtype=str) for name in texts}
@@ -177,21 +177,13 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{target}: {wanted}; it is a file")
     if not target.exists() or not any(target.iterdir()):
         return
-    said = _zarr_attributes(target)
-    if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
+    attributes: Any = {}
+    with contextlib.suppress(InputError, LookupError, TypeError):
+        attributes = dict(sealed.metadata(target)[0]["attributes"])
+    if not attributes.keys() >= _MARKS or attributes["kind"] not in [*KINDS]:
         raise InputError(f"{target}: {wanted}; the folder does not contain a result")
-    for entry in target.rglob("*"):
-        if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
-            raise InputError(f"{target}: {wanted}; it contains {entry.name!r}, no part of a result")
-
-
-def _zarr_attributes(target: Path) -> object:
-    """Return the attributes of a Zarr store of format 3 or 2, None if there are none."""
-    with contextlib.suppress(FileNotFoundError, KeyError, TypeError, ValueError):
-        return json.loads((target / "zarr.json").read_bytes())["attributes"]
-    with contextlib.suppress(FileNotFoundError, ValueError):
-        return json.loads((target / ".zattrs").read_bytes())
-    return None
+    for name in sealed.foreign(target):
+        raise InputError(f"{target}: {wanted}; it contains {name!r}, no part of a result")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -207,6 +199,8 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
+        if suffix == ".zarr":
+            _check_complete(source)
         dataset: xr.Dataset = (
             open_zarr(source)
             if suffix == ".zarr"
@@ -241,9 +235,12 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars([*texts]).assign_coords(named)
 
 
-def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
-    if dataset.attrs.get(MARK, {"complete": True})["complete"] is not True:
+def _check_complete(source: Path | str) -> None:
+    if sealed.checked(source)[0]["complete"] is not True:
         raise InputError(f"{source}: {_UNFINISHED}")
+
+
+def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]

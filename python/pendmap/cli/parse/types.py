@@ -166,8 +166,8 @@ def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
     """Return the type of files to write, and of stores at an address."""
 
     def read(text: str) -> Path | Address:
-        if "://" not in text:
-            return _output(suffixes, text)
+        if text.startswith("file://") or "://" not in text:
+            return _output(suffixes, text.removeprefix("file://"))
         if not text.lower().rstrip("/").endswith(".zarr"):
             raise InputError(f"{text!r}: suffix of an address must be .zarr")
         _import_library(text, ".zarr")
