@@ -72,6 +72,8 @@ class Work:
     tiles_done: int = 0
     """Tiles that are in the store."""
     tiles: int = 0
+    step: str = ""
+    """Step that is computed."""
 
     @contextlib.contextmanager
     def named(self, address: str) -> Iterator[None]:
@@ -88,6 +90,8 @@ class Work:
 
     @property
     def _kept(self) -> str:
+        with contextlib.suppress(Exception):  # workers may have stored more than they have told
+            self.tiles_done = max(self.tiles_done, len(self.store.done(self.step)))
         return f"{self.tiles_done} of {counted(self.tiles, 'tile')} are kept, --resume goes on"
 
     def once(self, name: str, make: Callable[[], bytes]) -> bytes:
@@ -105,7 +109,7 @@ class Work:
         """
         done = self.store.done(step)
         wanted, missing = list(tiles), []
-        self.tiles, self.tiles_done = len(wanted), 0
+        self.tiles, self.tiles_done, self.step = len(wanted), 0, step
         for tile in wanted:
             record = self.store.get(f"{step}/{tile}") if tile in done else None
             if record is None or not self.store.holds(step, tile):
@@ -134,8 +138,7 @@ class Work:
                     self.store.put(f"{step}/{tile}", answer.record)
                 yield tile, answer.record
         except WorkersGoneError as error:
-            kept = f"; {self._kept}" if self.store.shared else ""
-            raise NotWrittenError(f"the workers are gone ({error}){kept}") from error
+            raise NotWrittenError(f"the workers are gone ({error})") from error
         finally:
             answers.close()
 

@@ -182,7 +182,7 @@ class ZarrStore:
                 raise InputError(f"{self.address}: cannot be replaced, it has {name!r}")
             system.rm(self._root, recursive=True)
         zarr.create_group(self._url, zarr_format=3, attributes={MARK: sealed.signed(mark)})
-        self.group.create_group(WORK)
+        sealed.put_whole(system, f"{self._root}/{WORK}/zarr.json", sealed.GROUP)
 
     def abandon(self) -> None:
         """Remove a store in which nothing has been done."""
@@ -198,6 +198,7 @@ class ZarrStore:
         """Remove what a killed process has written of the result beside the cells."""
         system, _ = self._place
         self._check_held()
+        sealed.put_whole(system, f"{self._root}/{WORK}/zarr.json", sealed.GROUP)
         for name in unpack(self.get(_REST) or pack(names=[]))["names"]:
             if system.exists(f"{self._root}/{name}"):
                 system.rm(f"{self._root}/{name}", recursive=True)
@@ -219,9 +220,8 @@ class ZarrStore:
             raise InputError(f"{self.unfinished}: was begun with tiles of {tiles}, not {chunks}")
         self.put(f"tiles-{layout.step}", pack(chunks=chunks))
         for name, dtype in layout.dtypes.items():
-            file = f"{self._root}/{name}/zarr.json"
-            if system.exists(file):  # it may be damaged
-                system.rm_file(file)
+            if system.exists(f"{self._root}/{name}/zarr.json"):  # it may be damaged
+                system.rm_file(f"{self._root}/{name}/zarr.json")
             self.group.create_array(
                 name,
                 shape=layout.shape,
@@ -272,7 +272,7 @@ class ZarrStore:
         """Return an array of cells that is read when it is used."""
         if name.startswith(WORK):  # removed at the end
             return np.asarray(self._array(name)[:])
-        others = [other for other in self.group.array_keys() if other != name]
+        others = [other for other in sealed.metadata(self._url)[1] if other != name]
         return open_zarr(self._url, drop=others)[name].variable._data  # noqa: SLF001
 
     # ---- records

@@ -18,6 +18,7 @@ import pendmap.files.accessor  # noqa: F401 (dataset.pendmap)
 from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
 from pendmap.files import check_regular, sealed, whole_file, whole_folder
+from pendmap.files.hdf5 import check_alone
 from pendmap.files.sealed import MARK
 
 if TYPE_CHECKING:
@@ -132,7 +133,8 @@ def write_zarr(
     checks = {"compressors": sealed.compressors()}
     encoding = {name: encoding.get(name, {}) | checks for name in dataset.variables}
     form: Any = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
-    dataset.to_zarr(place, mode=mode, encoding=encoding, **form)
+    with sealed.beside_others():
+        dataset.to_zarr(place, mode=mode, encoding=encoding, **form)
     return attributes
 
 
@@ -143,9 +145,10 @@ def open_zarr(
 ) -> xr.Dataset:
     """Open a Zarr store as it is stored; variables are read when they are used, but for text."""
     form: Any = {"zarr_format": 3, "consolidated": False, "drop_variables": list(drop)}
-    dataset: xr.Dataset = xr.open_zarr(
-        sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
-    )
+    with sealed.beside_others():
+        dataset: xr.Dataset = xr.open_zarr(
+            sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
+        )
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind in "OT"]
     plain = {name: np.array(dataset[name].values.tolist(), dtype=str) for name in texts}
     return dataset.assign({name: dataset[name].copy(data=values) for name, values in plain.items()})
@@ -188,8 +191,11 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
     """Return the dataset of a file or a store; raises as :func:`pendmap.load`."""
-    source = os.fspath(path) if "://" in os.fspath(path) else Path(path)
+    name = os.fspath(path).removeprefix("file://")
+    source = name if "://" in name else Path(name)
     suffix = PurePath(source).suffix.lower()
+    if isinstance(source, str) and suffix != ".zarr":
+        raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
     if isinstance(source, Path) and not source.exists():
         if source.with_name(f"{source.name}.part").exists():
             raise InputError(f"{source}: {_UNFINISHED}")
@@ -199,8 +205,10 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
-        if suffix == ".zarr":
+        if isinstance(source, str) or suffix == ".zarr":
             _check_complete(source)
+        else:
+            check_alone(source)
         dataset: xr.Dataset = (
             open_zarr(source)
             if suffix == ".zarr"

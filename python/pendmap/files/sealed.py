@@ -6,6 +6,7 @@ What is missing is an error, never a fill value. Only Zarr 3 with known codecs i
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import itertools
@@ -13,6 +14,7 @@ import json
 import os
 import re
 import uuid
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,6 +31,8 @@ MARK: Final = "pendmap"
 """Attribute of a Zarr store: the digest, whether it is complete, and the request of a run."""
 WORK: Final = "work"
 """Folder of what a run keeps beside its result until it is complete."""
+GROUP: Final = b'{"zarr_format": 3, "node_type": "group", "attributes": {}}'
+"""Metadata of a group without attributes."""
 _DIGEST: Final = "sha256"  # Entry of the mark
 _CODECS: Final = frozenset(("bytes", "crc32c", "vlen-utf8", "zstd"))
 _REMAINS: Final = re.compile(r".*\.[0-9a-f]{32}\.part(ial)?")  # Files of killed writers
@@ -199,6 +203,14 @@ def remove_remains(folder: Path) -> None:
     for file in folder.rglob("*"):
         if _REMAINS.fullmatch(file.name):
             file.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def beside_others() -> Iterator[None]:
+    """Let zarr be silent about files in a store that are no part of it."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Object at .* is not recognized")
+        yield
 
 
 @functools.cache
