@@ -88,7 +88,7 @@ class Kept:
         with executor_of(executor=self.executor) as executor:
             if self.store is None:
                 return compute(Work(job, MemoryStore(), executor, progress))[0]
-            store = ZarrStore(os.fspath(self.store))
+            store = ZarrStore(_address(self.store))
             mark = _request(name, model, arguments)
             with store.held():
                 if self._begin(store, mark):
@@ -139,12 +139,13 @@ class Kept:
 def _address(store: str | os.PathLike[str]) -> str:
     """Return the address of a store; a folder must be named like one."""
     name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
+    name = name.removeprefix("file://")
     if "://" not in name and not name.rstrip("/").endswith(".zarr"):
         raise InputError(
             "store must be a folder NAME.zarr, or an address like s3://bucket/map.zarr, got "
             f"{short_repr(store)}"
         )
-    return name.removeprefix("file://")
+    return name
 
 
 def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:

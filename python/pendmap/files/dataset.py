@@ -74,7 +74,7 @@ def save(
     >>> pendmap.save(result, "melnikov.nc").name
     'melnikov.nc'
     """
-    target = Path(path)
+    target = Path(os.fspath(path).removeprefix("file://"))
     if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
         own: Path = dataset.save(target)
         return own

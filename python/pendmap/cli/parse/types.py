@@ -7,7 +7,7 @@ import importlib
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -248,6 +248,15 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
+class _File(click.Path):
+    """A path, which may be written as ``file://`` and the path."""
+
+    def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
+        """Return the path."""
+        plain = value.removeprefix("file://") if isinstance(value, str) else value
+        return super().convert(plain, *words)
+
+
 def _effects() -> Iterable[str]:
     from pendmap.model.effects import effects
 
@@ -260,7 +269,7 @@ def _methods() -> Iterable[str]:
     return METHODS
 
 
-FILE: click.Path = click.Path(path_type=Path)
+FILE = _File(path_type=Path)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
 RANGE = OptionType("A:B:N", _range)
