@@ -320,13 +320,13 @@ class ZarrStore:
             self._array(name).attrs.put(_plain(dataset[name].attrs))
         sealed.check_chunks(self._url)
         sealed.seal(self._url, {**_plain(attributes), MARK: dict(mark)})
-        self.publish()
+        self.publish(read=False)
 
     @_reached
-    def publish(self) -> None:
+    def publish(self, *, read: bool = True) -> None:
         """Remove the records of a complete store, and move it to its name; no other is moved.
 
-        A run that is killed here goes on with it.
+        A run that is killed here goes on with it, and reads all of it first.
         """
         system, path = self._place
         self.__dict__.pop("group", None)
@@ -336,7 +336,8 @@ class ZarrStore:
             return
         if not sealed.checked(self._url)[0]["complete"]:
             return
-        sealed.check_chunks(self._url)
+        if read:
+            sealed.check_chunks(self._url)
         for name in sealed.foreign(self._url):
             if name.startswith(f"{WORK}/"):
                 raise InputError(f"{self.unfinished}: has {name!r}, which is no part of the run")
