@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from pendmap.analysis.melnikov import melnikov as melnikov
     from pendmap.analysis.orbits import orbit as orbit
     from pendmap.analysis.parameter_map import parameter_map as parameter_map
-    from pendmap.analysis.stored import merge as merge
     from pendmap.analysis.tongues import tongues as tongues
     from pendmap.analysis.trajectories import advance as advance
     from pendmap.analysis.trajectory import simulate as simulate
@@ -122,7 +121,6 @@ _OTHERS = {
         "uncertainty_exponent",
     ],
     "analysis.grid": ["Axis", "Grid"],
-    "analysis.stored": ["merge"],
     "analysis.trajectories": ["advance"],
     "analysis.varied": ["pendulum_of"],
     "comparison.experiment": ["compare"],

@@ -88,7 +88,6 @@ MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1
 MOST_THREADS: Final = 256
-MOST_PARTS: Final = 1_000_000
 MOST_WORKERS: Final = 10_000  # Largest allowed values of arguments
 
 _LONGEST: Final = 60  # Largest length of a value in a message, characters

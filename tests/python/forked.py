@@ -21,7 +21,6 @@ from pendmap import comparison, diagnosis, identification, render, viewer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import xarray as xr
 
 ROOMS = ("pendmap", "pendmap.comparison", "pendmap.identification", "pendmap.diagnosis")
 PATIENCE = 60
@@ -78,11 +77,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
     halves = np.where(np.arange(200) < 97, 1, 2)[:, None].repeat(200, axis=1)
     few = comparison.Ensemble(members=20)
 
-    def merged() -> xr.Dataset:
-        store = folder / f"{os.getpid()}.zarr"
-        pendmap.basins(pendulum, small, store=store, part=(2, 2))
-        return pendmap.merge(store)
-
     return {
         "advance": lambda: pendmap.advance(pendulum, starts, starts, 3),
         "basin_entropy": lambda: pendmap.basin_entropy(basins.label),
@@ -102,7 +96,6 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "load_model": lambda: pendmap.load_model(folder / "given.toml"),
         "lyapunov": lambda: pendmap.lyapunov(pendmap.Pendulum(p=2.0), 1.0, 0.0, precision=0.1),
         "melnikov": lambda: pendmap.melnikov(pendulum, [1.0]),
-        "merge": merged,
         "sweep": lambda: pendmap.sweep(pendulum, {"p": (0.6, 0.8, 3)}, grid=small),
         "noise_floor": lambda: pendmap.noise_floor(free.runs[0]),
         "orbit": lambda: pendmap.orbit(pendulum, 1, 1, small),

@@ -14,6 +14,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import pendmap
@@ -21,6 +22,7 @@ from pendmap import Grid, Pendulum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 TILE = 1500
 _DRY = Pendulum(gamma=0.05, theta_r=0.05, p=1.1, omega=1.9)
@@ -42,6 +44,21 @@ CASES: dict[str, Callable[..., xr.Dataset]] = {
     "list": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), *_STARTS, **keep),
 }
 """Analyses that are computed in tiles."""
+
+
+class StoppedError(Exception):
+    """A run that is stopped by its progress."""
+
+
+def begun(run: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
+    """Begin a run in a store, and stop it at a share of its work."""
+
+    def stop(done: int, total: int) -> None:
+        if done > share * total:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run(store=store, progress=stop, **keep)
 
 
 def small_tiles() -> None:

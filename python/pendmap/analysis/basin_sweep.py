@@ -93,9 +93,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check: bool = True,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    part: tuple[int, int] | None = None,
     executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    mix: bool = False,
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -130,7 +128,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check : bool
         Whether to check a sample of the labels of the first map of each block with half the step
         and mirrored.
-    store, resume, part, executor, mix, chunks, progress
+    store, resume, executor, chunks, progress
         As for :func:`pendmap.basins`; tiles are blocks.
 
     Returns
@@ -177,7 +175,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     bare, units = without_dimensions(pendulum)
     axes = varied.varied(pendulum, ranges, len(ranges))
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    kept = Kept(store, resume, part, executor, mix, chunks)
+    kept = Kept(store, resume, executor, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     choices = choices_of(numerics, layer_periods, check=check)
     workers = numerics.workers or _core.default_threads()

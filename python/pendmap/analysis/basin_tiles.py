@@ -22,7 +22,7 @@ from pendmap.engine import Layout, Tile, pack, unpack
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -42,6 +42,7 @@ _BOX: Final = 5  # Tiles begin with a row of boxes of the basin entropy
 _SAMPLE: Final = 256  # Largest number of undecided starts from which a further search begins
 _CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int32"}
 _COMPUTED: Final = {"computed": "int8"}
+_FOLDER: Final = "work/"  # Beginning of the names of cells that are not the last ones
 _EXPONENT: Final = {"finite_time_exponent": "float32"}
 _BYTES: Final = 32  # Memory of a start during the computation
 _STILL: Final = 1e-12  # Largest sine of an angle at rest
@@ -155,14 +156,9 @@ class BasinTiles:
     """Whether cells inside blocks of one label are filled; of a grid alone."""
 
     @property
-    def _folder(self) -> str:
-        """Beginning of the names of the cells in the store."""
-        return "" if self.part_of_result else "work/"
-
-    @property
-    def _names(self) -> list[str]:
-        """Names of labels, settling times and turns in the store."""
-        return [f"{self._folder}{name}" for name in _CELLS]
+    def _last(self) -> str:
+        """Beginning of the names of the cells with their last numbers in a store."""
+        return "" if self.part_of_result else f"{_FOLDER}last-"
 
     @property
     def height(self) -> int:
@@ -221,15 +217,17 @@ class BasinTiles:
             filled, record = adaptive.refined(
                 plan, first, last, self.starts.shape, self.choices["seed"], progress
             )
-            return Tile(pack(**record), filled)
+            return Tile(pack(**record), _named(filled))
         found = plan.label(first - before, last - before, progress)
-        cells: Cells = dict(zip(self._names, (found.label, found.settle, found.turns), strict=True))
+        cells: Cells = dict(zip(_CELLS, (found.label, found.settle, found.turns), strict=True))
         if found.finite_time_exponent is not None:
             exponent = found.finite_time_exponent * np.float32(self.rate)
-            cells[f"{self._folder}finite_time_exponent"] = exponent
+            cells["finite_time_exponent"] = exponent
         if self.adaptive:
             cells["computed"] = np.full(found.label.size, adaptive.COMPUTED, np.int8)
-        return Tile(pack(work=found.work, undecided=np.count_nonzero(found.label == 0)), cells)
+        return Tile(
+            pack(work=found.work, undecided=np.count_nonzero(found.label == 0)), _named(cells)
+        )
 
     def _first(self, tile: int) -> int:
         """Return the index of the first start of a tile."""
@@ -245,7 +243,7 @@ class BasinTiles:
             picks: Indices = found["picks"][found["label"] == 0]
             return picks
         rows = slice(tile * self.height, (tile + 1) * self.height)
-        return np.flatnonzero(store.read(self._names[0], rows) == 0) + self._first(tile)
+        return np.flatnonzero(store.read(f"{_FOLDER}label", rows) == 0) + self._first(tile)
 
     # ---- the whole
 
@@ -257,8 +255,7 @@ class BasinTiles:
         plan = self.plan(work.once("plan-0", lambda: self.plan(progress=work.progress).state))
         labelled = plan.plane == "basins"
         dtypes = _CELLS | ({} if labelled else _EXPONENT) | (_COMPUTED if self.adaptive else {})
-        inside = {f"{self._folder}{name}": dtype for name, dtype in dtypes.items()}
-        layout = Layout(self.starts.dims, shape, self.height, inside)
+        layout = Layout(self.starts.dims, shape, self.height, _named(dtypes), "label")
         store.create(layout)
         if store.shared and self.starts.axes is None:
             for tile in range(layout.tiles):
@@ -290,7 +287,7 @@ class BasinTiles:
         measures = unpack(work.once("measures", measure))
         counts = measures.pop("counts")
         attractors, last = plan.finish(np.ascontiguousarray(counts[2:]))
-        self._renumber(work, layout, [*moves, last])
+        final = self._renumber(work, layout, [*moves, last])
         share = counts[:2] / math.prod(shape)
         uncertain = {
             name: measures.pop(name, np.zeros(0)) for name in ("eps", "uncertain", "tried")
@@ -302,7 +299,7 @@ class BasinTiles:
             **{name: getattr(plan, name) for name in _PLAN},
             **dict.fromkeys(_RELIABILITY, 0.0) | {"unreliable_mirror": None} | measures,
             attractors=attractors,
-            cells={name: store.whole(f"{self._folder}{name}") for name in dtypes},
+            cells={name: store.whole(f"{final}{name}") for name in dtypes},
             failed=share[0].item(),
             undecided=1.0 if plan.plane == "conservative" else share[1].item(),
             decided=int(counts[2:].sum()),
@@ -337,7 +334,7 @@ class BasinTiles:
 
         Entry ``k`` of ``moves`` has the new number of each attractor after step ``k``.
         """
-        rows, cut = layout.rows(tile), len(self._folder)
+        rows, cut = layout.rows(tile), len(_FOLDER)
         cells = {name[cut:]: store.read(name, rows) for name in layout.dtypes}
         if moves:
             cells = {name: values.copy() for name, values in cells.items()}
@@ -424,27 +421,26 @@ class BasinTiles:
             **{name: value for name, value in told.items() if value is not None},
         )
 
-    def _renumber(self, work: Work, layout: Layout, moves: list[Labels]) -> None:
+    def _renumber(self, work: Work, layout: Layout, moves: list[Labels]) -> str:
         """Give attractors their last numbers, and starts what later steps have found.
 
-        In a store all tiles are written beside the old ones first, then over them: a run that is
-        killed in between does the second part again.
+        Returns the beginning of the names of the cells. In a store they are other cells than those
+        of the steps: nothing is written over.
         """
-        store, (*earlier, last) = work.store, moves
-        if not earlier and np.array_equal(last, np.arange(1, last.size + 1)):
-            return
+        store, last = work.store, moves[-1]
+        if len(moves) == 1 and np.array_equal(last, np.arange(1, last.size + 1)):
+            moves = []
+        name = self._last if store.shared else _FOLDER
+        if store.shared:
+            dtypes = {f"{name}{key[len(_FOLDER) :]}": each for key, each in layout.dtypes.items()}
+            store.create(dataclasses.replace(layout, dtypes=dtypes, step="last"))
+        for tile in range(layout.tiles) if store.shared or moves else ():
+            if not (store.shared and store.holds("last", tile)):
+                cells = self._merged(store, layout, moves, tile)
+                store.write(tile, {f"{name}{key}": own for key, own in cells.items()})
+        return name
 
-        def write(tile: int, cells: Cells) -> None:
-            store.write(tile, {f"{self._folder}{name}": own for name, own in cells.items()})
 
-        if not store.shared:
-            for tile in range(layout.tiles):
-                write(tile, self._merged(store, layout, moves, tile))
-            return
-        done = store.done("final")
-        for tile in range(layout.tiles):
-            if store.get("final/all") is None and tile not in done:
-                store.put(f"final/{tile}", pack(**self._merged(store, layout, moves, tile)))
-        work.once("final/all", lambda: b"done")
-        for tile in range(layout.tiles):
-            write(tile, unpack(store.get(f"final/{tile}") or b""))
+def _named(cells: Mapping[str, Any]) -> dict[str, Any]:
+    """Return cells by their names in the store before attractors have their last numbers."""
+    return {f"{_FOLDER}{name}": values for name, values in cells.items()}

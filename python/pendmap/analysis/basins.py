@@ -142,9 +142,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     draws: int | None = None,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    part: tuple[int, int] | None = None,
     executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    mix: bool = False,
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -201,14 +199,9 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     resume : bool
         Whether to go on with the store of a run that was stopped; the result is the same, bit for
         bit. A store that another request began is refused.
-    part : (int, int), optional
-        ``(7, 64)`` computes the seventh of 64 parts of the tiles; :func:`pendmap.merge` completes
-        the map when all parts are in the store. Returns a dataset without variables.
     executor : optional
         Computes the tiles: a Dask client or any executor of :mod:`concurrent.futures`, like those
         of joblib, mpi4py and submitit. Each tile has one thread unless ``threads`` says otherwise.
-    mix : bool
-        Whether to go on with a store that was begun on a processor that rounds otherwise.
     chunks : optional
         As for :func:`xarray.open_zarr`: the result of a store has arrays of Dask, ``{}`` with the
         tiles as chunks.
@@ -265,7 +258,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    kept = Kept(store, resume, part, executor, mix, chunks)
+    kept = Kept(store, resume, executor, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     choices = choices_of(numerics, layer_periods, check=check)
     if draws is not None:

@@ -71,9 +71,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     seed: int = 0,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    part: tuple[int, int] | None = None,
     executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    mix: bool = False,
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -101,7 +99,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         starts end on there.
     starts, box, tol, max_periods, threads, seed
         As for :func:`pendmap.parameter_map`.
-    store, resume, part, executor, mix, chunks, progress
+    store, resume, executor, chunks, progress
         As for :func:`pendmap.parameter_map`; tiles are 16 values.
 
     Returns
@@ -132,7 +130,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     (axis,) = varied.varied(pendulum, ranges, 1)
-    kept = Kept(store, resume, part, executor, mix, chunks)
+    kept = Kept(store, resume, executor, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     search = cell_search.CellSearch(starts, box, numerics)
     first = None

@@ -124,9 +124,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws: int | None = None,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    part: tuple[int, int] | None = None,
     executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    mix: bool = False,
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -160,7 +158,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Draws the starts, and the models of ``draws``.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the interval of the mean lifetime.
-    max_periods, tol, threads, store, resume, part, executor, mix, chunks, progress
+    max_periods, tol, threads, store, resume, executor, chunks, progress
         As for :func:`pendmap.basins`.
 
     Returns
@@ -195,7 +193,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
-    kept = Kept(store, resume, part, executor, mix, chunks)
+    kept = Kept(store, resume, executor, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")

@@ -109,9 +109,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws: int | None = None,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    part: tuple[int, int] | None = None,
     executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    mix: bool = False,
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -163,7 +161,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell.
-    threads, store, resume, part, executor, mix, chunks, progress
+    threads, store, resume, executor, chunks, progress
         As for :func:`pendmap.basins`; tiles are blocks of 16 x 16 cells.
 
     Returns
@@ -200,7 +198,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     columns, rows = varied.varied(pendulum, ranges, 2)
-    kept = Kept(store, resume, part, executor, mix, chunks)
+    kept = Kept(store, resume, executor, chunks)
     numerics = Numerics(tol, max_periods, threads, seed, progress)
     search = cell_search.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)

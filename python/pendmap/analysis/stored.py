@@ -1,4 +1,4 @@
-"""Runs that are kept in a store: what they were asked for, how they go on, how parts are merged."""
+"""Runs that are kept in a store: what they were asked for, how they go on."""
 
 from __future__ import annotations
 
@@ -9,26 +9,23 @@ import os
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis.grid import Grid
 from pendmap.engine import (
     MemoryStore,
-    PartDone,
     Work,
     ZarrStore,
     executor_of,
-    pack,
     rounding,
-    unpack,
 )
-from pendmap.errors import MOST_PARTS, InputError, check_flag, check_whole, short_repr
-from pendmap.formatting import counted
-from pendmap.model import model_text, parse_model
+from pendmap.errors import InputError, check_flag, short_repr
+from pendmap.model import model_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    import xarray as xr
 
     from pendmap.analysis.numerics import Numerics, Progress
     from pendmap.model import Pendulum, Rig
@@ -37,7 +34,6 @@ if TYPE_CHECKING:
     """Function that computes a result, and names its variables that are cells of the store."""
 
 _DIGEST: Final = "sha256 "
-_GRIDS: Final = ("grid", "box")  # Arguments that are grids
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,22 +42,14 @@ class Kept:
 
     store: str | os.PathLike[str] | None = None
     resume: bool = False
-    part: tuple[int, int] | None = None
     executor: Any = None
-    mix: bool = False
     chunks: Any = None
 
     def __post_init__(self) -> None:
         if self.store is not None:
             _address(self.store)
         check_flag("resume", self.resume)
-        check_flag("mix", self.mix)
-        if self.part is not None:
-            if not isinstance(self.part, tuple | list) or len(self.part) != 2:  # noqa: PLR2004
-                raise InputError(f"part must be (number, parts), like (7, 64), got {self.part}")
-            parts = check_whole("part: parts", self.part[1], 1, MOST_PARTS)
-            check_whole("part: number", self.part[0], 1, parts)
-        for what in ("resume", "part", "chunks"):
+        for what in ("resume", "chunks"):
             if self.store is None and getattr(self, what) not in (False, None):
                 raise InputError(f"{what} must be given with a store (.zarr), got none")
         if self.chunks is not None and importlib.util.find_spec("dask") is None:
@@ -99,42 +87,28 @@ class Kept:
         """Return the result of ``compute``, or of the store if it is complete there."""
         with executor_of(executor=self.executor) as executor:
             if self.store is None:
-                return compute(Work(job, MemoryStore(), executor, None, progress))[0]
-            store = ZarrStore(os.fspath(self.store))
+                return compute(Work(job, MemoryStore(), executor, progress))[0]
+            store = ZarrStore(_address(self.store))
             mark = _request(name, model, arguments)
-            if self._begin(store, mark):
-                return store.result(self.chunks)
-            for key, values in arguments.items():
-                if isinstance(values, np.ndarray) and store.get(key) is None:
-                    store.put(key, pack(values=values))
-            work = Work(job, store, executor, self.part, progress)
-            try:
-                with work.named(store.unfinished):
-                    dataset, cells = compute(work)
-                    store.complete(dataset, cells, {**mark, "complete": True})
-            except PartDone:
-                return self._said(work, store.unfinished)
-            except BaseException:
-                if self.part is None:  # another part may have begun the store
+            with store.held():
+                if self._begin(store, mark):
+                    return store.result(self.chunks, again=True)
+                work = Work(job, store, executor, progress)
+                try:
+                    with work.named(store.unfinished):
+                        dataset, cells = compute(work)
+                        store.complete(dataset, cells, {**mark, "complete": True})
+                except BaseException:
                     store.abandon()
-                raise
+                    raise
             return store.result(self.chunks)
-
-    def _said(self, work: Work, name: str) -> xr.Dataset:
-        """Return a dataset without variables that tells what a part has done."""
-        number, parts = self.part or (1, 1)
-        line = f"{work.tiles_done} of {counted(work.tiles, 'tile')} are in {name}."
-        end = f"pendmap merge {self.store} completes it when all parts are."
-        told = {"part": number, "parts": parts, "tiles": work.tiles, "tiles_done": work.tiles_done}
-        title = f"Part {number} of {parts} is done"
-        return xr.Dataset(attrs={"title": title, "summary": f"{line}\n{end}", **told})
 
     def _begin(self, store: ZarrStore, mark: dict[str, Any]) -> bool:
         """Begin a store or go on with one; return whether it is complete."""
-        old = store.mark()
-        if old is not None and (self.resume or self.part is not None):
+        old = store.mark(resume=self.resume)
+        if old is not None and self.resume:
             self._check(store.address, old, mark)
-            if not old["complete"] and self.part is None:
+            if not old["complete"]:
                 store.go_on()
             return bool(old["complete"])
         if old is not None and not old["complete"]:
@@ -155,80 +129,17 @@ class Kept:
             if before.get(key) != now.get(key):
                 said, given = (short_repr(one.get(key)) for one in (before, now))
                 raise InputError(f"{address}: was begun with {key} = {said}, not {given}")
-        if old["rounding"] != mark["rounding"] and not self.mix:
+        if old["rounding"] != mark["rounding"]:
             raise InputError(
                 f"{address}: was begun with an instruction set that rounds otherwise "
-                f"({old['rounding']}, here {mark['rounding']}): --mix (mix=True) goes on"
+                f"({old['rounding']}, here {mark['rounding']})"
             )
-
-
-def merge(
-    store: str | os.PathLike[str],
-    *,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> xr.Dataset:
-    """Complete a run in a store: compute what is missing, and what its tiles exchange.
-
-    Parameters
-    ----------
-    store : str or path
-        A store that :func:`pendmap.basins`, :func:`pendmap.parameter_map`, :func:`pendmap.sweep`,
-        :func:`pendmap.bifurcation` or :func:`pendmap.lifetime` began, in parts or alone.
-    executor, threads, progress
-        As for :func:`pendmap.basins`.
-
-    Returns
-    -------
-    xarray.Dataset
-        The result; of a complete store without a computation.
-
-    Raises
-    ------
-    InputError
-        If there is no run of this version.
-    OSError
-        If the store cannot be written.
-
-    Examples
-    --------
-    >>> import pendmap
-    >>> pendulum, grid = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0), pendmap.Grid.square(20)
-    >>> result = pendmap.basins(pendulum, grid, store="map.zarr")
-    >>> bool((pendmap.merge("map.zarr").label == result.label).all())
-    True
-    """
-    import pendmap  # noqa: PLC0415 (the public functions, which import this module)
-
-    place = ZarrStore(_address(store))
-    mark = place.mark()
-    if not mark:
-        raise InputError(f"{place.address}: must be a store of a run, there is none")
-    if mark["complete"]:
-        return place.result()
-    arguments = dict(mark["arguments"])
-    for key, value in arguments.items():
-        if isinstance(value, str) and value.startswith(_DIGEST):
-            arguments[key] = unpack(place.get(key) or pack(values=[]))["values"]
-        elif key in _GRIDS and value is not None:
-            arguments[key] = Grid(*(tuple(axis) for axis in value))  # type: ignore[arg-type]
-        elif key == "ranges":
-            # A number of values is whole; values themselves are not.
-            arguments[key] = {
-                name: tuple(own) if isinstance(own, list) and isinstance(own[-1], int) else own
-                for name, own in value.items()
-            }
-    run = getattr(pendmap, mark["analysis"])
-    model = parse_model(mark["model"], place.address)
-    more = {"executor": executor, "threads": threads, "progress": progress}
-    found: xr.Dataset = run(model, **arguments, store=store, resume=True, **more)
-    return found
 
 
 def _address(store: str | os.PathLike[str]) -> str:
     """Return the address of a store; a folder must be named like one."""
     name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
+    name = name.removeprefix("file://")
     if "://" not in name and not name.rstrip("/").endswith(".zarr"):
         raise InputError(
             "store must be a folder NAME.zarr, or an address like s3://bucket/map.zarr, got "

@@ -41,7 +41,6 @@ _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 _COMMANDS = {
     **{name: text for name, _, text in ANALYSES.values()},
-    "merge": "Complete a result that was computed in parts, or whose run was stopped.",
     "look": "Describe a record: channels, rate, noise, releases, faults.",
     "identify": "Find natural frequency, damping and friction in a free decay.",
     "compare": "Compare a model with records that it was not fitted to.",
@@ -54,7 +53,7 @@ _COMMANDS = {
     "info": "Show the version, the instruction set used, the threads.",
 }
 """Commands and their descriptions, in the order of --help."""
-_SECTIONS = {"Maps and motions": "merge", "Records": "rig", "Other": "info"}
+_SECTIONS = {"Maps and motions": "melnikov", "Records": "rig", "Other": "info"}
 """Sections of --help, and the last command of each."""
 _NAMED = re.compile(
     r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL

@@ -281,7 +281,9 @@ def keep_files(options: Mapping[Path | Address, str]) -> None:
     """Refuse files and stores that exist, named by their option."""
     for path, option in options.items():
         if isinstance(path, Address):
-            there = [str(path)] if _complete(path) else []
+            from pendmap.engine import ZarrStore
+
+            there = [str(path)] if ZarrStore(path).finished() else []
         else:
             files = _report_files(path) if option == "--report" else [path]
             there = [str(file) for file in files if file.exists()]
@@ -290,14 +292,6 @@ def keep_files(options: Mapping[Path | Address, str]) -> None:
                 f"Invalid value for '{option}': {name!r}: must be a new file, got one that exists:"
                 " --overwrite replaces it"
             )
-
-
-def _complete(address: Address) -> bool:
-    """Return whether there is a complete result at an address."""
-    from pendmap.engine import ZarrStore
-
-    mark = ZarrStore(address).mark()
-    return mark is not None and bool(mark["complete"])
 
 
 def keep_inputs(

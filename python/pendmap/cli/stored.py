@@ -6,11 +6,9 @@ import contextlib
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli.parse.types import Address
 from pendmap.cli.show import made_here, show
-from pendmap.cli.text import say, write_json
+from pendmap.cli.text import say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,15 +25,13 @@ class Kept:
     """The options of a store and of workers."""
 
     resume: bool
-    part: tuple[int, int] | None
-    mix: bool
     count: int | None
     scheduler: str | None
 
     @property
     def goes_on(self) -> bool:
         """Whether an existing store is not replaced."""
-        return self.resume or self.part is not None
+        return self.resume
 
     @classmethod
     def take(cls, given: dict[str, Any]) -> Kept:
@@ -45,22 +41,18 @@ class Kept:
     def run(
         self, analysis: partial[xr.Dataset], outputs: Outputs, name: str, schema: Schema
     ) -> None:
-        """Compute a result, write its files, and show it or what a part has done."""
+        """Compute a result, write its files, and show it."""
         store = outputs.store
         if analysis.keywords.get("draws") and not isinstance(store, Address):
             store = None  # draws are written when all are computed
-        if self.part is not None and outputs.drawings:
-            raise click.UsageError("--part must be given with --out NAME.zarr and no other output")
-        keep = {"store": store, "resume": self.resume, "part": self.part, "mix": self.mix}
+        keep = {"store": store, "resume": self.resume}
         with (
             workers(self.scheduler, self.count, quiet=outputs.quiet) as executor,
             made_here(),
             outputs.progress(name) as progress,
         ):
             dataset = analysis(progress=progress, executor=executor, **keep)
-        if self.part is not None and "parts" in dataset.attrs:
-            show_part(dataset, outputs)
-        elif store is None:
+        if store is None:
             show(dataset, outputs, schema)
         else:
             show(dataset, dataclasses.replace(outputs, out=None), schema, [str(store)])
@@ -78,12 +70,3 @@ def workers(scheduler: str | None, count: int | None, *, quiet: bool) -> Iterato
         if not quiet and not executor.nthreads():
             say(f"{scheduler} has no workers yet: waiting for them.", err=True)
         yield executor
-
-
-def show_part(dataset: xr.Dataset, outputs: Outputs) -> None:
-    """Tell what a part of a run has done."""
-    title, summary, *_ = (dataset.attrs.pop(name) for name in ("title", "summary"))
-    if outputs.as_json:
-        write_json(dataset.attrs)
-    elif not outputs.quiet:
-        say(f"{title}\n{summary}")

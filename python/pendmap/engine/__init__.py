@@ -1,14 +1,14 @@
 """Computations in tiles: where their results are kept, and who computes them."""
 
 from pendmap.engine.executors import executor_of
-from pendmap.engine.store import Layout, MemoryStore, Store, ZarrStore, pack, unpack
-from pendmap.engine.work import Job, PartDone, Tile, Work, rounding
+from pendmap.engine.store import Layout, MemoryStore, Store, pack, unpack
+from pendmap.engine.work import Job, Tile, Work, rounding
+from pendmap.engine.zarr_store import ZarrStore
 
 __all__ = [
     "Job",
     "Layout",
     "MemoryStore",
-    "PartDone",
     "Store",
     "Tile",
     "Work",

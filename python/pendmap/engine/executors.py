@@ -7,6 +7,7 @@ loky, mpi4py.futures and submitit have it, a Dask client gives one by ``get_exec
 
 from __future__ import annotations
 
+import asyncio
 import concurrent.futures
 import contextlib
 import importlib.util
@@ -15,7 +16,7 @@ import os
 import time
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.errors import MOST_WORKERS, InputError, check_whole, short_repr
+from pendmap.errors import MOST_WORKERS, InputError, check_whole, one_line, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -25,6 +26,7 @@ _IN_FLIGHT: Final = 4
 _LEAST_IN_FLIGHT: Final = 16
 _TRIES: Final = 20  # Times that a tile is given to another worker after it has lost its own
 _POLL: Final = 0.05  # Time between two looks at futures that cannot be waited for, s
+_ANSWER: Final = 10.0  # Time in which a scheduler must answer, s
 _COUNTED: Final = 5.0  # Time between two counts of the workers, s
 
 
@@ -55,13 +57,14 @@ def executor_of(
     import distributed  # noqa: PLC0415 (an extra)
 
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_silent("distributed"))
         if scheduler is not None:
+            _check_scheduler(scheduler)
             target: Any = scheduler
         else:
             count = check_whole("workers", workers, 1, MOST_WORKERS)
             level = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
             quiet = {"distributed.worker.memory.terminate": False, level: "critical"}
-            stack.enter_context(_silent("distributed"))
             stack.enter_context(dask.config.set(quiet))
             # The scheduler's status page listens even when it is off, at 8787 unless told.
             page = "127.0.0.1:0"
@@ -70,23 +73,40 @@ def executor_of(
                 target = stack.enter_context(distributed.LocalCluster(**local))
             except (OSError, RuntimeError) as error:
                 raise InputError(f"workers cannot be started: {error}") from error
-        try:
-            client = stack.enter_context(distributed.Client(target, set_as_default=False))
-        except (OSError, ValueError) as error:
-            raise InputError(f"scheduler {scheduler}: {error}") from None
-        yield client
+        yield stack.enter_context(distributed.Client(target, set_as_default=False))
+
+
+def _check_scheduler(address: str) -> None:
+    """Raise InputError unless a scheduler of Dask answers; a client that fails takes a minute."""
+    import dask  # noqa: PLC0415 (an extra)
+    import distributed  # noqa: PLC0415 (an extra)
+
+    async def answer() -> Any:  # noqa: ANN401 (of Dask)
+        async with distributed.rpc(address) as scheduler:
+            return await asyncio.wait_for(scheduler.identity(), _ANSWER)
+
+    try:
+        with dask.config.set({"distributed.comm.timeouts.connect": f"{_ANSWER} s"}):
+            kind = asyncio.run(answer())["type"]
+    except Exception as error:  # noqa: BLE001 (of many libraries)
+        reason = one_line(str(error)) or f"no answer in {_ANSWER:g} s"
+        raise InputError(f"scheduler {short_repr(address)} is not reached: {reason}") from None
+    if kind != "Scheduler":
+        raise InputError(f"scheduler must be one of Dask, got a {kind} at {short_repr(address)}")
 
 
 @contextlib.contextmanager
 def _silent(name: str) -> Iterator[None]:
-    """Silence a logger: workers that are stopped, as by Ctrl-C, would tell it in many lines."""
-    logger = logging.getLogger(name)
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    """Silence the loggers of a package: workers or a scheduler that end would fill many lines."""
+    known = [each for each in logging.root.manager.loggerDict if each.partition(".")[0] == name]
+    before = {each: logging.getLogger(each).level for each in known}
+    for each in known:
+        logging.getLogger(each).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for each, level in before.items():
+            logging.getLogger(each).setLevel(level)
 
 
 class WorkersGoneError(RuntimeError):
@@ -162,7 +182,7 @@ def _result(future: Any, tile: int) -> Any:  # noqa: ANN401
     try:
         return future.result()
     except (concurrent.futures.CancelledError, concurrent.futures.BrokenExecutor) as error:
-        raise WorkersGoneError(f"tile {tile}: {error or 'the scheduler is gone'}") from error
+        raise WorkersGoneError(f"tile {tile}: {str(error) or 'the scheduler is gone'}") from error
 
 
 def _workers(pool: Any, client: Any) -> int:  # noqa: ANN401

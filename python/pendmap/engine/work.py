@@ -61,10 +61,6 @@ class Job(Protocol):
         """Compute a tile."""
 
 
-class PartDone(Exception):  # noqa: N818 (no error)
-    """The tiles of a part of a run are in the store."""
-
-
 @dataclasses.dataclass
 class Work:
     """A job in progress."""
@@ -72,11 +68,12 @@ class Work:
     job: Job
     store: Store = dataclasses.field(default_factory=MemoryStore)
     executor: Any = None
-    part: tuple[int, int] | None = None
     progress: Progress | None = None
     tiles_done: int = 0
     """Tiles that are in the store."""
     tiles: int = 0
+    step: str = ""
+    """Step that is computed."""
 
     @contextlib.contextmanager
     def named(self, address: str) -> Iterator[None]:
@@ -88,11 +85,13 @@ class Work:
             raise
         except OSError as error:
             if error.errno is None:
-                raise
+                raise NotWrittenError(f"{error}; {self._kept}") from error
             raise OSError(error.errno, f"{error.strerror}; {self._kept}", address) from error
 
     @property
     def _kept(self) -> str:
+        with contextlib.suppress(Exception):  # workers may have stored more than they have told
+            self.tiles_done = max(self.tiles_done, len(self.store.done(self.step)))
         return f"{self.tiles_done} of {counted(self.tiles, 'tile')} are kept, --resume goes on"
 
     def once(self, name: str, make: Callable[[], bytes]) -> bytes:
@@ -106,28 +105,23 @@ class Work:
     def each(self, step: str, state: str, tiles: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield tiles of a step with their records, computing those that are not there.
 
-        ``state`` names the record that all tiles of the step need. In a part of a run only its own
-        tiles are computed, and PartDone is raised then.
+        ``state`` names the record that all tiles of the step need.
         """
         done = self.store.done(step)
-        wanted = list(tiles)
-        missing = [tile for tile in wanted if tile not in done]
-        self.tiles, self.tiles_done = len(wanted), len(wanted) - len(missing)
-        mine = missing
-        if self.part is not None:
-            number, parts = self.part
-            mine = [tile for tile in missing if tile % parts == number - 1]
+        wanted, missing = list(tiles), []
+        self.tiles, self.tiles_done, self.step = len(wanted), 0, step
         for tile in wanted:
-            if tile in done and (record := self.store.get(f"{step}/{tile}")) is not None:
-                yield tile, record
+            record = self.store.get(f"{step}/{tile}") if tile in done else None
+            if record is None or not self.store.holds(step, tile):
+                missing.append(tile)
+                continue
+            self.tiles_done += 1
+            yield tile, record
         self._report(0)
-        for tile, record in self._computed(step, state, mine):
+        for tile, record in self._computed(step, state, missing):
             self.tiles_done += 1
             self._report(0)
             yield tile, record
-        if self.part is not None:
-            self.tiles_done = len(self.store.done(step))
-            raise PartDone
 
     def _computed(self, step: str, state: str, tiles: list[int]) -> Iterator[tuple[int, bytes]]:
         if self.executor is None:
@@ -144,8 +138,7 @@ class Work:
                     self.store.put(f"{step}/{tile}", answer.record)
                 yield tile, answer.record
         except WorkersGoneError as error:
-            kept = f"; {self._kept}" if self.store.shared else ""
-            raise NotWrittenError(f"the workers are gone ({error}){kept}") from error
+            raise NotWrittenError(f"the workers are gone ({error})") from error
         finally:
             answers.close()
 

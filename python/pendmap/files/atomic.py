@@ -81,6 +81,7 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
         part.touch()
         with _disk_faults(part):
             yield part
+        synced(part)
         part.replace(target)
 
 
@@ -98,11 +99,13 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         new.parent.mkdir()
         with _disk_faults(stage / "probe"):
             yield new
+        synced(new)
         _replace(target, new, stage)
 
 
 def move_folder(new: Path, target: Path) -> None:
     """Move a folder to ``target``, on the same disk; a folder there is removed after that."""
+    synced(new)
     with _named(target), _stage(target.parent) as stage:
         _replace(target, new, stage)
 
@@ -117,6 +120,26 @@ def _replace(target: Path, new: Path, stage: Path) -> None:
     except OSError:
         _put_back(stage)
         raise
+    _sync(target.parent)
+
+
+def synced(path: Path) -> None:
+    """Write a file, or a folder with all that is in it, from the memory of the system to disk."""
+    for folder, _, names in os.walk(path) if path.is_dir() else ():
+        for name in names:
+            _sync(Path(folder, name))
+        _sync(Path(folder))
+    if not path.is_dir():
+        _sync(path)
+
+
+def _sync(path: Path) -> None:
+    with contextlib.suppress(PermissionError):  # Windows opens no folder
+        descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def read_whole(path: str | os.PathLike[str], most: int) -> bytes:

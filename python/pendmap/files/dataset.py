@@ -6,13 +6,10 @@ import contextlib
 import contextvars
 import functools
 import importlib.util
-import json
 import math
 import os
-import re
 import threading
 import time
-import warnings
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -22,19 +19,18 @@ import xarray as xr
 import pendmap.files.accessor  # noqa: F401 (dataset.pendmap)
 from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
-from pendmap.files import check_regular, whole_file, whole_folder
+from pendmap.files import check_regular, sealed, whole_file, whole_folder
+from pendmap.files.hdf5 import check_alone
+from pendmap.files.sealed import MARK
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
-MARK: Final = "pendmap"
-"""Attribute of a Zarr store that a run began: the request, and whether it is complete."""
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
 KINDS: Final = {kind: functions for kind, (_, functions, _) in ANALYSES.items()}
-_UPGRADE: Final = "pendmap.analysis.version_1"  # Module that knows the schemas, for old files alone
 _TEXT: Final = "_name"
 """Suffix of a coordinate of text in a file: by CF those named as their dimension are numbers."""
 _MADE_BY: Final = contextvars.ContextVar("made_by", default="")
@@ -43,9 +39,7 @@ _AS_STORED: Final[dict[str, Any]] = {"mask_and_scale": False, "decode_coords": "
 """How files are read: whole numbers stay whole, missing or not, and bounds are coordinates."""
 _NETCDF: Final[Any] = functools.partial(xr.open_dataset, engine="netcdf4", **_AS_STORED)
 _ONE: Final = threading.RLock()  # Held while NetCDF is read or written: the library has no threads
-_UNFINISHED: Final = "is an unfinished run: pendmap merge {} completes it"
-# Names of files in a Zarr store: metadata and chunks, of the formats 2 and 3
-_ZARR: Final = re.compile(r"zarr\.json|\.z(attrs|group|array|metadata)|c|\d+(\.\d+)*|.*\.partial")
+_UNFINISHED: Final = "is an unfinished run: its command completes it with --resume (resume=True)"
 
 
 def save(
@@ -84,7 +78,7 @@ def save(
     >>> pendmap.save(result, "melnikov.nc").name
     'melnikov.nc'
     """
-    target = Path(path)
+    target = Path(os.fspath(path).removeprefix("file://"))
     if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
         own: Path = dataset.save(target)
         return own
@@ -106,8 +100,8 @@ def save(
         return target
     check_replaceable(target)
     with whole_folder(target) as part:
-        write_zarr(dataset, part)
-        gather(part)
+        write_zarr(dataset.assign_attrs({MARK: {"complete": True}}), part)
+        sealed.seal(part)
     return target
 
 
@@ -138,7 +132,11 @@ def write_zarr(
     dataset = dataset.assign({n: dataset[n].astype(k) for n, k in zip(texts, kinds, strict=True)})
     mode: Literal["w", "a"] = "w" if beside is None else "a"
     dataset.attrs = attributes if beside is None else dict(beside)
-    dataset.to_zarr(place, mode=mode, zarr_format=3, consolidated=False, encoding=encoding)
+    checks = {"compressors": sealed.compressors()}
+    encoding = {name: encoding.get(name, {}) | checks for name in dataset.variables}
+    form: Any = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
+    with sealed.beside_others():
+        dataset.to_zarr(place, mode=mode, encoding=encoding, **form)
     return attributes
 
 
@@ -148,21 +146,14 @@ def open_zarr(
     drop: Collection[str] = (),
 ) -> xr.Dataset:
     """Open a Zarr store as it is stored; variables are read when they are used, but for text."""
-    dataset: xr.Dataset = xr.open_zarr(
-        place, chunks=chunks, consolidated=False, drop_variables=list(drop), **_AS_STORED
-    )
+    form: Any = {"zarr_format": 3, "consolidated": False, "drop_variables": list(drop)}
+    with sealed.beside_others():
+        dataset: xr.Dataset = xr.open_zarr(
+            sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
+        )
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind in "OT"]
     plain = {name: np.array(dataset[name].values.tolist(), dtype=str) for name in texts}
     return dataset.assign({name: dataset[name].copy(data=values) for name, values in plain.items()})
-
-
-def gather(place: str | os.PathLike[str]) -> None:
-    """Gather the metadata of a complete Zarr store at its root, where other tools look first."""
-    import zarr  # noqa: PLC0415 (an extra)
-
-    with _ONE, warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Consolidated metadata is currently not part")
-        zarr.consolidate_metadata(place, zarr_format=3)
 
 
 @contextlib.contextmanager
@@ -195,43 +186,38 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{target}: {wanted}; it is a file")
     if not target.exists() or not any(target.iterdir()):
         return
-    said = _zarr_attributes(target)
-    if not isinstance(said, dict) or not said.keys() >= _MARKS or said["kind"] not in [*KINDS]:
+    attributes: Any = {}
+    with contextlib.suppress(InputError, LookupError, TypeError):
+        attributes = dict(sealed.metadata(target)[0]["attributes"])
+    if not attributes.keys() >= _MARKS or attributes["kind"] not in [*KINDS]:
         raise InputError(f"{target}: {wanted}; the folder does not contain a result")
-    for entry in target.rglob("*"):
-        if entry.is_symlink() or not (entry.is_dir() or _ZARR.fullmatch(entry.name)):
-            raise InputError(f"{target}: {wanted}; it contains {entry.name!r}, no part of a result")
-
-
-def _zarr_attributes(target: Path) -> object:
-    """Return the attributes of a Zarr store of format 3 or 2, None if there are none."""
-    with contextlib.suppress(FileNotFoundError, KeyError, TypeError, ValueError):
-        return json.loads((target / "zarr.json").read_bytes())["attributes"]
-    with contextlib.suppress(FileNotFoundError, ValueError):
-        return json.loads((target / ".zattrs").read_bytes())
-    return None
+    for name in sealed.foreign(target):
+        raise InputError(f"{target}: {wanted}; it contains {name!r}, no part of a result")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
     """Return the dataset of a file or a store; raises as :func:`pendmap.load`."""
-    source = os.fspath(path) if "://" in os.fspath(path) else Path(path)
+    name = os.fspath(path).removeprefix("file://")
+    source = name if "://" in name else Path(name)
     suffix = PurePath(source).suffix.lower()
+    if isinstance(source, str) and suffix != ".zarr":
+        raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
     if isinstance(source, Path) and not source.exists():
         if source.with_name(f"{source.name}.part").exists():
-            raise InputError(f"{source}: {_UNFINISHED.format(source)}")
+            raise InputError(f"{source}: {_UNFINISHED}")
         raise FileNotFoundError(2, "no such file", str(source))
     if suffix not in SUFFIXES:
         raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}")
     if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
     try:
-        read: Any = open_zarr if suffix == ".zarr" else _NETCDF
+        stored = isinstance(source, str) or suffix == ".zarr"
+        (_check_complete if stored else check_alone)(source)
+        read: Any = open_zarr if stored else _NETCDF
         with _ONE, read(source) as opened:
             _check_result(opened, source)
             dataset = restored(opened.load())
         dataset.attrs.pop(MARK, None)
-        if dataset.attrs["format_version"] < FORMAT_VERSION and dataset.attrs["kind"] in KINDS:
-            dataset = importlib.import_module(_UPGRADE).upgraded(dataset)
     except InputError:
         raise
     except Exception as error:  # a damaged file may raise any error
@@ -261,13 +247,16 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars([*texts]).assign_coords(named)
 
 
+def _check_complete(source: Path | str) -> None:
+    if sealed.checked(source)[0]["complete"] is not True:
+        raise InputError(f"{source}: {_UNFINISHED}")
+
+
 def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
-    if dataset.attrs.get(MARK, {"complete": True})["complete"] is not True:
-        raise InputError(f"{source}: {_UNFINISHED.format(source)}")
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
-    if not isinstance(version, int | np.integer) or not 1 <= version <= FORMAT_VERSION:
+    if not isinstance(version, int | np.integer) or version != FORMAT_VERSION:
         known = f"this pendmap reads format {FORMAT_VERSION}"
         raise InputError(f"{source}: has format {version}, {known}")
     if not isinstance(kind, str):

@@ -56,6 +56,8 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
     folder = Path(out)
     if not folder.name or folder.name == "..":
         folder = folder.resolve()
+    if not folder.name:
+        raise InputError(f"{folder}: must be a folder in another one, got the root")
     truth = folder.with_name(f"{folder.name}.truth.toml")
     if not folder.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(folder.parent))

@@ -127,7 +127,7 @@ def test_over_two_parameters_rows_and_columns_agree_with_lines() -> None:
         )
 
 
-def test_results_depend_neither_on_threads_nor_on_an_executor_nor_on_parts(
+def test_results_depend_neither_on_threads_nor_on_an_executor(
     line: xr.Dataset, tmp_path: Path
 ) -> None:
     equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, threads=1), line)
@@ -135,10 +135,7 @@ def test_results_depend_neither_on_threads_nor_on_an_executor_nor_on_parts(
         equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, executor=pool), line)
     pytest.importorskip("zarr")
     store = tmp_path / "sweep.zarr"
-    for number in (2, 1):
-        said = pendmap.sweep(DRIVEN, LINE, grid=CELLS, store=store, part=(number, 2))
-        assert not said.variables
-    equal(pendmap.merge(store), line)
+    equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, store=store), line)
     equal(pendmap.sweep(DRIVEN, LINE, grid=CELLS, store=store, resume=True), line)
     with pytest.raises(InputError, match="was begun with grid"):
         pendmap.sweep(DRIVEN, LINE, grid=CELLS + 1, store=store, resume=True)
@@ -326,9 +323,8 @@ def test_values_may_be_any_that_ascend(tmp_path: Path) -> None:
     found = pendmap.sweep(Pendulum(), {"p": np.array(values)}, grid=12, check=False)
     assert found["p"].values.tolist() == values
     assert found["p_bounds"].values[1].tolist() == pytest.approx([0.45, 0.6])
-    pendmap.sweep(Pendulum(), {"p": values[:3]}, grid=12, store=tmp_path / "s.zarr", part=(1, 2))
-    merged = pendmap.merge(tmp_path / "s.zarr")
-    assert merged["fraction"].values.tolist() == found["fraction"].values[:3].tolist()
+    kept = pendmap.sweep(Pendulum(), {"p": values[:3]}, grid=12, store=tmp_path / "s.zarr")
+    assert kept["fraction"].values.tolist() == found["fraction"].values[:3].tolist()
 
 
 def test_two_parameters_may_have_any_values() -> None:

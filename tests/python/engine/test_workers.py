@@ -1,4 +1,4 @@
-"""Tiles computed by processes, clusters and parts: the bits of the plain call."""
+"""Tiles computed by processes and clusters: the bits of the plain call."""
 
 from __future__ import annotations
 
@@ -121,23 +121,6 @@ def test_separate_processes_compute_the_same_bits(tmp_path: Path) -> None:
             tiled.assert_same(kept, plain(name))
 
 
-@pytest.mark.parametrize("name", [*tiled.CASES])
-def test_parts_that_are_merged_are_the_same_bits(tmp_path: Path, name: str) -> None:
-    store = tmp_path / "parts.zarr"
-    for number in (3, 1, 2):
-        told = tiled.CASES[name](store=store, part=(number, 3)).attrs
-        assert (told["part"], told["parts"]) == (number, 3)
-    assert told["tiles_done"] == told["tiles"]
-    tiled.assert_same(pendmap.merge(store), plain(name))
-    tiled.assert_same(pendmap.load(store), plain(name))
-    tiled.assert_same(tiled.CASES[name](store=store, part=(2, 3)), plain(name))
-
-
-def test_a_part_that_was_left_out_is_computed_by_merge(tmp_path: Path) -> None:
-    tiled.CASES["basins"](store=tmp_path / "parts.zarr", part=(2, 4))
-    tiled.assert_same(pendmap.merge(tmp_path / "parts.zarr"), plain("basins"))
-
-
 @pytest.mark.thorough
 def test_workers_that_are_killed_cost_only_their_tiles(tmp_path: Path) -> None:
     over, killed = threading.Event(), []
@@ -192,8 +175,6 @@ def test_an_error_of_a_worker_is_that_of_the_call() -> None:
     ("keep", "said"),
     [
         ({"executor": 3}, "executor must have submit"),
-        ({"part": (3, 2), "store": "x.zarr"}, "part: number must be a whole number from 1 to 2"),
-        ({"part": (1, 2)}, "part must be given with a store"),
         ({"resume": True}, "resume must be given with a store"),
         ({"chunks": {}}, "chunks must be given with a store"),
         ({"store": "no/folder/x.zarr"}, "the folder does not exist"),

@@ -1,12 +1,10 @@
-"""Results by the CF conventions 1.11, their alignment, and files of the format 1."""
+"""Results by the CF conventions 1.11, and their alignment."""
 
 from __future__ import annotations
 
-import gzip
 import re
 import time
 import tomllib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +12,11 @@ import pytest
 import xarray as xr
 
 import pendmap
-from pendmap import Effect, Grid, Pendulum, Rig, render
-from pendmap.charts import parameter_map
-from pendmap.files import facts
+from pendmap import Effect, Grid, Pendulum, Rig
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 SI = Rig(
     w0=6.2,
@@ -192,40 +189,3 @@ def test_the_text_of_the_model_is_a_model_file(tmp_path: Path) -> None:
         text = pendmap.simulate(model, 1.0, 0.0, 1.0).attrs["model"]
         (tmp_path / "again.toml").write_text(text, encoding="utf-8")
         assert pendmap.load_model(tmp_path / "again.toml") == model
-
-
-@pytest.mark.parametrize("kind", ["basins", "parameter_map", "tongues"])
-def test_files_of_the_format_1_are_upgraded(kind: str, tmp_path: Path) -> None:
-    packed = Path(__file__).with_name("version_1") / f"{kind}.nc.gz"
-    file = tmp_path / f"{kind}.nc"
-    file.write_bytes(gzip.decompress(packed.read_bytes()))
-    old, found = stored(file), pendmap.load(file)
-    rig = Rig(w0=6.2, c_over_m=0.6, Tr=0.3, p=1.2, Omega=12.4, notes=NOTES)
-    today = {
-        "basins": lambda: pendmap.basins(SI, Grid.square(8, 6.2)),
-        "parameter_map": lambda: pendmap.parameter_map(rig, PLANE, starts=2, draws=2),
-        "tongues": lambda: pendmap.tongues(BARE, [1.9, 2.0]),
-    }[kind]()
-    assert old.attrs["format_version"] == 1
-    assert found.attrs["format_version"] == 2
-    assert set(found.variables) == set(today.variables)
-    assert set(found.attrs) == set(today.attrs) - {"history"}
-    for name, each in found.variables.items():
-        assert each.dims == today[name].dims, name
-        assert each.attrs.get("units", "1") == today[name].attrs.get("units", "1"), name
-    known = facts(found)
-    renamed = {"doubt_start", "doubt_parameters", "effects", "format_version", "inverted"}
-    renamed |= {"undecided", "failed", "chaos_periods"} if kind == "parameter_map" else set()
-    varied = {"p", "omega", "Omega"} if kind != "basins" else set()
-    for name in set(old.attrs) - renamed - varied - {"coordinates"}:
-        assert known[name] == old.attrs[name], name
-    if kind == "parameter_map":
-        regimes = parameter_map.sets(found)
-        assert [str(kinds).replace("'", '"') for kinds in regimes] == list(
-            old["regime_kinds"].values
-        )
-    if kind == "basins":
-        assert known["model"] == today.attrs["model"]
-    assert render.draw(found, tmp_path / "a.svg").stat().st_size > packed.stat().st_size
-    pendmap.save(found, tmp_path / "again.nc")
-    assert set(pendmap.load(tmp_path / "again.nc").variables) == set(found.variables)

@@ -222,7 +222,7 @@ def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
 
 def test_the_bias_of_a_sensor_has_its_unit(tmp_path: Path) -> None:
     run = read(tmp_path, *rates(release=1.0))
-    report = identify_experiment(Experiment(Path(), (run, run)), methods=["trajectory"])
+    report = identify(Experiment(Path(), (run, run)), methods=["trajectory"])
     for found in (report, report.best):
         units = found.to_dataframe().unit
         assert units["w0"] == units["bias[1]"] == found.unit("bias[0]") == "rad/s"

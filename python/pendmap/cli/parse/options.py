@@ -23,7 +23,6 @@ from pendmap.cli.parse.types import (
     AXIS,
     INSTRUCTION_SET,
     NUMBER,
-    PART,
     PICTURES,
     TEXT,
     output_file,
@@ -207,14 +206,6 @@ search_options = added(
 
 store_options = added(
     flag("--resume", "Go on with the unfinished run in --out F.zarr.", group=LONG),
-    option(
-        "--part",
-        PART,
-        "Compute part K of N of the tiles of --out F.zarr; pendmap merge completes it.",
-        metavar="K/N",
-        group=LONG,
-    ),
-    flag("--mix", "Go on with a store begun where numbers are rounded otherwise.", group=LONG),
 )
 """Options of analyses that are kept in a store."""
 worker_options = added(

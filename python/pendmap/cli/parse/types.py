@@ -7,12 +7,12 @@ import importlib
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
-from pendmap.errors import MOST_CELLS, MOST_PARTS, InputError, MissingExtraError, short_repr
+from pendmap.errors import MOST_CELLS, InputError, MissingExtraError, short_repr
 from pendmap.files import check_room
 
 if TYPE_CHECKING:
@@ -168,8 +168,8 @@ def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
     """Return the type of files to write, and of stores at an address."""
 
     def read(text: str) -> Path | Address:
-        if "://" not in text:
-            return _output(suffixes, text)
+        if text.startswith("file://") or "://" not in text:
+            return _output(suffixes, text.removeprefix("file://"))
         if not text.lower().rstrip("/").endswith(".zarr"):
             raise InputError(f"{text!r}: suffix of an address must be .zarr")
         _import_library(text, ".zarr")
@@ -250,13 +250,13 @@ _LIBRARIES = {
 """Module that a suffix needs, imported before anything is computed, and its package."""
 
 
-def _part(text: str) -> tuple[int, int]:
-    """Read the number of a part and of all parts."""
-    match = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text.strip())
-    number, parts = map(int, match.groups()) if match else (0, 0)
-    if not 1 <= number <= parts <= MOST_PARTS:
-        raise InputError(f"must be K/N with K from 1 to N, like 7/64, got {short_repr(text)}")
-    return number, parts
+class _File(click.Path):
+    """A path, which may be written as ``file://`` and the path."""
+
+    def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
+        """Return the path."""
+        plain = value.removeprefix("file://") if isinstance(value, str) else value
+        return super().convert(plain, *words)
 
 
 def _effects() -> Iterable[str]:
@@ -271,14 +271,13 @@ def _methods() -> Iterable[str]:
     return METHODS
 
 
-FILE: click.Path = click.Path(path_type=Path)
+FILE = _File(path_type=Path)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
 RANGE = OptionType("A:B:N", _range)
 NUMBER_OR_RANGE = OptionType[float | AxisText](
     "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
 )
-PART = OptionType("K/N", _part)
 TEXT = OptionType("text", str)
 EFFECT = OptionType("name", str, _effects)
 METHOD = OptionType("name", str, _methods)

@@ -1,0 +1,103 @@
+"""Stores that were damaged: never a wrong number, never a traceback."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+
+import pendmap
+import tiled
+from pendmap import Grid, InputError, Pendulum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import xarray as xr
+
+MODEL = Pendulum(gamma=0.2, p=0.6)
+RUN = partial(pendmap.basins, MODEL, Grid.square(20), check=False)
+
+
+def deleted(file: Path, _: random.Random) -> None:
+    file.unlink()
+
+
+def emptied(file: Path, _: random.Random) -> None:
+    file.write_bytes(b"")
+
+
+def truncated(file: Path, draw: random.Random) -> None:
+    file.write_bytes(file.read_bytes()[: draw.randrange(file.stat().st_size)])
+
+
+def flipped(file: Path, draw: random.Random) -> None:
+    data = bytearray(file.read_bytes())
+    data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+    file.write_bytes(bytes(data))
+
+
+DAMAGES = (deleted, emptied, truncated, flipped)
+
+
+@pytest.fixture(autouse=True)
+def _tiny_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pendmap.analysis.basins.TILE", 100)
+
+
+def same_or_refused(call: Callable[[], xr.Dataset], truth: xr.Dataset) -> bool:
+    """Assert that a call returns a result or refuses it; return whether it does."""
+    try:
+        result = call()
+    except InputError:
+        return False
+    tiled.assert_same(result, truth)
+    return True
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_result_is_refused(damage: Callable[..., None], tmp_path: Path) -> None:
+    truth, draw = RUN(store=tmp_path / "whole.zarr").load(), random.Random(damage.__name__)  # noqa: S311
+    files = sorted(file for file in (tmp_path / "whole.zarr").rglob("*") if file.is_file())
+    for file in draw.sample(files, 12):
+        store = tmp_path / "map.zarr"
+        shutil.copytree(tmp_path / "whole.zarr", store)
+        damage(store / file.relative_to(tmp_path / "whole.zarr"), draw)
+        loaded = same_or_refused(lambda: pendmap.load(store), truth)  # noqa: B023
+        resumed = same_or_refused(lambda: RUN(store=store, resume=True), truth)  # noqa: B023
+        assert loaded == resumed, file
+        assert not loaded or file.suffix == ".json", file
+        shutil.rmtree(store)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_run_goes_on_or_is_refused(damage: Callable[..., None], tmp_path: Path) -> None:
+    truth, draw = RUN(), random.Random(damage.__name__)  # noqa: S311
+    tiled.begun(RUN, tmp_path / "begun.zarr", 0.6)
+    begun = tmp_path / "begun.zarr.part"
+    files = sorted(file for file in begun.rglob("*") if file.is_file())
+    for file in draw.sample(files, 5):
+        store = tmp_path / "map.zarr"
+        shutil.copytree(begun, f"{store}.part")
+        damage(tmp_path / "map.zarr.part" / file.relative_to(begun), draw)
+        whole = same_or_refused(lambda: RUN(store=store, resume=True), truth)  # noqa: B023
+        assert whole or file.parent == begun, file
+        for left in tmp_path.glob("map.zarr*"):
+            shutil.rmtree(left)
+
+
+def test_a_file_of_another_is_kept(tmp_path: Path) -> None:
+    store, truth = tmp_path / "map.zarr", RUN()
+    tiled.begun(RUN, store, 0.6)
+    files = [tmp_path / "map.zarr.part" / name for name in ("notes.txt", "mine.partial")]
+    for file in files:
+        file.write_text("mine")
+    tiled.assert_same(RUN(store=store, resume=True), truth)
+    assert [store.joinpath(file.name).read_text() for file in files] == ["mine"] * 2
+    tiled.assert_same(pendmap.load(store), truth)
+    with pytest.raises(InputError, match=r"it contains '.*', no part of a result"):
+        RUN(store=store)
