@@ -212,8 +212,9 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         check_regular(source)
     try:
         stored = isinstance(source, str) or suffix == ".zarr"
-        (_check_complete if stored else check_alone)(source)
+        check: Any = _check_complete if stored else check_alone
         read: Any = open_zarr if stored else _NETCDF
+        check(source)
         with _ONE, read(source) as opened:
             _check_result(opened, source)
             dataset = restored(opened.load())
