@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use pendmap::attractor::Catalogue;
 use pendmap::attractor::capture::{Fate, outcomes};
-use pendmap::attractor::trap::Ellipse;
+use pendmap::attractor::trap::{Band, Ellipse};
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::{State, Strobe};
 use pendmap::model::Pendulum;
@@ -169,4 +169,69 @@ fn a_band_holds_the_running_state() {
             assert!(off < 5e-3, "{pendulum:?}: {start:?} to {end:?}, {off:e} off");
         }
     }
+}
+
+/// States in a band, spread over its width and along both edges.
+fn within(band: &Band) -> Vec<State> {
+    let state = |k: u32| {
+        let k = f64::from(k);
+        let theta = TAU * ((k * 0.618_033_988_749_895).fract() - 0.5);
+        let side = 2.0 * (k * 0.754_877_666_246_693).fract() - 1.0;
+        let side = if k < 200.0 { 0.999 * side.signum() } else { side };
+        [theta, band.at(theta) + side * band.half_width]
+    };
+    (0..400).map(state).collect()
+}
+
+#[test]
+fn a_trap_holds_no_other_attractor() {
+    // Pendulums with a torque near the saddle-node of rest, or anywhere, undriven or weakly driven.
+    let mut seen = [0; 2];
+    for k in 1..=48_u32 {
+        let draw = |ratio: f64| (0.5 + f64::from(k) * ratio).fract();
+        let gamma = 0.05 * 30_f64.powf(draw(0.819_172_513_396_164_4));
+        let near =
+            1.0 - 10_f64.powf(-1.0 - 3.5 * draw(0.671_043_606_703_789_2)) * draw(0.237).signum();
+        let size = if k % 3 == 0 { 1.2 * draw(0.549_700_477_901_970_3) } else { near };
+        let torque = if k % 2 == 0 { size } else { -size };
+        let p = [0.0, 0.0, 0.001, 0.01, 0.1, 0.5][k as usize % 6];
+        let omega = 1.0 + 2.0 * draw(0.450_299_522_098_029_7);
+        let mut pendulum = Pendulum::new(gamma, p, omega, 0.3, torque).expect("in range");
+        if k % 5 == 0 {
+            pendulum = pendulum.with_friction(0.002).expect("in range");
+        }
+        let (strobe, catalogue) = searched(&pendulum, &plane(100), simd());
+        let fine = fine_strobe(&pendulum, 2 * strobe.steps(), simd());
+        let periods = 300 + (60.0 / (gamma * pendulum.period())) as usize;
+        for band in &catalogue.traps.bands {
+            seen[0] += 1;
+            let states = within(band);
+            for (start, end) in states.iter().zip(advanced(&fine, &states, periods)) {
+                let off = band.distance(end);
+                assert!(off < 0.01, "{pendulum:?}: band {}, {start:?} to {end:?}", band.half_width);
+            }
+        }
+        for ellipse in &catalogue.traps.ellipses {
+            seen[1] += 1;
+            let attractor = &catalogue.attractors[ellipse.attractor];
+            let slowest = -attractor.exponent * pendulum.period();
+            let n = attractor.n.expect("a cycle");
+            let periods = (300 + (30.0 / slowest) as usize).min(200_000).next_multiple_of(n);
+            let states = inside(ellipse);
+            for (start, end) in states.iter().zip(advanced(&fine, &states, periods)) {
+                let height = ellipse.height([end[0], end[1]]).min(
+                    [-TAU, TAU]
+                        .map(|turn| ellipse.height([end[0] + turn, end[1]]))
+                        .into_iter()
+                        .fold(f64::INFINITY, f64::min),
+                );
+                assert!(
+                    height < 0.01,
+                    "{pendulum:?}: {} from {start:?} to {end:?}",
+                    attractor.name
+                );
+            }
+        }
+    }
+    assert!(seen[0] > 8 && seen[1] > 24, "{seen:?}");
 }
