@@ -323,8 +323,7 @@ impl Band {
             // Lengths agree, so this cannot fail.
             let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, RETURNS);
             let far = theta.iter().zip(&velocity).map(|(theta, v)| self.distance([*theta, *v]));
-            // False too of what is not a number.
-            let far = far.filter(|distance| !(*distance < near));
+            let far = far.filter(|distance| distance.is_nan() || *distance >= near);
             elsewhere = far.min_by(f64::total_cmp);
             elsewhere?;
         }
