@@ -29,8 +29,8 @@ from pendmap.records import Experiment, Run
 from pendmap.residuals.by_run import RunByRun, parameters_by_run
 
 if TYPE_CHECKING:
+    from pendmap.diagnosis import NamedEffect
     from pendmap.diagnosis.fitted_model import FittedModel
-    from pendmap.diagnosis.named import NamedEffect
 
 CHANCE, SURE = Thresholds().rest, Thresholds().sure
 
