@@ -219,7 +219,7 @@ def model_of(points: list[float], *, twin: int = 0) -> Mapped:
 def job(*counts: int) -> SweepTiles:
     names = ("p", "omega")[: len(counts)]
     spans = tuple(
-        (name, np.linspace(1.0, 2.0, n).tolist()) for name, n in zip(names, counts, strict=True)
+        [(name, np.linspace(1.0, 2.0, n).tolist())] for name, n in zip(names, counts, strict=True)
     )
     return SweepTiles(DRIVEN, spans, ((-3, 3, 5), (-3, 3, 5)), {}, 1)  # type: ignore[typeddict-item]
 

@@ -8,8 +8,8 @@ import pytest
 from pendmap import Grid, Pendulum, _core
 from pendmap.analysis.cell_search import spread
 
-P = ("p", np.linspace(0.2, 1.2, 19).tolist())
-OMEGA = ("omega", np.linspace(1.7, 2.2, 17).tolist())
+P = [("p", np.linspace(0.2, 1.2, 19).tolist())]
+OMEGA = [("omega", np.linspace(1.7, 2.2, 17).tolist())]
 EACH = 2
 STARTS = spread(Grid.square(100), 61 * EACH)
 
@@ -27,7 +27,9 @@ def arrays(found: object) -> dict[str, object]:
     }
 
 
-def computed(model: Pendulum, *axes: tuple[str, list[float]]) -> tuple[_core.Survey, list[bytes]]:
+def computed(
+    model: Pendulum, *axes: list[tuple[str, list[float]]]
+) -> tuple[_core.Survey, list[bytes]]:
     """Return a survey and its blocks, every call with a survey of its own, last block first."""
     first = _core.Survey(model, axes, *STARTS, EACH, 1e-6, None, 1)
     same = lambda: _core.Survey(model, axes, *STARTS, EACH, 1e-6, None, 1, first.state)  # noqa: E731
