@@ -83,7 +83,10 @@ def test_a_complete_store_is_replaced_only_on_request(pendmap_command: Run, tmp_
         assert pendmap_command(*words).returncode == 0
         refused = pendmap_command(*words)
         assert refused.returncode == 2
-        assert f"{store.removeprefix('file://')!r}: must be a new file, got one that exists" in refused.stderr
+        assert (
+            f"{store.removeprefix('file://')!r}: must be a new file, got one that exists"
+            in refused.stderr
+        )
         for option in ("--resume", "--overwrite", "--dry-run"):
             run = pendmap_command(*words, option)
             assert run.returncode == 0, run.stderr
