@@ -1,6 +1,7 @@
 """Computations in tiles: where their results are kept, and who computes them."""
 
 from pendmap.engine.executors import executor_of
+from pendmap.engine.lock import held
 from pendmap.engine.store import Layout, MemoryStore, Store, pack, unpack
 from pendmap.engine.work import Job, Tile, Work, rounding
 from pendmap.engine.zarr_store import ZarrStore
@@ -14,6 +15,7 @@ __all__ = [
     "Work",
     "ZarrStore",
     "executor_of",
+    "held",
     "pack",
     "rounding",
     "unpack",

@@ -155,7 +155,7 @@ class _Lease:
                 return
             left = _EXPIRES - (time.time() - record.get("renewed", 0.0))
             if left > 0:
-                raise _refused(self._name, data, f"{left:.0f} s more if it does not live")
+                raise _refused(self._name, data, f"{round(left)} s more if it does not live")
             self._system.rm_file(self._path)
         raise InputError(f"{self._name}: other runs take the store at the same moment")
 

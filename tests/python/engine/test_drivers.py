@@ -19,7 +19,7 @@ import tiled
 from conftest import HERE
 from interrupted import any_file, started, until
 from pendmap import InputError
-from pendmap.engine import lock
+from pendmap.engine import held
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,7 +78,7 @@ def test_threads_are_runs_too(tmp_path: Path) -> None:
 
 HOLDER = """
 import os, sys, time, fsspec
-from pendmap.engine.lock import held
+from pendmap.engine import held
 with held("a", fsspec.filesystem("file"), sys.argv[1], local=True):
     if child := os.fork():
         print(child, flush=True)
@@ -93,26 +93,26 @@ def test_a_child_that_outlives_its_run_holds_nothing(tmp_path: Path) -> None:
         child = int(process.stdout.readline())
         process.kill()
         process.wait(60)
-        with lock.held("a", fsspec.filesystem("file"), words[-1], local=True):
+        with held("a", fsspec.filesystem("file"), words[-1], local=True):
             os.kill(child, signal.SIGKILL)
 
 
 def test_a_lease_ends_with_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that was stopped for long holds the store no more, and removes nothing."""
-    monkeypatch.setattr(lock, "_EXPIRES", 0.4)
+    monkeypatch.setattr("pendmap.engine.lock._EXPIRES", 0.4)
     system, path = fsspec.filesystem("memory"), "/m.zarr.lock"
-    with lock.held("memory://m.zarr", system, path, local=False) as check:
+    with held("memory://m.zarr", system, path, local=False) as check:
         time.sleep(1.0)
         check()  # it has been renewed
         with (
             pytest.raises(InputError, match="is held by a run, process"),
-            lock.held("memory://m.zarr", system, path, local=False),
+            held("memory://m.zarr", system, path, local=False),
         ):
             pass
         with monkeypatch.context() as patch:
-            patch.setattr(lock._Lease, "_mine", lambda _: False)  # noqa: SLF001 (as if stopped)
+            patch.setattr("pendmap.engine.lock._Lease._mine", lambda _: False)  # as if stopped
             time.sleep(1.0)
-        with lock.held("memory://m.zarr", system, path, local=False) as other:
+        with held("memory://m.zarr", system, path, local=False) as other:
             with pytest.raises(OSError, match="this run was stopped for long"):
                 check()
             other()
