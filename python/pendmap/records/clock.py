@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import counted, listed, moment
+from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
 from pendmap.records.noise import fastest
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
 from pendmap.signal.local_polynomial import even_weights
@@ -186,8 +186,8 @@ def _coarse(work: Work) -> None:
     work.clock_stderr = even.stderr / even.interval
     text = f"stamps in ticks of {tick:.3g} s: the readings are spread evenly"
     if even.missed <= even.interval:
-        rate, error = 1 / even.interval, work.clock_stderr / even.interval
-        work.report("time-coarse", f"{text}, {rate:.7g} +- {error:.1g} Hz", mended=True)
+        rate = Estimate(1 / even.interval, work.clock_stderr / even.interval)
+        work.report("time-coarse", f"{text}, {estimate_text(rate)} Hz", mended=True)
         work.time = even.times
         return
     work.report("time-coarse", f"{text} over each tick, no rate fits all", mended=True)
