@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pendmap.diagnosis.diagnose import diagnose, diagnosed_model
-from pendmap.diagnosis.functions import FunctionScore, TorqueFunction
 from pendmap.diagnosis.named import NamedEffect
 from pendmap.diagnosis.result import Discrepancy
 from pendmap.diagnosis.thresholds import Thresholds
 
 __all__ = [
     "Discrepancy",
-    "FunctionScore",
     "NamedEffect",
     "Thresholds",
-    "TorqueFunction",
     "diagnose",
     "diagnosed_model",
 ]

@@ -177,6 +177,8 @@ def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
     Raises InputError if one is not a Formula, is given twice, or is not proportional to its first
     parameter.
     """
+    if not isinstance(effects, list | tuple):
+        raise InputError(f"effects must be a list of Formula, got {short_repr(effects)}")
     formulas = []
     for effect in effects:
         if not isinstance(effect, Formula):

@@ -12,7 +12,6 @@ from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.functions import check_functions, score_functions, separate_functions
 from pendmap.diagnosis.named import name_effects
 from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
 from pendmap.diagnosis.scores import Scores
@@ -31,7 +30,6 @@ from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
 
-    from pendmap.diagnosis.functions import TorqueFunction
     from pendmap.model import Formula, Rig
     from pendmap.records import Experiment
     from pendmap.records.read import Records
@@ -45,7 +43,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     model: Rig | None = None,
     max_effects: int = MOST_EFFECTS,
     without: Collection[str] = (),
-    effects: Collection[Formula | TorqueFunction] = (),
+    effects: Sequence[Formula] = (),
     thresholds: Thresholds | None = None,
     rate_hz: float | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -66,9 +64,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         Most effects that are added; the sensor's zero is not included.
     without : collection of str
         Effects excluded from the candidates.
-    effects : collection of Formula and TorqueFunction
-        Further candidates: formulas are treated like the library's effects, Python functions to
-        first order.
+    effects : sequence of Formula
+        Further candidates, treated like the library's effects.
     thresholds : Thresholds, optional
         Thresholds of all decisions.
     rate_hz : float, optional
@@ -104,11 +101,9 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     ('named', ['quadratic_drag'])
     """
     experiment = experiment_of(records, rate_hz=rate_hz)
-    functions, others = separate_functions(effects)
-    own = checked_own(others)
+    own = checked_own(effects)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
-    check_functions(data.runs, functions)
     with _refuse_divergence(experiment):
         base, core = fit_baseline(data, model, without)
     # Windows are as long as those over which the baseline followed the runs.
@@ -170,12 +165,6 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         tuple(without),
         max_effects,
         own,
-        compute_part(
-            reasons,
-            "functions",
-            lambda: score_functions(data, begin.fitted, best.fitted, functions),
-            (),
-        ),
         reasons,
     )
 

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.replay import Reasons
     from pendmap.diagnosis.candidates import Candidate
-    from pendmap.diagnosis.functions import FunctionScore
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
@@ -91,7 +90,6 @@ class Discrepancy(FitResult):
     without: tuple[str, ...] = ()  # Effects excluded from the candidates
     most: int = MOST_EFFECTS  # Most effects that could be added
     own: tuple[Formula, ...] = ()  # The user's own formulas among the candidates
-    functions: tuple[FunctionScore, ...] = ()  # Scores of the user's Python functions
     # Reasons for parts that were not computed, by field of the JSON; see ``not_computed``.
     reasons: Reasons = dataclasses.field(default_factory=dict)
 
@@ -324,11 +322,6 @@ def as_text(found: Discrepancy) -> Iterator[str]:
         yield (
             f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
-        )
-    for score in found.functions:
-        yield (
-            f"Function {score.name}, to first order: {score.size:.3g} +- {score.stderr:.2g} times "
-            f"it, G = {score.gain:.1f}; {score.left:.1f} in addition to the effects found"
         )
     yield from _further(found)
     yield from finding_lines(found.data.experiment, *runs)

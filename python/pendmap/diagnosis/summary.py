@@ -102,9 +102,6 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             for name, pairs in found.runs.coefficients.items()
         },
         "ranking": ranking(found),
-        "functions": None
-        if "functions" in unknown
-        else [dataclasses.asdict(score) for score in found.functions],
         "not_computed": unknown,
         "attempts": [dataclasses.asdict(attempt) for attempt in found.attempts],
         "findings": [one.text for _, one in found.data.experiment.findings_of(found.data.runs)],

@@ -14,7 +14,7 @@ from pendmap.files import read_toml
 from pendmap.model.effects import Effect, EffectDefinition
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 
 _DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
@@ -154,49 +154,6 @@ class Formula:
     def __call__(self, **parameters: float) -> Effect:
         """Return the effect with values for its parameters."""
         return Effect(self.name, parameters, formula=self)
-
-    @classmethod
-    def of(
-        cls, function: Callable[..., Any], parameters: Mapping[str, Any], *, name: str | None = None
-    ) -> Formula:
-        """Return the formula that a Python function computes.
-
-        The function is traced: called once with symbols in place of numbers. The resulting term
-        runs compiled, also in maps.
-
-        Parameters
-        ----------
-        function : callable
-            ``function(theta, v, t, phase, parameters)`` of arrays and a mapping of numbers; it
-            returns the torque per moment of inertia, by arithmetic and functions of numpy.
-        parameters : mapping
-            Those of :class:`Formula`.
-        name : str, optional
-            By default the function's.
-
-        Raises
-        ------
-        InputError
-            If the function branches on values, looks up a table, or does something else that no
-            formula has; or the formula is one that :class:`Formula` refuses.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> def root_drag(theta, v, t, phase, parameters):
-        ...     return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
-        >>> Formula.of(root_drag, {"k": 1.5}).term
-        '-k*sqrt(abs(v))*sign(v)'
-        """
-        from pendmap.model.traced import term_of  # noqa: PLC0415 (it loads numpy)
-
-        called = str(getattr(function, "__name__", "")) if name is None else name
-        if not callable(function):
-            shown = short_repr(function)
-            raise InputError(f"function must be a function of five arguments, got {shown}")
-        if not isinstance(parameters, Mapping):
-            return cls(called, "0", parameters)  # which raises
-        return cls(called, term_of(function, parameters, called), parameters)
 
     @property
     def table(self) -> dict[str, Any]:

@@ -223,24 +223,6 @@ def ranked(found: Discrepancy) -> Iterator[str | Picture]:
     head, rows = ranking_table(found)
     yield table(head, [(code(row[0]), *map(plain, row[1:])) for row in rows], words=("shape",))
     yield Picture("ranking", "Scores of the candidates at the baseline.")
-    if found.functions:
-        yield (
-            "Python functions that were tried: to first order only, and never refitted or named. "
-            "G is the fall of the sum of squares by the function at the baseline, and then in "
-            "addition to the effects found, if there are any:"
-        )
-        scores = [
-            (
-                code(score.name),
-                stated(score.size, score.stderr) if math.isfinite(score.size) else "undetectable",
-                gained(score.gain),
-                gained(score.left),
-            )
-            for score in found.functions
-        ]
-        yield table(
-            ("function", "times its torque", "score G", "G beyond the effects found"), scores
-        )
     for each in found.assessment.identified:
         yield from _alternatives(found, each)
 

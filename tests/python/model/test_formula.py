@@ -6,7 +6,6 @@ import json
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 import pendmap
@@ -23,7 +22,6 @@ from pendmap import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     from conftest import Run
@@ -170,48 +168,3 @@ def test_maps_refuse_torques_that_do_not_repeat() -> None:
     with pytest.raises(InputError, match="uneven can be in one trajectory, not in maps"):
         pendmap.basins(Pendulum(effects=(uneven(k=0.1),)), pendmap.Grid.square(10))
     assert pendmap.simulate(Pendulum(effects=(uneven(k=0.1),)), 1.0, 0.0, until=1.0) is not None
-
-
-# ruff: noqa: ARG001, ARG005 (each function takes all arguments of a torque)
-def _drag(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
-    return -parameters["k"] * np.sqrt(np.abs(v)) * np.sign(v)
-
-
-def _mixed(theta: Any, v: Any, t: Any, phase: Any, parameters: Any) -> Any:  # noqa: ANN401
-    k = parameters["k"]
-    return k * (np.cos(2 * (theta - 1)) ** 2 - np.tanh(-np.sin(theta) / 0.3)) - 0.1 * -k * (
-        np.maximum(np.sin(phase), 0.0) - 2 ** (-np.cos(theta))
-    ) / np.square(3 - np.sin(theta))
-
-
-@pytest.mark.parametrize(("function", "power"), [(_drag, 1.5), (_mixed, 2.0)])
-def test_a_function_is_read_as_the_formula_it_computes(
-    function: Callable[..., Any], power: float
-) -> None:
-    formula = Formula.of(function, {"k": power}, name="mine")
-    pendulum = Pendulum(gamma=0.0, p=0.0, omega=1.7, effects=(formula(k=0.1),))
-    rng = np.random.default_rng(5)
-    for theta, v in zip(rng.uniform(-3, 3, 40), rng.uniform(-3, 3, 40), strict=True):
-        # The first instants of a trajectory show its acceleration.
-        path = pendmap.simulate(pendulum, theta, v, until=2e-3, samples=3)
-        seen = (float(path.velocity[-1]) - float(path.velocity[0])) / 2e-3
-        own = -np.sin(theta) + function(theta, v, 0.0, 0.0, {"k": 0.1})
-        assert seen == pytest.approx(own, abs=2e-2 * (1 + abs(v)))
-    assert formula.term.count("k") >= 1
-
-
-@pytest.mark.parametrize(
-    ("function", "said"),
-    [
-        (lambda th, v, t, ph, p: p["k"] if v > 0 else 0.0, "numpy.greater, which no formula has"),
-        (lambda th, v, t, ph, p: p["k"] * np.interp(th, [0, 1], [0, 1]), "numpy.interp"),
-        (lambda th, v, t, ph, p: p["q"] * v, "must ask for parameters among k, got 'q'"),
-        (lambda th, v, t, ph, p: p["k"] * th.foo, "fails with AttributeError"),
-        (lambda th, v: v, "fails with TypeError"),
-        (lambda th, v, t, ph, p: None, "the value None"),
-    ],
-)
-def test_functions_that_are_no_formula_are_refused(function: Callable[..., Any], said: str) -> None:
-    with pytest.raises(InputError, match=said) as caught:
-        Formula.of(function, {"k": 2}, name="mine")
-    assert str(caught.value).count("\n") == 0

@@ -18,7 +18,7 @@ from matplotlib import rc_context
 from hidden import once
 from pendmap import InputError, render, report
 from pendmap.charts import diagnosis
-from pendmap.diagnosis import FunctionScore, Thresholds
+from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.summary import as_json
 from pendmap.render import drawing, style
 from pendmap.render.report import figures
@@ -176,18 +176,6 @@ def test_numbers_have_one_format_and_errors_two_digits() -> None:
         "99.5 %",
         "above 99.9 %",
     ]
-
-
-def test_scores_of_python_functions_are_reported() -> None:
-    scores = (
-        FunctionScore("table", 0.2, 0.013, 81.2, 0.4),
-        FunctionScore("flat", math.nan, math.nan, 0.0, 0.0),
-    )
-    text = report.as_markdown(
-        report.diagnosis(dataclasses.replace(once("quadratic_drag"), functions=scores)), {}
-    )
-    assert "| `table` | 0.200 \N{PLUS-MINUS SIGN} 0.013 | 81.2 | 0.4 |" in text
-    assert "| `flat` | undetectable | 0 | 0 |" in text
 
 
 @pytest.mark.parametrize("size", [1.0, -1.0])
