@@ -57,7 +57,7 @@ def test_a_netcdf_that_leads_to_another_file_is_not_opened(
     file = tmp_path / "a.nc"
     file.write_bytes(zlib.decompress(base64.b85decode(LEADING[name])))
     monkeypatch.setattr(netCDF4, "Dataset", lambda *_, **__: pytest.fail("it was opened"))
-    with pytest.raises(InputError, match="must have all its data in it, it refers to other files"):
+    with pytest.raises(InputError, match="cannot be read: it refers to other files"):
         pendmap.load(file)
 
 
