@@ -37,10 +37,7 @@ def check_alone(path: Path) -> None:
             raise InputError(f"{path}: cannot be read as a result of pendmap: it is no NetCDF file")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             if _refers(data):
-                raise InputError(
-                    f"{path}: cannot be read: it refers to other files, or is damaged; it must have all "
-                    "its data in it"
-                )
+                raise InputError(f"{path}: cannot be read: it refers to other files or is damaged")
 
 
 def _refers(data: mmap.mmap) -> bool:
