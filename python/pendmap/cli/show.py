@@ -355,12 +355,15 @@ class Written(list[str]):
             say("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
-        """Raise an error if a file was refused, or could not be written to the disk."""
-        if self.refused:
+        """Raise an error if a file was refused, or could not be written to the disk.
+
+        Input is bad only where nothing of the result is written.
+        """
+        if self.refused and not self:
             raise self.refused[0]
-        if self.missed:
+        if missed := [*map(str, self.refused), *self.missed]:
             complete = ", ".join(self) or "nothing"
-            raise NotWrittenError(f"{'; '.join(self.missed)}; written: {complete}")
+            raise NotWrittenError(f"{'; '.join(missed)}; written: {complete}")
 
 
 def write_all(files: Iterable[tuple[Write, Path]], *, keep: bool = False) -> Written:

@@ -137,9 +137,10 @@ class IdentificationReport(FitResult):
         first = next(iter(self.methods.values()))
         reasons = "; ".join(first.warnings)
         if not first.converged:
+            more = "" if first.applicable else f": {reasons}"
             raise NotFittedError(
-                f"{self.run.name}: must be the record of a free decay, got one to which "
-                f"{first.method} did not converge{'' if first.applicable else f': {reasons}'}"
+                f"{self.run.name}: must be the record of a free decay, got one on which the fit of "
+                f"the {first.method} did not converge{more}"
             )
         if self.asked:
             names = ", ".join(self.asked)
