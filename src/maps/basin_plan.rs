@@ -146,7 +146,7 @@ impl Plan {
         }
         let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
         let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, simd)?;
-        let searched = search_periods(pendulum, options.max_periods);
+        let searched = search_periods(&strobe, options.max_periods);
         let mut catalogue = known.map_or_else(
             || Catalogue::new(&strobe, Effort::THOROUGH),
             |known| known.catalogue.continued(&strobe, searched, control.flag()),
@@ -254,7 +254,7 @@ impl Plan {
         }
         self.facts.further += 1;
         let before: Vec<[u64; 2]> = self.catalogue.attractors.iter().map(Attractor::mark).collect();
-        let searched = search_periods(&self.strobe.pendulum, self.facts.given);
+        let searched = search_periods(&self.strobe, self.facts.given);
         self.catalogue.progress = control.shared();
         if self.catalogue.search(&self.strobe, open, searched, control.flag()) {
             self.facts.bound = self.settling_bound().max(self.facts.bound);
@@ -298,7 +298,7 @@ impl Plan {
     /// Periods without capture after which a trajectory is classified as chaotic.
     #[must_use]
     pub fn chaos_bound(&self) -> u32 {
-        chaos_periods(&self.strobe.pendulum, self.facts.given)
+        chaos_periods(&self.strobe, self.facts.given)
     }
 
     /// Periods after which starts that are undecided at first are so at last, with the attractors known by now.
@@ -315,7 +315,7 @@ impl Plan {
             most
         } else if self.catalogue.longest_settle == 0 {
             // There are several chaotic sets only: no settling time to derive a bound from.
-            search_periods(&self.strobe.pendulum, None)
+            search_periods(&self.strobe, None)
         } else {
             (PATIENCE * self.catalogue.longest_settle).clamp(LEAST_BOUND, most)
         }

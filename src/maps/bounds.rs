@@ -4,6 +4,7 @@
 //! motion by some power of e, within limits.
 
 use crate::attractor::Effort;
+use crate::integrate::Strobe;
 use crate::model::Pendulum;
 
 /// Least bound of a start, in periods: resonances and transient chaos last as long under strong damping.
@@ -16,6 +17,8 @@ const DECAY: f64 = 200.0;
 const CELL: (f64, f64) = (40.0, 64.0);
 /// Part of a start's bound after which a search begins to observe uncaptured trajectories.
 const SEARCHED: u32 = 4;
+/// Integration steps of a search at least, where a period has many: steps measure the motion's own time.
+const LEAST_STEPS: u32 = 1_000_000;
 
 /// Periods in which damping shrinks a free motion by `exp(-decay)`, `2 decay / (gamma T)`, within limits.
 ///
@@ -56,15 +59,17 @@ pub fn settling_periods(pendulum: &Pendulum, rate: Option<f64>) -> u32 {
 }
 
 /// Periods after which a search begins to observe uncaptured trajectories. A bound `given` for the starts is one for
-/// the search too, which no bound makes shorter than usual damping does: what is called chaos is watched for as long.
+/// the search too, which no bound makes shorter than usual damping does, or than a million integration steps: what
+/// is called chaos is watched for as long.
 #[must_use]
-pub fn search_periods(pendulum: &Pendulum, given: Option<u32>) -> u32 {
-    let most = given.map_or(u32::MAX, |given| given.max(LEAST / SEARCHED));
-    (max_periods(pendulum) / SEARCHED).min(most)
+pub fn search_periods(strobe: &Strobe, given: Option<u32>) -> u32 {
+    let least = (LEAST / SEARCHED).min(LEAST_STEPS / strobe.steps() as u32).max(1);
+    let most = given.map_or(u32::MAX, |given| given.max(least));
+    (max_periods(&strobe.pendulum) / SEARCHED).min(most)
 }
 
 /// Periods without capture after which a trajectory is classified as chaotic.
 #[must_use]
-pub fn chaos_periods(pendulum: &Pendulum, given: Option<u32>) -> u32 {
-    search_periods(pendulum, given) * (1 + Effort::THOROUGH.watch)
+pub fn chaos_periods(strobe: &Strobe, given: Option<u32>) -> u32 {
+    search_periods(strobe, given) * (1 + Effort::THOROUGH.watch)
 }

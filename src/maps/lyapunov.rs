@@ -131,7 +131,7 @@ pub fn lyapunov(
         lost: 0,
         growth: Vec::new(),
         bound,
-        chaos_bound: chaos_periods(pendulum, request.max_periods),
+        chaos_bound: chaos_periods(&strobe, request.max_periods),
         steps: strobe.steps(),
         reached_error,
         simd,
@@ -163,7 +163,7 @@ impl Run<'_> {
         result: &mut Exponent,
     ) -> Result<(), Error> {
         let pendulum = &self.strobe.pendulum;
-        let searched = search_periods(pendulum, max_periods);
+        let searched = search_periods(self.strobe, max_periods);
         let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
         catalogue.progress = self.control.shared();
         catalogue.search(self.strobe, seeds, searched, self.control.flag());
@@ -270,7 +270,7 @@ impl Run<'_> {
             .map(|(_, end)| *end)
             .collect();
         if !suspects.is_empty() {
-            let searched = search_periods(&self.strobe.pendulum, None);
+            let searched = search_periods(self.strobe, None);
             catalogue.search(self.strobe, &suspects, searched, self.control.flag());
         }
         let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());

@@ -249,8 +249,13 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _check_complete(source: Path | str) -> None:
-    if sealed.checked(source)[0]["complete"] is not True:
+    mark, arrays = sealed.checked(source)
+    if mark["complete"] is not True:
         raise InputError(f"{source}: {_UNFINISHED}")
+    for name, array in arrays.items():
+        if (count := math.prod(sealed.counts(array))) > sealed.MOST_CHUNKS:
+            wanted = f"must have at most {sealed.MOST_CHUNKS} chunks, got {count}"
+            raise InputError(f"{source}: {name} {wanted}")
 
 
 def _check_result(dataset: xr.Dataset, source: Path | str) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import itertools
 import json
 import os
 import re
@@ -36,6 +35,7 @@ GROUP: Final = b'{"zarr_format": 3, "node_type": "group", "attributes": {}}'
 _DIGEST: Final = "sha256"  # Entry of the mark
 _CODECS: Final = frozenset(("bytes", "crc32c", "vlen-utf8", "zstd"))
 _REMAINS: Final = re.compile(r".*\.[0-9a-f]{32}\.part(ial)?")  # Files of killed writers
+MOST_CHUNKS: Final = 2**18  # Most chunks of an array that is loaded as a whole
 _OURS: Final = re.compile(rf"zarr\.json|{WORK}(/[a-z0-9_-]+)*(/(\d+|zarr\.json))?")
 """Files of a store that are no chunks: metadata, records of runs."""
 
@@ -99,6 +99,7 @@ def metadata(address: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str,
         try:
             arrays[name] = _parsed(data)
             codecs = {codec["name"] for codec in arrays[name]["codecs"]}
+            counts(arrays[name])
         except (ValueError, LookupError, TypeError, RecursionError) as error:
             raise InputError(f"{address}: {name}/zarr.json is damaged: {error}") from None
         if not codecs <= _CODECS:
@@ -173,19 +174,28 @@ def check_chunks(address: str | os.PathLike[str]) -> None:
                 raise InputError(f"{address}: {name} is damaged: {one_line(str(error))}") from error
 
 
-def chunks(array: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the names of the chunks of an array."""
+def counts(array: Mapping[str, Any]) -> list[int]:
+    """Return the number of chunks of an array along each dimension."""
     sides = array["chunk_grid"]["configuration"]["chunk_shape"]
-    counts = [range(-(-n // side)) for n, side in zip(array["shape"], sides, strict=True)]
-    for places in itertools.product(*counts):
-        yield "/".join(["c", *map(str, places)])
+    return [-(-n // max(side, 1)) for n, side in zip(array["shape"], sides, strict=True)]
 
 
 def foreign(address: str | os.PathLike[str]) -> Iterator[str]:
     """Yield the names of files and links in a store that are no part of one."""
     _, arrays = metadata(address)
-    ours = {f"{name}/{key}" for name in arrays for key in ["zarr.json", *chunks(arrays[name])]}
-    yield from (name for name in strangers(address) if name not in ours)
+
+    def ours(folder: str, key: str) -> bool:
+        if folder not in arrays or key == "zarr.json":
+            return folder in arrays
+        first, *places = key.split("/")
+        most = counts(arrays[folder])
+        inside = (k.isdecimal() and int(k) < n for k, n in zip(places, most, strict=False))
+        return first == "c" and len(places) == len(most) and all(inside)
+
+    for name in strangers(address):
+        folder, _, key = name.partition("/")
+        if not ours(folder, key):
+            yield name
 
 
 def strangers(address: str | os.PathLike[str]) -> Iterator[str]:

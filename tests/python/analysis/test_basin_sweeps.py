@@ -268,7 +268,7 @@ def test_numbers_do_not_depend_on_the_direction_of_a_parameter(
     rising = swept(ranges)
     equal(swept({name: (high, low, n) for name, (low, high, n) in ranges.items()}), rising)
     job, maps = seen[0]
-    every = tuple((name, values[::-1]) for name, values in job.varied)
+    every = tuple([(name, values[::-1]) for name, values in axis] for axis in job.varied)
     turned = branches.branches(
         dataclasses.replace(job, varied=every),
         {tuple(n - 1 - k for n, k in zip(job.shape, at, strict=True)): maps[at] for at in maps},

@@ -217,7 +217,7 @@ def test_no_curve_of_the_recording_leaps_from_one_tongue_to_the_next(tmp_path: P
         step = np.abs(np.diff(np.asarray(strip), axis=0))
         assert step.max() < 0.2
     legend = str(back.one("/legend", "TextDocument:text"))
-    assert "- rest: multiplier +1: grey" in legend
+    assert "- rest: multiplier +1: magenta" in legend
 
 
 def test_a_map_is_read_back_from_its_file(plane: xr.Dataset, tmp_path: Path) -> None:

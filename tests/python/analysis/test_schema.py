@@ -27,7 +27,7 @@ RESULTS = {
     "trajectory": lambda: pendmap.simulate(DRIVEN, 1.0, 0.0, 10.0),
 }
 
-OF_ALL = ("Conventions", "comment", "source", "references")
+OF_ALL = ("Conventions", "comment", "history", "source", "references")
 
 
 @pytest.mark.parametrize("kind", pendmap.ANALYSES)

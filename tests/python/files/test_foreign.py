@@ -15,6 +15,7 @@ import xarray as xr
 
 import pendmap
 from pendmap import InputError, Pendulum
+from pendmap.files import sealed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,3 +101,22 @@ def test_other_programs_read_a_store(tmp_path: Path) -> None:
     with xr.open_zarr(pendmap.save(result, tmp_path / "a.zarr"), consolidated=False) as plain:
         for name, values in result.data_vars.items():
             np.testing.assert_array_equal(plain[name].values, values.values)
+
+
+@pytest.mark.parametrize("count", [10**6, 10**15])
+def test_a_store_of_a_million_chunks_is_not_loaded(count: int, tmp_path: Path) -> None:
+    store = tmp_path / "a.zarr"
+    pendmap.save(pendmap.basins(Pendulum(p=0.6), 4, check=False), store)
+    file = store / "label" / "zarr.json"
+    array = json.loads(file.read_bytes())
+    array["shape"] = [count, 1]
+    array["chunk_grid"]["configuration"]["chunk_shape"] = [1, 1]
+    file.write_text(json.dumps(array))
+    sealed.seal(store)
+    for _ in range(2):
+        with pytest.raises(InputError, match=f"label must have at most 262144 chunks, got {count}"):
+            pendmap.load(store)
+        (store / "label" / "c" / str(count - 1)).mkdir(parents=True, exist_ok=True)
+    (store / "label" / "c" / str(count)).write_text("not of the array")
+    with pytest.raises(InputError, match=f"it contains 'label/c/{count}', no part of a result"):
+        pendmap.save(pendmap.basins(Pendulum(p=0.6), 4, check=False), store)
