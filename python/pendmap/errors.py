@@ -48,10 +48,6 @@ class FitDiverged(ArithmeticError):  # noqa: N818 (it is no mistake of the calle
     """A fit diverged: its trajectory overflowed, or its values are outside a model's range."""
 
 
-class NotFittedError(InputError):
-    """No model was fitted: the search did not converge, or an effect was not fitted."""
-
-
 class ViewerError(RuntimeError):
     """The viewer cannot be started, or no longer answers."""
 

@@ -18,14 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pendmap import ANALYSES
-from pendmap.errors import (
-    FitDiverged,
-    InputError,
-    NotFittedError,
-    NotWrittenError,
-    ViewerError,
-    one_line,
-)
+from pendmap.errors import FitDiverged, InputError, NotWrittenError, ViewerError, one_line
 from pendmap.files import COMPLETE, STOPS
 from pendmap.formatting import WIDTH
 
@@ -236,8 +229,6 @@ def _failed(error: BaseException) -> int:
             return 128 + signal.SIGPIPE
         case click.ClickException():
             message = error.format_message()
-        case NotFittedError():
-            code = FAILED
         case FitDiverged() | InputError() | ViewerError():
             pass
         case MemoryError():

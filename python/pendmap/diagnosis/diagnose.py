@@ -19,7 +19,7 @@ from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import decide_verdict
-from pendmap.errors import FitDiverged, InputError, NotFittedError
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.records import experiment_of
@@ -206,7 +206,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     """
     if not found.best.fitted.fit.converged:
         where = found.data.experiment.path
-        raise NotFittedError(f"{where}: the fit of the best model must converge, it did not")
+        raise InputError(f"{where}: the fit of the best model must converge, it did not")
     runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
     sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}

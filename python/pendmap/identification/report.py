@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
-from pendmap.errors import InputError, NotFittedError
+from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
 from pendmap.identification.methods.trajectory import OFFSET, identification_of
 from pendmap.identification.parameters import SENSOR
@@ -138,13 +138,13 @@ class IdentificationReport(FitResult):
         reasons = "; ".join(first.warnings)
         if not first.converged:
             more = "" if first.applicable else f": {reasons}"
-            raise NotFittedError(
+            raise InputError(
                 f"{self.run.name}: must be the record of a free decay, got one on which the fit of "
                 f"the {first.method} did not converge{more}"
             )
         if self.asked:
             names = ", ".join(self.asked)
-            raise NotFittedError(f"{self.run.name}: {names} could not be fitted: {reasons}")
+            raise InputError(f"{self.run.name}: {names} could not be fitted: {reasons}")
         raise InputError(f"{self.run.name}: no method can be applied: {reasons}")
 
     @property

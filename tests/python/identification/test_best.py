@@ -11,7 +11,7 @@ import pytest
 
 import pendmap
 from decays import decay, record
-from pendmap.errors import NotFittedError
+from pendmap.errors import InputError
 from pendmap.formatting import interval
 from pendmap.identification import Estimate, identified_model, identify
 from pendmap.identification.report import as_json, as_text, in_short
@@ -28,7 +28,7 @@ def test_a_search_that_did_not_converge_gives_no_model() -> None:
     lost = dataclasses.replace(report.best, converged=False)
     for methods in (report.methods | {"trajectory": lost}, {"trajectory": lost}):
         other = dataclasses.replace(report, methods=methods)
-        with pytest.raises(NotFittedError, match="trajectory did not converge"):
+        with pytest.raises(InputError, match="trajectory did not converge"):
             identified_model(other)
         assert as_json(other)["best"] is None
         assert not any(text.startswith("trajectory: 3001") for text in as_text(other))
@@ -46,7 +46,7 @@ def test_a_method_that_cannot_be_applied_is_replaced_unless_effects_are_given() 
     model = identified_model(other)
     assert model.w0 == report.methods["combined_repaired"]["w0"]
     assert model.notes["provenance"]["method"] == "combined_repaired"
-    with pytest.raises(NotFittedError, match="magnet could not be fitted: too short"):
+    with pytest.raises(InputError, match="magnet could not be fitted: too short"):
         identified_model(dataclasses.replace(other, asked=("magnet",)))
 
 

@@ -148,7 +148,7 @@ def test_no_model_is_written_where_the_search_did_not_converge(
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
     for words in ((), ("--effect", "quadratic_drag")):
         run = pendmap_command("identify", "a.csv", *words, "--out", "a.toml")
-        assert run.returncode == 1
+        assert run.returncode == 2
         assert run.stderr.count("\n") == 1
         assert "trajectory did not converge" in run.stderr
         assert not (tmp_path / "a.toml").exists()
