@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.errors import FitDiverged, core_errors
 from pendmap.identification.fit import prepared
+from pendmap.identification.parameters import SENSOR
 from pendmap.identification.runs import bare_windows, tolerance_of
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ def window_slopes(
     from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
+    base = [name for name in base if name not in SENSOR]  # always fitted
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start)
     begin, windows = unknown.start, bare_windows(fit.windows, unknown.units)

@@ -51,7 +51,7 @@ TRUE = {
 @pytest.mark.parametrize(("name", "made", "wanted"), ASSUMED)
 def test_a_method_finds_what_it_assumes(name: str, made: object, wanted: dict[str, float]) -> None:
     time, angle = record(made, seconds=30 if made is not WIDE else 85, noise_deg=1e-4)  # type: ignore[arg-type]
-    found = identify(time, angle, methods=[name])[name]
+    found = identify(time, angle, methods=[name]).methods[name]
     assert found.method == name
     assert found.applicable, found.warnings
     for key, close in wanted.items():
@@ -60,7 +60,7 @@ def test_a_method_finds_what_it_assumes(name: str, made: object, wanted: dict[st
 
 def test_every_method_has_the_common_result() -> None:
     time, angle = record(WIDE, counts=4096)
-    everything = identify(time, angle)
+    everything = identify(time, angle, methods=METHODS).methods
     assert list(everything) == list(METHODS)
     for name, found in everything.items():
         assert found.method == name
@@ -85,7 +85,7 @@ def test_errors_of_the_energy_balance_match_the_scatter() -> None:
     off = []
     for seed in range(30):
         time, angle = record(WIDE, noise_deg=0.2, offset=2e-3, seed=seed)
-        found = identify(time, angle, methods=["energy_balance"])["energy_balance"]
+        found = identify(time, angle, methods=["energy_balance"]).methods["energy_balance"]
         assert found.misfit == pytest.approx(1, abs=0.5)
         true = {**BOTH, "offset": 2e-3}
         off.append([(found[n] - v) / (found.estimates[n].stderr or 0) for n, v in true.items()])
@@ -204,7 +204,7 @@ def test_a_record_that_begins_in_motion_is_compared_peak_by_peak(begin: int) -> 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_record_without_a_swing_is_not_applicable(name: str) -> None:
     time = np.arange(300) / 100
-    found = identify(time, 0.5 * np.exp(-time), methods=[name])[name]
+    found = identify(time, 0.5 * np.exp(-time), methods=[name]).methods[name]
     assert not found.applicable
     assert found.warnings
     with pytest.raises(InputError, match="swing"):
