@@ -13,6 +13,7 @@ import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
+import fsspec
 import numpy as np
 import pytest
 import xarray as xr
@@ -51,11 +52,16 @@ class StoppedError(Exception):
 
 
 def begun(run: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
-    """Begin a run in a store, and stop it at a share of its work."""
+    """Begin a run in a store, and stop it at a share of its work, when a tile is kept."""
+    part = str(store) if "://" in str(store) else f"{str(store).rstrip('/')}.part"
+    system, folder = fsspec.core.url_to_fs(part)
 
     def stop(done: int, total: int) -> None:
-        if done > share * total:
-            raise StoppedError
+        # The search for attractors reports its progress too.
+        if done > share * total and system.exists(folder):
+            system.invalidate_cache()
+            if any(name.rsplit("/", 1)[-1].isdecimal() for name in system.find(f"{folder}/work")):
+                raise StoppedError
 
     with pytest.raises(StoppedError):
         run(store=store, progress=stop, **keep)

@@ -122,7 +122,7 @@ def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = tmp_path / "map.zarr"
     with monkeypatch.context() as patch:
-        patch.setattr(pendmap._core, "__version__", "0.0.1")  # noqa: SLF001
+        patch.setattr("pendmap._core.__version__", "0.0.1")
         tiled.begun(tiled.CASES["basins"], store)
     with pytest.raises(InputError, match=r"was begun by version of pendmap 0\.0\.1, not "):
         tiled.CASES["basins"](store=store, resume=True)
