@@ -14,7 +14,8 @@ pub fn zero(function: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     }
     for _ in 0..ITERATIONS {
         let [(a, fa), (b, fb)] = ends;
-        let place = if fa == fb { 0.5 * (a + b) } else { (a * fb - b * fa) / (fb - fa) };
+        let rise = fb - fa;
+        let place = if rise == 0.0 { 0.5 * (a + b) } else { (a * fb - b * fa) / rise };
         let here = function(place);
         if here == 0.0 || (b - a).abs() <= 4.0 * f64::EPSILON * (a.abs() + b.abs()) {
             return place;
@@ -34,6 +35,7 @@ pub fn zero(function: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
 
 /// Whether a function with these values, in the middle its least, may pass zero between them: the parabola
 /// through them falls to less than half of it.
+#[must_use]
 pub fn may_touch([before, here, after]: [f64; 3]) -> bool {
     let [slope, bend] = [0.5 * (after - before), before - 2.0 * here + after];
     here < before && here < after && here - 0.5 * slope * slope / bend <= 0.5 * here

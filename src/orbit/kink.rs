@@ -139,7 +139,7 @@ impl KinkedRest {
             let pairs: Vec<[f64; 2]> = rays.iter().map(pair).collect();
             let key = |p: &[f64; 2]| (p[0] >= p[1], p[0]);
             let greatest = |grows: bool| {
-                let some = pairs.iter().filter(|p| grows && p[0] >= 1.0 || !grows);
+                let some = pairs.iter().filter(|p| !grows || p[0] >= 1.0);
                 some.max_by(|a, b| {
                     let ((x, u), (y, v)) = (key(a), key(b));
                     x.cmp(&y).then(u.total_cmp(&v))

@@ -199,7 +199,7 @@ impl Sector {
 
     /// The inverse of the solution at a place.
     fn back(&self, place: f64) -> Matrix2<f64> {
-        if place == -1.0 {
+        if place + 1.0 == 0.0 {
             return Matrix2::identity();
         }
         self.at(place).try_inverse().unwrap_or_else(Matrix2::identity)
@@ -223,10 +223,8 @@ fn series(values: &Series) -> Series {
 /// The series of the integral from -1, plus a constant.
 fn integral(series: &Series, constant: f64) -> Series {
     let at = |i: usize| series.get(i).copied().unwrap_or(0.0) * if i == 0 { 2.0 } else { 1.0 };
-    let mut whole: Series = [0.0; NODES];
-    for i in 1..NODES {
-        whole[i] = (at(i - 1) - at(i + 1)) / (2.0 * i as f64);
-    }
+    let term = |i: usize| (at(i - 1) - at(i + 1)) / (2.0 * i as f64);
+    let mut whole: Series = std::array::from_fn(|i| if i == 0 { 0.0 } else { term(i) });
     whole[0] = constant - value(&whole, -1.0);
     whole
 }
