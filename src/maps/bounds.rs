@@ -29,7 +29,7 @@ fn shrinking(pendulum: &Pendulum, decay: f64, least: f64) -> u32 {
     periods.clamp(least, MOST).ceil() as u32
 }
 
-/// Periods in which what decays at this rate shrinks by `exp(-DECAY)`, from `least` to `most` or [`MOST`].
+/// Periods in which what decays at this rate shrinks by `exp(-DECAY)`, from `least` to `most` or a million.
 #[must_use]
 pub fn decay_periods(pendulum: &Pendulum, rate: f64, least: u32, most: Option<u32>) -> u32 {
     let most = most.map_or(MOST, f64::from).max(f64::from(least));
