@@ -75,6 +75,13 @@ class _Commands(click.Group):
         loaded: click.Command = module.command
         return loaded
 
+    def make_context(self, *args: Any, **more: Any) -> click.Context:  # noqa: ANN401 (of click)
+        """Parse the words; an interrupt is that of :meth:`invoke`."""
+        try:
+            return super().make_context(*args, **more)
+        except KeyboardInterrupt as error:
+            raise click.Abort from error
+
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 (what the command returns)
         """Run the command; a refused value is named by its option."""
         try:
