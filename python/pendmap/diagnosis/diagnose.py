@@ -198,15 +198,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     -------
     Rig
         The best model, with its notes.
-
-    Raises
-    ------
-    InputError
-        If the search for it did not converge.
     """
-    if not found.best.fitted.fit.converged:
-        where = found.data.experiment.path
-        raise InputError(f"{where}: the fit of the best model must converge, it did not")
     runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
     sha256 = found.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
