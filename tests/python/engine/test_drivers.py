@@ -31,7 +31,7 @@ def running(store: Path) -> Iterator[subprocess.Popen[str]]:
     """A run of the map of basins that has begun its tiles."""
     words = [sys.executable, "tiled.py", "basins", str(store), "none", "0"]
     with started(words, cwd=HERE, stdout=subprocess.PIPE) as process:
-        until(process, lambda: any_file(store.parent, "map.zarr.part/work/label/zarr.json"), 0.01)
+        until(process, lambda: any_file(store.parent, "map.zarr.part/*/label/zarr.json"), 0.01)
         yield process
 
 
