@@ -323,6 +323,7 @@ class Fit(FitPoint):
     stages: int
     converged: bool
     given_up: bool
+    promised: float
 
 @final
 class FittedRun:

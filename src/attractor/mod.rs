@@ -8,8 +8,9 @@
 //! - `uncaptured`: whether uncaptured trajectories are chaotic or unsettled; `membership`: the attractor of each
 //! - [`chaos`]: chaotic attractors, from long runs cut into windows ([`long_runs`]), which `groups` sorts; [`region`]:
 //!   the part of the plane that one visits
-//! - `near_returns`, `short_cycles`: candidates for periodic orbits
+//! - [`attracting`]: attracting orbits from those of similar pendulums; `near_returns`, `short_cycles`: candidates for periodic orbits
 
+pub mod attracting;
 pub mod capture;
 pub mod catalogue;
 pub mod chaos;

@@ -60,6 +60,8 @@ pub struct Fit {
     pub converged: bool,
     /// Whether it was given up.
     pub given_up: bool,
+    /// [`Outcome::promised`] of the last stage; infinite if it could not begin.
+    pub promised: f64,
 }
 
 impl Fit {
@@ -96,8 +98,8 @@ pub fn fit(
     let held = held(problem, settings);
     let mut point = Point::new(problem, problem.start(), windows)?;
     let outcome = descend(problem, &mut point, &held, last, cancel)?;
-    let Outcome { steps, converged, given_up } = outcome;
-    Ok(Fit { point, steps, stages: 1, converged, given_up })
+    let Outcome { steps, converged, given_up, promised } = outcome;
+    Ok(Fit { point, steps, stages: 1, converged, given_up, promised })
 }
 
 /// The parameters that are held fixed.
@@ -131,8 +133,8 @@ fn widened(
             steps += outcome.steps;
         }
         if length >= most {
-            let converged = outcome.converged;
-            return Ok(Fit { point, steps, stages, converged, given_up: false });
+            let Outcome { converged, promised, .. } = outcome;
+            return Ok(Fit { point, steps, stages, converged, given_up: false, promised });
         }
         // Not a rest of the record at the end that is much shorter than the others.
         length *= settings.growth;
@@ -144,7 +146,17 @@ fn widened(
         // that is known.
         point = match Point::new(problem, point.values.clone(), windows) {
             Ok(next) => next,
-            Err(_) => return Ok(Fit { point, steps, stages, converged: false, given_up: false }),
+            Err(_) => {
+                let promised = f64::INFINITY;
+                return Ok(Fit {
+                    point,
+                    steps,
+                    stages,
+                    converged: false,
+                    given_up: false,
+                    promised,
+                });
+            }
         };
     }
 }

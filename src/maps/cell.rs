@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::bounds::cell_periods;
+use crate::attractor::attracting::{Alike, attracting};
 use crate::attractor::chaos::spread;
-use crate::attractor::find::{Alike, attracting};
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;

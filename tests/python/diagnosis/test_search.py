@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,10 +13,10 @@ import pytest
 from driven_decays import motion
 from pendmap import FitDiverged, InputError, read_experiment, virtual_rig
 from pendmap.comparison.data import DataSplit, split_records
-from pendmap.diagnosis import Thresholds
+from pendmap.diagnosis import Thresholds, diagnose
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import CORE, Candidate
-from pendmap.diagnosis.fitted_model import fit_with_candidates
+from pendmap.diagnosis.fitted_model import fit_again, fit_with_candidates
 from pendmap.diagnosis.hold_out import hold_out_losses
 from pendmap.diagnosis.search import prune_effects, search
 from pendmap.diagnosis.state import State
@@ -26,6 +26,7 @@ from pendmap.records import Experiment, Run
 
 if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.identification.fit import TrajectoryFit
 
 
 def recorded(folder: Path, *effects: str, **given: float) -> DataSplit:
@@ -229,6 +230,37 @@ def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path
     assert steps < whole[2]
     assert chi2 < 1.2 * base.chi2
     assert fit(1.01 * base.chi2) == whole
+
+
+@pytest.mark.parametrize("shift", [0.3, -3.0, 30.0])
+def test_a_fit_that_is_stopped_states_its_distance_from_the_minimum(
+    tmp_path: Path, shift: float
+) -> None:
+    data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
+    base, _ = fit_baseline(data)
+    off = base.start["c_over_m"] + shift * base.fit.estimates["c_over_m"].stderr
+    stopped = fit_again(data, base, start=base.start | {"c_over_m": off}, steps=0)
+    assert stopped is not None
+    assert not stopped.fit.converged
+    # In the units of the noise, without the widening of a model that does not fit.
+    distance = math.sqrt(stopped.fit.promised)
+    assert distance == pytest.approx(math.sqrt(stopped.chi2 - base.chi2), rel=0.05)
+    assert stopped.distance == pytest.approx(distance / math.sqrt(stopped.level))
+    assert base.distance == 0
+
+
+def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
+
+    def stopped(*given: Any, **named: Any) -> TrajectoryFit:
+        fit = fit_runs(*given, **named)
+        return dataclasses.replace(fit, converged=False, promised=9 * fit.chi2 / fit.degrees)
+
+    monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_runs", stopped)
+    with pytest.raises(InputError, match=r"must converge, got one that ends \d.*standard errors"):
+        diagnose(data.experiment, max_effects=0)
 
 
 def test_a_fit_converges_where_the_pendulum_comes_to_rest(tmp_path: Path) -> None:
