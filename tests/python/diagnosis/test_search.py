@@ -254,7 +254,7 @@ def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
 ) -> None:
     data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
 
-    def stopped(*given: Any, **named: Any) -> TrajectoryFit:
+    def stopped(*given: Any, **named: Any) -> TrajectoryFit:  # noqa: ANN401 (of fit_runs)
         fit = fit_runs(*given, **named)
         return dataclasses.replace(fit, converged=False, promised=9 * fit.chi2 / fit.degrees)
 
