@@ -43,6 +43,10 @@ impl Rests {
 /// it is held in two successive periods, nearer in the second, and within this part of the friction
 /// of permanent sticking, it is at rest. Held states form a line, on which their map is monotone.
 const CREEPING: f64 = 0.05;
+/// A heavily damped pendulum without drive approaches the edge of a set at rest for ever: slower than this, and this
+/// near to angles that friction holds, it is at rest.
+const SLOW: f64 = 1e-7;
+const AHEAD: f64 = 1e-4;
 
 /// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -228,6 +232,18 @@ impl<'a> Guard<'a> {
         (equation.holds_for_ever(theta) || creeps).then_some(rest)
     }
 
+    /// The set at rest whose edge a pendulum without drive approaches. It cannot pass through the set: the friction
+    /// would stop it within a hundredth of the angles that are looked at.
+    fn approached(&self, [theta, velocity]: State) -> Option<usize> {
+        let equation = &self.strobe.equation;
+        if !self.strobe.friction || !equation.is_autonomous() || velocity.abs() > SLOW {
+            return None;
+        }
+        let ahead = |distance: f64| theta + distance.copysign(velocity);
+        let held = [AHEAD, 3.0 * AHEAD].iter().all(|d| equation.holds_for_ever(ahead(*d)));
+        if held { self.traps.rests.of(ahead(AHEAD)) } else { None }
+    }
+
     pub(super) fn state(&self, block: &Block, lane: usize) -> State {
         [block.half_turns[lane] * PI, block.kick[lane] / self.strobe.schedule.kick]
     }
@@ -385,7 +401,8 @@ impl<'a> Watch<'a> {
                 continue;
             }
             let end = self.end(lane);
-            self.hand_over(tenant, fate_at_bound(end.0), end);
+            let rest = self.guard.approached(end.0).map(Fate::Captured);
+            self.hand_over(tenant, rest.unwrap_or_else(|| fate_at_bound(end.0)), end);
             emptied += usize::from(!self.refill(lane));
         }
         emptied

@@ -13,6 +13,8 @@ const ANGLES: usize = 720;
 const MOST_HALF_TURNS: i32 = 1000;
 /// An angle this near to 0 or pi is set to it.
 const NEAR: f64 = 1e-6;
+/// Largest distance of a set's middle from its half turn.
+const WITHIN: f64 = FRAC_PI_2 - 1e-9;
 /// An undriven pendulum stands still where the load exceeds the friction by no more than this.
 const BALANCED: f64 = 1e-9;
 
@@ -26,11 +28,15 @@ pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
         return Vec::new();
     }
     let equation = pendulum.equation();
-    let held = |theta: &f64| equation.holds_for_ever(*theta);
+    // Where the load is least a quarter turn from rest, each half turn has its part of the angles that are held.
+    let around = |half_turn: i32| {
+        let middle = f64::from(half_turn) * PI;
+        let away = (centre(&equation, middle) - middle).clamp(-WITHIN, WITHIN);
+        Some(middle + away).filter(|theta| equation.holds_for_ever(*theta))
+    };
     if pendulum.angle() == Angle::Circle {
-        return balances(pendulum).into_iter().filter(held).collect();
+        return [0, 1].into_iter().filter_map(around).collect();
     }
-    let around = |half_turn: i32| Some(centre(&equation, f64::from(half_turn) * PI)).filter(held);
     let mut all: Vec<f64> = around(0).into_iter().collect();
     for sense in [1, -1] {
         let mut empty = 0;

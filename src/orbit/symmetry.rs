@@ -11,6 +11,8 @@ use crate::model::{Angle, Pendulum};
 const STEP_ERROR: f64 = 1e-12;
 /// Largest distance of Newton's method from the image given by half a period.
 const REACH: f64 = 0.1;
+/// An orbit is clearly nearer than its mirror image if that is this many times as far.
+const CLEARLY: f64 = 3.0;
 
 /// The symmetry of a pendulum, acting on stroboscopic states.
 #[derive(Debug)]
@@ -52,7 +54,7 @@ impl Mirror {
     }
 
     /// Whether an orbit continues that of a similar pendulum with the point `start`: both are symmetric or neither is
-    /// (unless `symmetric` is unknown), and of a pair of mirror images it is the nearer one.
+    /// (unless `symmetric` is unknown), and of a pair of mirror images it is clearly the nearer one.
     #[must_use]
     pub fn continues(&self, orbit: &PeriodicOrbit, start: State, symmetric: Option<bool>) -> bool {
         let image: Vec<State> = orbit.points.iter().map(|p| self.image(*p)).collect();
@@ -61,7 +63,7 @@ impl Mirror {
             let away = points.iter().map(|p| self.angle.distance(*p, start));
             away.fold(f64::INFINITY, f64::min)
         };
-        let nearer = is_symmetric || apart(&orbit.points) <= apart(&image);
+        let nearer = is_symmetric || CLEARLY * apart(&orbit.points) <= apart(&image);
         nearer && symmetric.is_none_or(|known| known == is_symmetric)
     }
 

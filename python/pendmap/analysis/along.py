@@ -70,6 +70,9 @@ class Varied:
         """Coordinates of a dataset; those of several values of the first also have bounds."""
         x = self.values
         more = {one.name: (self.name, one.values, one.attributes) for one in self.along if one.name}
+        known = {one.parameter: one for one in self.every}
+        if "omega" in known and "p" in known and known["p"].name == "stroke_mm":
+            more["p"] = self.name, known["p"].bare, variable((), 0.0, "1", LABELS["p"].meaning)[2]
         if x.size == 1:
             return {self.name: (self.name, x, self.attributes), **more}
         if self.even:

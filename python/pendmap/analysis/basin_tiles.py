@@ -435,9 +435,8 @@ class BasinTiles:
             dtypes = {f"{name}{key[len(_FOLDER) :]}": each for key, each in layout.dtypes.items()}
             store.create(dataclasses.replace(layout, dtypes=dtypes, step="last"))
         for tile in range(layout.tiles) if store.shared or moves else ():
-            if not (store.shared and store.holds("last", tile)):
-                cells = self._merged(store, layout, moves, tile)
-                store.write(tile, {f"{name}{key}": own for key, own in cells.items()})
+            cells = self._merged(store, layout, moves, tile)
+            store.write(tile, {f"{name}{key}": own for key, own in cells.items()})
         return name
 
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path, PurePath
+from typing import Any
 
 import click
 
 from pendmap.cli.parse.groups import argument, group, new_command
 from pendmap.cli.parse.options import flag, option, output_options
-from pendmap.cli.parse.types import NUMBER, OptionType
+from pendmap.cli.parse.types import NUMBER, RESULT, Address, OptionType
 from pendmap.cli.show import Outputs, write_all
 from pendmap.errors import InputError, named
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 _LAYERS = {
     "basins": "labels settle turns exponent",
@@ -39,7 +36,7 @@ _LOOK = group("Look", "--layer settle --width 86 --no-title")
     "pendmap plot basins.nc --width 86 --no-title --out column.pdf",
     "pendmap plot basins.nc --out basins.rrd",
 )
-@argument("file", "FILE")
+@argument("file", "FILE", RESULT)
 @option(
     "--layer",
     _LAYER,
@@ -59,7 +56,7 @@ _LOOK = group("Look", "--layer settle --width 86 --no-title")
 @output_options((), json="")
 def command(  # noqa: PLR0913 (the options above)
     *,
-    file: Path,
+    file: Path | Address,
     layer: str | None,
     size: str | None,
     width: float | None,
@@ -70,17 +67,19 @@ def command(  # noqa: PLR0913 (the options above)
 ) -> None:
     """Draw a result again, in another size, colours or layer, without computing.
 
-    FILE is a result, .nc or .zarr. Figures and recordings are written; if none is named, FILE.png.
+    FILE is a result, .nc or .zarr, or the address of a .zarr. Figures and recordings are written;
+    if none is named, FILE.png, for an address in this folder.
     """
     if size and width:
         raise click.UsageError("only one of --size and --width must be given, got both")
     if width is not None and not 40 <= width <= 500:  # noqa: PLR2004
         raise click.UsageError(f"--width must be 40 to 500 mm, got {width:g}")
     look: dict[str, Any] = {"size": _size(size), "width": width, "title": not no_title}
-    if not file.name:
+    at_address = isinstance(file, Address)
+    if not PurePath(file).name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
-    name = str(file.with_suffix(""))
-    outputs = Outputs.take(given, name, reads=[file], default=["plot"])
+    name = PurePath(file).stem if at_address else str(PurePath(file).with_suffix(""))
+    outputs = Outputs.take(given, name, reads=[] if at_address else [Path(file)], default=["plot"])
 
     from pendmap.files.saved import load
 

@@ -13,7 +13,7 @@ import functools
 import hashlib
 import importlib.util
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar, cast
 
 import numpy as np
 
@@ -33,12 +33,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.engine.store import Cells
+    from pendmap.files.strict import StrictStore
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _REST: Final = "rest"  # Record of the names of the variables of the result that are no cells
-_CHECK: Final = 32  # Bytes at the end of a record: the SHA-256 of the others
+_CHECK: Final = 32  # Bytes of a SHA-256: at the end of a record that of the others
 
 
 def _reached(method: Callable[P, T]) -> Callable[P, T]:
@@ -261,12 +262,29 @@ class ZarrStore:
     def holds(self, step: str, tile: int) -> bool:
         """Return whether the cells that a step has written of a tile are there, undamaged."""
         layout = self._layouts.get(step)
+        if layout is None:
+            return True
         try:
-            for name in layout.dtypes if layout is not None else ():
-                self.read(name, layout.rows(tile))  # type: ignore[union-attr]
+            for name in layout.dtypes:
+                self.read(name, layout.rows(tile))
         except (InputError, ValueError, RuntimeError):  # a chunk that is missing, or damaged
             return False
-        return True
+        return self._digest(step, tile) == (self._stored(f"{step}/{tile}") or b"")[-_CHECK:]
+
+    def _digest(self, step: str, tile: int) -> bytes:
+        """Return the digest of the chunks of a tile that this process has read or written last."""
+        layout = self._layouts.get(step)
+        parts: list[bytes] = []
+        for name in sorted(layout.dtypes) if layout is not None else ():
+            rest = "/0" * (len(layout.shape) - 1)  # type: ignore[union-attr]
+            parts.append(self._strict.checks.get(f"{name}/c/{tile}{rest}", b""))
+        return hashlib.sha256(b"".join(parts)).digest()
+
+    @property
+    def _strict(self) -> StrictStore:
+        """The store of zarr behind the group."""
+        store: Any = self.group.store
+        return cast("StrictStore", store)
 
     def whole(self, name: str) -> Any:  # noqa: ANN401 (a lazy array of xarray)
         """Return an array of cells that is read when it is used."""
@@ -280,16 +298,23 @@ class ZarrStore:
     @_reached
     def get(self, name: str) -> bytes | None:
         """Return a record, or None if there is none or it is damaged."""
+        data = self._stored(name)
+        return None if data is None else data[:-_CHECK]
+
+    def _stored(self, name: str) -> bytes | None:
+        """Return a record and the digest of its tile's chunks; None if it is damaged."""
         try:
             data: bytes = self._place[0].cat_file(f"{self._root}/{WORK}/{name}")
         except FileNotFoundError:
             return None
-        record, check = data[:-_CHECK], data[-_CHECK:]
-        return record if hashlib.sha256(record).digest() == check else None
+        content, check = data[:-_CHECK], data[-_CHECK:]
+        return content if hashlib.sha256(content).digest() == check else None
 
     @_reached
     def put(self, name: str, data: bytes) -> None:
-        """Write a record, whole or not at all."""
+        """Write a record, whole or not at all; that of a tile with a digest of its chunks."""
+        step, _, tile = name.rpartition("/")
+        data += self._digest(step, int(tile) if tile.isdigit() else 0)
         data += hashlib.sha256(data).digest()
         sealed.put_whole(self._place[0], f"{self._root}/{WORK}/{name}", data)
 
@@ -318,7 +343,6 @@ class ZarrStore:
         attributes = write_zarr(rest, self._url, {MARK: self.group.attrs[MARK]})
         for name in cells:
             self._array(name).attrs.put(_plain(dataset[name].attrs))
-        sealed.check_chunks(self._url)
         sealed.seal(self._url, {**_plain(attributes), MARK: dict(mark)})
         self.publish(read=False)
 

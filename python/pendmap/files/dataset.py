@@ -26,6 +26,8 @@ from pendmap.files.sealed import MARK
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
+    from pendmap.files.strict import StrictStore
+
 FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
@@ -144,12 +146,13 @@ def open_zarr(
     place: str | os.PathLike[str],
     chunks: Any = None,  # noqa: ANN401 (of xarray)
     drop: Collection[str] = (),
+    store: StrictStore | None = None,
 ) -> xr.Dataset:
     """Open a Zarr store as it is stored; variables are read when they are used, but for text."""
     form: Any = {"zarr_format": 3, "consolidated": False, "drop_variables": list(drop)}
     with sealed.beside_others():
         dataset: xr.Dataset = xr.open_zarr(
-            sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
+            store or sealed.open_store(place), chunks=chunks, **form, **_AS_STORED
         )
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind in "OT"]
     plain = {name: np.array(dataset[name].values.tolist(), dtype=str) for name in texts}
@@ -212,12 +215,16 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         check_regular(source)
     try:
         stored = isinstance(source, str) or suffix == ".zarr"
-        check: Any = _check_complete if stored else check_alone
-        read: Any = open_zarr if stored else _NETCDF
-        check(source)
-        with _ONE, read(source) as opened:
+        if stored:
+            mark = _check_complete(source)
+            store = sealed.open_store(source)
+        else:
+            check_alone(Path(source))
+        with _ONE, open_zarr(source, store=store) if stored else _NETCDF(source) as opened:
             _check_result(opened, source)
             dataset = restored(opened.load())
+        if stored:
+            sealed.check_digest(source, mark, store.digest())
         dataset.attrs.pop(MARK, None)
     except InputError:
         raise
@@ -248,7 +255,8 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars([*texts]).assign_coords(named)
 
 
-def _check_complete(source: Path | str) -> None:
+def _check_complete(source: Path | str) -> dict[str, Any]:
+    """Return the mark of a complete store; InputError for another."""
     mark, arrays = sealed.checked(source)
     if mark["complete"] is not True:
         raise InputError(f"{source}: {_UNFINISHED}")
@@ -256,6 +264,7 @@ def _check_complete(source: Path | str) -> None:
         if (count := math.prod(sealed.counts(array))) > sealed.MOST_CHUNKS:
             wanted = f"must have at most {sealed.MOST_CHUNKS} chunks, got {count}"
             raise InputError(f"{source}: {name} {wanted}")
+    return mark
 
 
 def _check_result(dataset: xr.Dataset, source: Path | str) -> None:

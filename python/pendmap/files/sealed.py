@@ -1,7 +1,8 @@
 """Zarr stores of results: what they may hold, and how a change of any byte is noticed.
 
-The root's attribute ``pendmap`` has a digest of all metadata; each chunk ends with its CRC-32C.
-What is missing is an error, never a fill value. Only Zarr 3 with known codecs is opened.
+The root's attribute ``pendmap`` has a digest of all metadata and of the chunks' places and
+checksums; each chunk ends with its CRC-32C. What is missing is an error, never a fill value. Only
+Zarr 3 with known codecs is opened.
 """
 
 from __future__ import annotations
@@ -18,13 +19,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, one_line
-from pendmap.files.atomic import synced
+from pendmap.files.atomic import check_regular, synced
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     import fsspec
     import zarr
+
+    from pendmap.files.strict import StrictStore
 
 MARK: Final = "pendmap"
 """Attribute of a Zarr store: the digest, whether it is complete, and the request of a run."""
@@ -33,6 +36,7 @@ WORK: Final = "work"
 GROUP: Final = b'{"zarr_format": 3, "node_type": "group", "attributes": {}}'
 """Metadata of a group without attributes."""
 _DIGEST: Final = "sha256"  # Entry of the mark
+CHUNKS: Final = "chunks"  # Entry of the mark of a complete store: digest of all chunks
 _CODECS: Final = frozenset(("bytes", "crc32c", "vlen-utf8", "zstd"))
 _REMAINS: Final = re.compile(r".*\.[0-9a-f]{32}\.part(ial)?")  # Files of killed writers
 MOST_CHUNKS: Final = 2**18  # Most chunks of an array that is loaded as a whole
@@ -53,7 +57,7 @@ def is_local(system: fsspec.AbstractFileSystem) -> bool:
     return "file" in ([system.protocol] if isinstance(system.protocol, str) else system.protocol)
 
 
-def open_store(address: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a store of zarr)
+def open_store(address: str | os.PathLike[str]) -> StrictStore:
     """Return a store of zarr in which a chunk that is missing is an error."""
     from zarr.storage import FsspecStore, LocalStore  # noqa: PLC0415 (an extra)
 
@@ -84,6 +88,8 @@ def metadata(address: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str,
     system, path = place(address)
     system.invalidate_cache()
     try:
+        if is_local(system):
+            check_regular(f"{path}/zarr.json")
         root = _parsed(system.cat_file(f"{path}/zarr.json"))
     except FileNotFoundError:
         raise InputError(f"{address}: must be a store of Zarr 3, it lacks zarr.json") from None
@@ -91,6 +97,9 @@ def metadata(address: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str,
         raise InputError(f"{address}: zarr.json is damaged: {error}") from None
     folders = [each["name"] for each in system.ls(path, detail=True) if each["type"] != "file"]
     names = {f"{folder}/zarr.json": folder.rsplit("/", 1)[-1] for folder in folders}
+    for file in names if is_local(system) else ():
+        if Path(file).exists():
+            check_regular(file)
     arrays = {}
     for file, data in system.cat([*names], on_error="omit").items():
         name = names[file.removeprefix("file://")]
@@ -136,14 +145,16 @@ def signed(mark: Mapping[str, Any]) -> dict[str, Any]:
 def seal(address: str | os.PathLike[str], attributes: Mapping[str, Any] | None = None) -> None:
     """Write the digest of a store, and the attributes of its root.
 
-    The root also has the metadata of all arrays, where other tools look first.
+    All chunks are read. The root also has the metadata of all arrays, where other tools look first.
     """
     system, path = place(address)
     root, arrays = metadata(address)
+    chunks = read_chunks(address, arrays)
     gathered = {"kind": "inline", "must_understand": False, "metadata": arrays}
     root["consolidated_metadata"] = gathered
     root["attributes"] = {**root.get("attributes", {}), **(attributes or {})}
-    root["attributes"][MARK] = {**root["attributes"][MARK], _DIGEST: digest(root, arrays)}
+    root["attributes"][MARK] = {**root["attributes"][MARK], CHUNKS: chunks}
+    root["attributes"][MARK][_DIGEST] = digest(root, arrays)
     put_whole(system, f"{path}/zarr.json", json.dumps(root, indent=2).encode())
 
 
@@ -160,11 +171,24 @@ def checked(address: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, 
 
 
 def check_chunks(address: str | os.PathLike[str]) -> None:
-    """Read all chunks of a store; InputError for one that is missing or damaged."""
+    """Read all chunks of a complete store; InputError for one that is missing or changed."""
+    mark, arrays = checked(address)
+    check_digest(address, mark, read_chunks(address, arrays))
+
+
+def check_digest(address: str | os.PathLike[str], mark: Mapping[str, Any], found: str) -> None:
+    """Raise InputError if the digest of a complete store's chunks is another than its mark has."""
+    if mark.get(CHUNKS, found) != found:
+        raise InputError(f"{address}: its chunks were changed after they were written")
+
+
+def read_chunks(address: str | os.PathLike[str], names: Iterable[str]) -> str:
+    """Read all chunks of arrays, and return their digest; InputError for one that is damaged."""
     import zarr  # noqa: PLC0415 (an extra)
 
-    group = zarr.open_group(open_store(address), mode="r", zarr_format=3, use_consolidated=False)
-    for name in checked(address)[1]:
+    store = open_store(address)
+    group = zarr.open_group(store, mode="r", zarr_format=3, use_consolidated=False)
+    for name in names:
         array: Any = group[name]
         height = array.chunks[0] if array.ndim else 1
         for first in range(0, array.shape[0] if array.ndim else 1, height):
@@ -172,6 +196,7 @@ def check_chunks(address: str | os.PathLike[str]) -> None:
                 array[first : first + height] if array.ndim else array[...]
             except Exception as error:  # a damaged chunk may raise any error
                 raise InputError(f"{address}: {name} is damaged: {one_line(str(error))}") from error
+    return store.digest()
 
 
 def counts(array: Mapping[str, Any]) -> list[int]:

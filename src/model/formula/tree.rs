@@ -90,9 +90,19 @@ pub struct Place {
 }
 
 impl Tree {
-    /// Two trees, joined.
+    /// Two trees, joined; numbers and what changes nothing are left out, so that `max(v, 0)` has the kink of
+    /// `abs(v)`.
     pub fn join(operator: Operator, left: Self, right: Self) -> Self {
-        Self::Join(operator, Box::new(left), Box::new(right))
+        use Operator::{Add, Multiply, Subtract};
+        match (operator, left, right) {
+            (_, Self::Number(a), Self::Number(b)) => Self::Number(operator.of(a, b)),
+            (Add, Self::Number(0.0), other)
+            | (Add | Subtract, other, Self::Number(0.0))
+            | (Multiply, Self::Number(1.0), other)
+            | (Multiply, other, Self::Number(1.0)) => other,
+            (Subtract, Self::Number(0.0), other) => other.negated(),
+            (_, left, right) => Self::Join(operator, Box::new(left), Box::new(right)),
+        }
     }
 
     /// The tree with the other sign.
@@ -241,15 +251,21 @@ impl Tree {
                 }
             }
             Self::Join(operator, left, right) => {
-                let (a, b) = (left.value(parameters, at), right.value(parameters, at));
-                match operator {
-                    Operator::Add => a + b,
-                    Operator::Subtract => a - b,
-                    Operator::Multiply => a * b,
-                    Operator::Divide => a / b,
-                    Operator::Power => a.powf(b),
-                }
+                operator.of(left.value(parameters, at), right.value(parameters, at))
             }
+        }
+    }
+}
+
+impl Operator {
+    /// Its value.
+    fn of(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Add => a + b,
+            Self::Subtract => a - b,
+            Self::Multiply => a * b,
+            Self::Divide => a / b,
+            Self::Power => a.powf(b),
         }
     }
 }

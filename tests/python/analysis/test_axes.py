@@ -184,6 +184,14 @@ def test_stroke_and_frequency_vary_together() -> None:
             same_as_alone(found, {"stroke_mm": j, "frequency_hz": k}, one)
 
 
+def test_a_curve_of_stroke_and_frequency_has_its_p() -> None:
+    curve = {"frequency_hz": [1.2, 1.6, 2.0], "stroke_mm": [60.0, 45.0, 20.0]}
+    found = pendmap.bifurcation(Rig(w0=6.2, c_over_m=0.62, Tr=0.1), curve)
+    each = zip(curve["stroke_mm"], curve["frequency_hz"], strict=True)
+    own = [1e-3 * mm * (2 * np.pi * hertz) ** 2 / 9.81 for mm, hertz in each]
+    assert found.p.values == pytest.approx(own)
+
+
 def test_an_axis_may_be_any_curve(tmp_path: Path) -> None:
     source = np.random.default_rng(4)
     curve = {"p": np.sort(source.uniform(0.2, 1.2, 4)), "omega": source.uniform(1.6, 2.4, 4)}

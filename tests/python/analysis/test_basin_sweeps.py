@@ -347,3 +347,15 @@ def test_two_parameters_may_have_any_values() -> None:
 def test_other_values_are_refused(ranges: dict[str, list[float]], said: str) -> None:
     with pytest.raises(pendmap.InputError, match=said):
         pendmap.sweep(Pendulum(), ranges, grid=12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_phase_of_the_drive_is_no_change_of_attractors(seed: int) -> None:
+    # It shifts time alone: a pair of mirror images stays two branches however it moves.
+    draw = np.random.default_rng(seed)
+    phases = np.linspace(0, 6.2, draw.integers(5, 10))
+    found = pendmap.sweep(
+        Pendulum(0.1, draw.uniform(1.275, 1.285), 2.0), {"phase": phases}, grid=12, check=False
+    )
+    names = ["oscillation 2:0 (-)", "oscillation 2:0 (+)", "rotation 1:-1", "rotation 1:+1"]
+    assert found["attractor"].values.tolist() == names

@@ -129,3 +129,15 @@ def test_an_equilibrium_under_a_torque_has_the_growth_of_both_half_swings() -> N
     times = [np.pi / np.sqrt(stiffness - c**2 / 4) for c in (0.17, 0.03)]
     exact = -(0.17 * times[0] + 0.03 * times[1]) / 2 / sum(times)
     assert of_rest(found) == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize("term", ["-b*max(v, 0)", "-b*max(0, v)", "b*min(-v, 0)"])
+def test_a_kink_may_be_written_as_the_greater_of_two(term: str) -> None:
+    # (v + abs(v))/2: half of it is viscous damping.
+    greater = Formula("greater", term, {"b": 1})(b=0.2)
+    same = FORMULA(b=0.1)
+    found = pendmap.basins(Pendulum(0.05, 0.35, 2.1, effects=(greater,)), 8)
+    truth = pendmap.basins(Pendulum(0.15, 0.35, 2.1, effects=(same,)), 8)
+    assert np.array_equal(found["label"], truth["label"])
+    assert found.attrs["steps_per_period"] == truth.attrs["steps_per_period"]
+    assert of_rest(found) == pytest.approx(of_rest(truth), abs=1e-9)

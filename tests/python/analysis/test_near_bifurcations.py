@@ -84,3 +84,34 @@ def test_a_long_search_reports_its_progress() -> None:
 
     with pytest.raises(StopError):
         pendmap.basins(Pendulum(gamma=1e-4, p=0.3), Grid.square(4), progress=progress)
+
+
+def held(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Return which starts friction stops in the end, by scipy and a friction of finite slope."""
+    n = theta.size
+
+    def slope(_: float, y: np.ndarray) -> np.ndarray:
+        friction = pendulum.theta_r * np.tanh(y[n:] / 1e-5)
+        return np.concatenate(
+            [y[n:], pendulum.torque - pendulum.gamma * y[n:] - np.sin(y[:n]) - friction]
+        )
+
+    y = np.concatenate([theta, velocity])
+    run = solve_ivp(slope, (0, 150), y, method="LSODA", rtol=1e-6, atol=1e-7, t_eval=[100, 150])
+    return np.abs(run.y[:n, 1] - run.y[:n, 0]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("gamma", "torque", "theta_r"),
+    [(1.0, 1.0, 0.05), (0.6, 1.015, 0.03), (0.8, -1.03, 0.05), (2.0, 0.96, 0.05)],
+)
+def test_friction_holds_all_angles_where_the_load_is_less(
+    gamma: float, torque: float, theta_r: float
+) -> None:
+    pendulum = Pendulum(gamma=gamma, p=0.0, torque=torque, theta_r=theta_r)
+    found = pendmap.basins(pendulum, Grid.square(8), check=False)
+    theta, velocity = np.meshgrid(found["theta"].values, found["velocity"].values)
+    rests = found["id"].values[found["kind"].str.contains("rest").values]
+    assert found["undecided"].item() == 0
+    truth = held(pendulum, theta.ravel(), velocity.ravel())
+    assert np.array_equal(np.isin(found["label"].values.ravel(), rests), truth)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 from functools import partial
@@ -101,3 +102,27 @@ def test_a_file_of_another_is_kept(tmp_path: Path) -> None:
     tiled.assert_same(pendmap.load(store), truth)
     with pytest.raises(InputError, match=r"it contains '.*', no part of a result"):
         RUN(store=store)
+
+
+def test_chunks_in_the_place_of_others_are_noticed(tmp_path: Path) -> None:
+    truth = RUN(store=tmp_path / "whole.zarr").load()
+    shutil.copytree(tmp_path / "whole.zarr", tmp_path / "map.zarr")
+    chunks = tmp_path / "map.zarr" / "settle_periods" / "c"
+    shutil.copy(chunks / "1" / "0", chunks / "0" / "0")
+    with pytest.raises(InputError, match="its chunks were changed after they were written"):
+        pendmap.load(tmp_path / "map.zarr")
+    with pytest.raises(InputError, match="its chunks were changed after they were written"):
+        RUN(store=tmp_path / "map.zarr", resume=True)
+    tiled.begun(RUN, tmp_path / "begun.zarr", 0.6)
+    chunks = tmp_path / "begun.zarr.part" / "work" / "settle_periods" / "c"
+    shutil.copy(chunks / "1" / "0", chunks / "0" / "0")
+    tiled.assert_same(RUN(store=tmp_path / "begun.zarr", resume=True), truth)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "label/zarr.json", "label/c/0/0"])
+def test_a_pipe_in_a_store_is_refused(name: str, tmp_path: Path) -> None:
+    RUN(store=tmp_path / "map.zarr")
+    (tmp_path / "map.zarr" / name).unlink()
+    os.mkfifo(tmp_path / "map.zarr" / name)
+    with pytest.raises(InputError, match="must be a file, it is a pipe or a device"):
+        pendmap.load(tmp_path / "map.zarr")

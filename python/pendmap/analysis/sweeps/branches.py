@@ -1,18 +1,19 @@
 """Attractors matched along parameters: branches, each with one number over the whole sweep.
 
 An orbit is followed from one model to the next by Newton's method, in halved steps of the
-parameters where a whole one fails; two orbits are one where that leads from each to the other
-without a change of symmetry. Global continuation as by Attractors.jl (Datseris & Wagemakers 2022,
-Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151) compares the distances
-of sets instead. So are here those of which one has another period or none that Newton's method
-finds: what an orbit becomes where its period doubles, chaos. Tumbling chaos and running states that
-no orbit locks are followed by their kind alone. Nothing depends on the order in which the models
-were mapped or on the direction of a parameter.
+parameters along its tangent where a whole one fails; two orbits are one where that leads from each
+to the other without a change of symmetry. Global continuation as by Attractors.jl (Datseris &
+Wagemakers 2022, Chaos 32, 023104; Datseris, Luiz Rossi & Wagemakers 2023, Chaos 33, 073151)
+compares the distances of sets instead. So are here those of which one has another period or none
+that Newton's method finds: what an orbit becomes where its period doubles, chaos. Tumbling chaos
+and running states that no orbit locks are followed by their kind alone. Nothing depends on the
+order in which the models were mapped or on the direction of a parameter.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -35,6 +36,7 @@ _LIKE: Final = 0.25
 _ALONE: Final = ("tumbling_chaos", "quasiperiodic_rotation", "rotation")
 """Kinds that a model has at most once in each sense unless Newton's method finds them."""
 _HALVED: Final = 4  # Number of times that a step of the parameters is halved
+_NEAR: Final = 2.0**-12  # Part of a step of the parameters over which a tangent is taken
 
 
 def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[int]]:
@@ -151,12 +153,17 @@ def _followed(
     for k in starts.keys() - ends.keys():
         at, step, point = 0.0, 0.5, starts[k]
         while at < 1.0 and step >= 0.5**_HALVED:
-            orbit = moved(old, {k: point}, min(at + step, 1.0)).get(k)
+            near = moved(old, {k: point}, at + _NEAR).get(k)
+            change = np.zeros(2) if near is None else near[0] - point
+            if circle:
+                change[0] = math.remainder(change[0], math.tau)
+            length = min(step, 1.0 - at)
+            orbit = moved(old, {k: point + length / _NEAR * change}, at + length).get(k)
             if orbit is None:
                 step *= 0.5
             else:
-                at, point = min(at + step, 1.0), orbit[0]
-        if orbit is not None:
+                at, point = at + length, orbit[0]
+        if orbit is not None and at == 1.0:
             ends[k] = orbit
     followed = {}
     for k, points in ends.items():

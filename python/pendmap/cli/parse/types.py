@@ -169,7 +169,7 @@ def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
 
     def read(text: str) -> Path | Address:
         if text.startswith("file://") or "://" not in text:
-            return _output(suffixes, text.removeprefix("file://"))
+            return _output(suffixes, text)
         if not text.lower().rstrip("/").endswith(".zarr"):
             raise InputError(f"{text!r}: suffix of an address must be .zarr")
         _import_library(text, ".zarr")
@@ -179,8 +179,8 @@ def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
 
 
 def _output(suffixes: tuple[str, ...], text: str) -> Path:
-    """Refuse a file that cannot be written."""
-    path = Path(text)
+    """Refuse a file that cannot be written; it may be written as ``file://`` and the path."""
+    path = Path(text.removeprefix("file://"))
     if not path.name:
         raise InputError(f"{text!r}: is a folder, or no file's name")
     if path.suffix.lower() not in suffixes:
@@ -206,7 +206,7 @@ def default_file(name: str | Path) -> Path:
 
 def _report(text: str) -> Path:
     """Refuse a report that cannot be written: a file, or a folder, which may be missing."""
-    path, suffixes = Path(text), REPORTS
+    path, suffixes = Path(text.removeprefix("file://")), REPORTS
     if path.suffix and not path.is_dir():
         return _output(suffixes, text)
     if path.exists() and not path.is_dir():
@@ -259,6 +259,15 @@ class _File(click.Path):
         return super().convert(plain, *words)
 
 
+class _Result(_File):
+    """A path, or the address of a store."""
+
+    def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
+        """Return the path or the address."""
+        path = super().convert(value, *words)
+        return Address(value) if "://" in str(value) and path == Path(value) else path
+
+
 def _effects() -> Iterable[str]:
     from pendmap.model.effects import effects
 
@@ -272,6 +281,7 @@ def _methods() -> Iterable[str]:
 
 
 FILE = _File(path_type=Path)
+RESULT = _Result(path_type=Path)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
 RANGE = OptionType("A:B:N", _range)
