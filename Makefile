@@ -68,7 +68,7 @@ bench: $(VENV)/.develop ## criterion, then the comparisons with other tools
 	$(BIN)/pip install --quiet -r benchmarks/requirements.txt
 	cargo bench --locked
 	for script in speed.integration speed.friction speed.exponents speed.parameters speed.maps speed.sweeps speed.autonomous \
-			speed.threads_memory speed.rig speed.adaptive speed.stores statistics.coverage; do \
+			speed.threads_memory speed.rig speed.stores statistics.coverage; do \
 		$(BIN)/python -m benchmarks.$$script || exit 1; done
 
 TIMED := bash -c 'TIMEFORMAT="$$0: %R s, %U s + %S s of processors"; time maturin develop --release --locked --quiet'

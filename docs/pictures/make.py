@@ -159,8 +159,6 @@ if __name__ == "__main__":
     planes()
     forced()
     render.draw(basins(Pendulum(p=0.6)), HERE / "smooth.png", layer="labels", size=SIZE, dpi=110)
-    own = basins(Pendulum(p=0.6), 400, adaptive=True)
-    render.draw(own, HERE / "adaptive.png", layer="settle", size=SIZE, dpi=110)
     render.draw(basins(Pendulum(p=1.7)), HERE / "fractal.png", layer="settle", size=SIZE, dpi=110)
     friction()
     record()

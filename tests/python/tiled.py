@@ -36,7 +36,7 @@ _CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, no
 CASES: dict[str, Callable[..., xr.Dataset]] = {
     "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(103), **keep),
     "chaos": lambda **keep: pendmap.basins(Pendulum(p=1.5, omega=1.1), Grid.square(103), **keep),
-    "adaptive": lambda **keep: pendmap.basins(_SLOW, Grid.square(163), adaptive=True, **keep),
+    "slow": lambda **keep: pendmap.basins(_SLOW, Grid.square(163), **keep),
     "map": lambda **keep: pendmap.parameter_map(Pendulum(), _WINDOW, starts=3, **keep),
     "sweep": lambda **keep: pendmap.sweep(Pendulum(), {"p": (0.4, 1.6, 40)}, grid=16, **keep),
     "plane": lambda **keep: pendmap.sweep(Pendulum(), _SMALL, grid=10, **keep),

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.adaptive import HOW, NO_TURNS
 from pendmap.analysis.fractality import fitted_map, passes_log2
-from pendmap.analysis.result import flag, variable
+from pendmap.analysis.result import variable
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -57,12 +56,8 @@ def cells_of(raw: SimpleNamespace, dims: tuple[str, ...], units: Units) -> dict[
             "1",
             f"net turns {when}",
             "the angle's displacement over 2 pi, rounded",
-            missing=NO_TURNS if "computed" in raw.cells else None,
         ),
     }
-    if "computed" in raw.cells:
-        text = "how the label of a cell was found"
-        cells["computed"] = flag(dims, raw.cells["computed"], text, HOW)
     if finite_time:
         values = raw.cells["finite_time_exponent"]
         name = f"finite-time Lyapunov exponent {when}"

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis import adaptive
 from pendmap.engine import Layout, Tile, pack, unpack
 from pendmap.errors import core_errors
 
@@ -41,7 +40,6 @@ _TILES: Final = 64  # Least number of tiles of a map of larger ones: workers end
 _BOX: Final = 5  # Tiles begin with a row of boxes of the basin entropy
 _SAMPLE: Final = 256  # Largest number of undecided starts from which a further search begins
 _CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int32"}
-_COMPUTED: Final = {"computed": "int8"}
 _FOLDER: Final = "work/"  # Beginning of the names of cells that are not the last ones
 _EXPONENT: Final = {"finite_time_exponent": "float32"}
 _BYTES: Final = 32  # Memory of a start during the computation
@@ -118,9 +116,9 @@ class Starts:
         """Number of starts in a row."""
         return 1 if self.axes is None else self.axes[0][2]
 
-    def height(self, cells: int, step: int = _BOX) -> int:
-        """Return the number of rows, a multiple of ``step``, with about ``cells`` starts."""
-        return min(step * -(-cells // (step * self.row)), self.shape[0])
+    def height(self, cells: int) -> int:
+        """Return the number of rows, of whole boxes, with about ``cells`` starts."""
+        return min(_BOX * -(-cells // (_BOX * self.row)), self.shape[0])
 
     def at_rest(self, rows: slice) -> Mask:
         """Return which starts of these rows are exactly at rest, hanging or inverted."""
@@ -152,8 +150,6 @@ class BasinTiles:
     """Threads of a tile; by default those of the choices, which the search and the checks have."""
     at_once: int = 1
     """Number of tiles that this process computes at once."""
-    adaptive: bool = False
-    """Whether cells inside blocks of one label are filled; of a grid alone."""
 
     @property
     def _last(self) -> str:
@@ -163,8 +159,7 @@ class BasinTiles:
     @property
     def height(self) -> int:
         """Number of rows of a tile."""
-        step = adaptive.SIDE if self.adaptive else _BOX
-        return self.starts.shape[0] if self.cells is None else self.starts.height(self.cells, step)
+        return self.starts.shape[0] if self.cells is None else self.starts.height(self.cells)
 
     def plan(
         self,
@@ -182,8 +177,8 @@ class BasinTiles:
 
     # ---- tiles
 
-    def inputs(self, store: Store, step: str, tile: int) -> tuple[Any, Indices, bool]:
-        """Return the starts of a tile, the indices of the undecided ones, whether it is refined."""
+    def inputs(self, store: Store, step: str, tile: int) -> tuple[Any, Indices]:
+        """Return the starts of a tile, and the indices of the undecided ones."""
         first, last = self._first(tile), self._first(tile + 1)
         record = store.get(f"starts/{tile}") if self.starts.lost else None
         if record is None:
@@ -192,20 +187,19 @@ class BasinTiles:
             states = unpack(record)
             starts = (states["theta"], states["velocity"])
         if step == "label":
-            tried = unpack(store.get("tried") or b"") if self.adaptive else {}
-            return starts, np.zeros(0, np.int64), bool(tried.get("refined", False))
-        return starts, self._undecided(store, int(step.removeprefix("again-")), tile), False
+            return starts, np.zeros(0, np.int64)
+        return starts, self._undecided(store, int(step.removeprefix("again-")), tile)
 
     def tile(
         self,
         step: str,
         state: bytes,
         tile: int,
-        inputs: tuple[Any, Indices, bool],
+        inputs: tuple[Any, Indices],
         progress: Any = None,  # noqa: ANN401
     ) -> Tile:
         """Label the starts of a tile, or its undecided ones again."""
-        starts, picks, refined = inputs
+        starts, picks = inputs
         plan = self.plan(state, starts)
         first, last = self._first(tile), self._first(tile + 1)
         before = 0 if self.starts.axes else first  # starts that the plan does not have
@@ -213,18 +207,11 @@ class BasinTiles:
             found = plan.label_again(picks - before, progress)
             own = {"label": found.label, "settle": found.settle, "turns": found.turns}
             return Tile(pack(picks=picks, work=found.work, **own))
-        if refined:
-            filled, record = adaptive.refined(
-                plan, first, last, self.starts.shape, self.choices["seed"], progress
-            )
-            return Tile(pack(**record), _named(filled))
         found = plan.label(first - before, last - before, progress)
         cells: Cells = dict(zip(_CELLS, (found.label, found.settle, found.turns), strict=True))
         if found.finite_time_exponent is not None:
             exponent = found.finite_time_exponent * np.float32(self.rate)
             cells["finite_time_exponent"] = exponent
-        if self.adaptive:
-            cells["computed"] = np.full(found.label.size, adaptive.COMPUTED, np.int8)
         return Tile(
             pack(work=found.work, undecided=np.count_nonzero(found.label == 0)), _named(cells)
         )
@@ -254,15 +241,13 @@ class BasinTiles:
             _core.reckon("starts", math.prod(shape), _BYTES)
         plan = self.plan(work.once("plan-0", lambda: self.plan(progress=work.progress).state))
         labelled = plan.plane == "basins"
-        dtypes = _CELLS | ({} if labelled else _EXPONENT) | (_COMPUTED if self.adaptive else {})
+        dtypes = _CELLS | ({} if labelled else _EXPONENT)
         layout = Layout(self.starts.dims, shape, self.height, _named(dtypes), "label")
         store.create(layout)
         if store.shared and self.starts.axes is None:
             for tile in range(layout.tiles):
                 theta, velocity = self.starts.of_tile(self._first(tile), self._first(tile + 1))
                 work.once(f"starts/{tile}", partial(pack, theta=theta, velocity=velocity))
-        if self.adaptive:
-            work.once("tried", partial(self._tried, plan))
         undecided = np.zeros(layout.tiles, np.int64)
         periods = 0
         for tile, record in work.each("label", "plan-0", range(layout.tiles)):
@@ -292,7 +277,6 @@ class BasinTiles:
         uncertain = {
             name: measures.pop(name, np.zeros(0)) for name in ("eps", "uncertain", "tried")
         }
-        audit = {name: measures.pop(name).item() for name in adaptive.FACTS if name in measures}
         texture = SimpleNamespace(**{name: measures.pop(name).item() for name in _TEXTURE})
         measures = {name: value.item() for name, value in measures.items()}
         return SimpleNamespace(
@@ -306,12 +290,7 @@ class BasinTiles:
             mean_periods=periods / math.prod(shape),
             texture=texture,
             uncertainty=uncertain,
-            audit=audit,
         )
-
-    def _tried(self, plan: _core.BasinPlan) -> bytes:
-        """Return whether the map is refined, and the share of blocks that would be whole."""
-        return pack(**adaptive.tried(plan, self.starts.shape, self.choices["seed"]))
 
     def _search(self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int) -> bytes:
         """Search from undecided starts; return the next plan, none if labels are final."""
@@ -348,9 +327,6 @@ class BasinTiles:
                 at = found["picks"] - self._first(tile)
                 for name, own in zip(_CELLS, ("label", "settle", "turns"), strict=True):
                     flat[name][at] = found[own]
-        if moves and self.adaptive:
-            found = unpack(store.get(f"label/{tile}") or b"")
-            adaptive.audit_again(flat, moves, found)
         return cells
 
     def _blocks(
@@ -382,11 +358,14 @@ class BasinTiles:
         columns, lines = _core.thinned(row, rows), _core.thinned(rows, row)
         own, thin = np.zeros(picks.size, np.int16), np.zeros((lines.size, columns.size), np.int16)
         counts = np.zeros(2**15 + 1, np.int64)
-        tally, moving = adaptive.Tally(), 0
+        settled, periods, longest, moving = 0, 0, -1, 0
         texture = _core.TextureSum(row, rows)
         before = np.zeros((0, row), np.int16)
         for at, cells in self._blocks(store, layout, moves):
-            tally.add(cells)
+            settle = cells["settle_periods"][cells["settle_periods"] >= 0]
+            settled += settle.size
+            periods += int(settle.sum())
+            longest = max(longest, int(settle.max(initial=-1)))
             moving += int(np.sum((cells["label"] == 0) & ~self.starts.at_rest(at)))
             label = cells["label"].reshape(-1, row)
             counts += np.bincount(label.reshape(-1) + 1, minlength=counts.size)
@@ -405,8 +384,6 @@ class BasinTiles:
         told = {name: getattr(found, name) for name in _TEXTURE}
         with core_errors():
             if check:
-                if self.adaptive:  # not those of filled cells
-                    own = plan.label_again(picks).label
                 reliable = plan.reliability(own)
                 told |= {name: getattr(reliable, name) for name in _RELIABILITY}
                 near = plan.uncertainty(thin.reshape(-1), columns.size) if grid else None
@@ -414,10 +391,9 @@ class BasinTiles:
                     told |= {"eps": near.eps, "uncertain": near.uncertain, "tried": near.tried}
         return pack(
             counts=counts[: 1 + max(2, np.flatnonzero(counts).max())],
-            mean_settle=tally.mean_settle,
-            longest_settle=tally.longest,
+            mean_settle=periods / settled if settled else -1.0,
+            longest_settle=longest,
             moving=moving,
-            **(tally.facts(unpack(store.get("tried") or b"")) if self.adaptive else {}),
             **{name: value for name, value in told.items() if value is not None},
         )
 

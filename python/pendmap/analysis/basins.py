@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 
-from pendmap.analysis import adaptive as refinement
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.basin_dataset import LAYERS, boundary, cells_of, uncertain_starts
 from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts, tile_of
@@ -113,7 +112,6 @@ SCHEMA = Schema(
     Found("longest_settle", "periods", "longest time of capture; -1: none", convert=none_below_0),
     *result.END,
     drawn_basins,
-    *refinement.FIELDS,
     result.SECTION,
     Field("layers", "", "labels or finite_time: layers that describe the plane", json=False),
     Found("boundary_boxes", "1", "boxes with more than one label", None, json=False),
@@ -138,7 +136,6 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     threads: int | None = None,
     seed: int = 0,
     check: bool = True,
-    adaptive: bool = False,
     draws: int | None = None,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
@@ -183,11 +180,6 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check : bool
         Whether to check labels of a sample with half the step and mirrored, and to measure the
         share of starts whose label changes nearby.
-    adaptive : bool
-        Whether to compute the cells at boundaries alone: those inside a block of cells get the
-        label of its rim if that has one. Filled cells are drawn
-        at random and computed, which bounds the share of wrong labels. Where the boundary is
-        fractal everywhere all cells are computed.
     draws : int, optional
         Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
         the probability of each outcome in each cell, and the uncertainty due to the parameters.
@@ -221,11 +213,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         a grid. ``basin_entropy``, ``boundary_basin_entropy`` and ``uncertainty_exponent`` measure
         how the basins are interwoven (:func:`pendmap.basin_entropy`,
         :func:`pendmap.uncertainty_exponent`); the exponent's counts, from 10,000 cells on, are
-        ``uncertain`` of ``uncertainty_tried`` starts over ``distance``. With ``adaptive`` also
-        ``computed``, how the label of a cell was found (settling time and net turns of a filled
-        cell are missing), ``computed_share``, and ``label_error``, the estimated share of cells
-        with a wrong label, between ``label_error_low`` and ``label_error_high`` with 95 %
-        confidence; ``mean_settle`` is an estimate too. With ``draws`` also
+        ``uncertain`` of ``uncertainty_tried`` starts over ``distance``. With ``draws`` also
         ``probability``, ``certainty`` and ``label_entropy`` over the draws.
 
     Notes
@@ -268,7 +256,6 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
             basins,
             grid=grid,
             layer_periods=layer_periods,
-            adaptive=adaptive,
             **numerics.options,
         )
         own = same(pendulum, check=check, progress=several.first)
@@ -276,9 +263,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     starts_of = Starts(grid.bare(units))
     cells = tile_of(grid.cells, TILE) if kept.tiled else None
     rate = units.given(1.0, RATE)
-    check_flag("adaptive", adaptive)
     of_tile = kept.threads(threads)
-    job = BasinTiles(bare, starts_of, choices, rate, cells, threads=of_tile, adaptive=adaptive)
+    job = BasinTiles(bare, starts_of, choices, rate, cells, threads=of_tile)
     angle, speed = grid.theta, grid.velocity
     said = f"initial velocity {units.derivative}"
 
@@ -301,7 +287,6 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         "layer_periods": layer_periods,
         "seed": numerics.seed,
         "check": check,
-        "adaptive": adaptive,
     }
     return kept.complete("basins", pendulum, request, job, compute, progress)
 
@@ -403,7 +388,6 @@ def _complete(
         "layers": LAYERS[raw.plane],
         "cells": count,
         "labels_reliable": int(raw.unreliable <= RELIABLE),
-        **raw.audit,
     }
     SCHEMA.complete(dataset, model, values, raw)
     pendulum, _ = without_dimensions(model)

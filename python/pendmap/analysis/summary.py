@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis import adaptive
 from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.result import missed, of_model, rows
 from pendmap.files import facts
@@ -66,7 +65,6 @@ def summarise(
                 "With dry friction alone (gamma = 0) phase area shrinks only where the motion "
                 "turns back: a rotation sustained by the drive approaches no attractor."
             )
-    lines += adaptive.said(a)
     lines += of_model(pendulum, "this map is")
     lines.append(
         f"{counted(a['cells'], 'start')}, {a['mean_periods']:.1f} periods each on average, "
@@ -210,8 +208,7 @@ def _settling(dataset: xr.Dataset) -> list[str]:
         time = f" = {units.given(math.tau, TIME):.4g} s" if units.si else ""
         own = f" (without drive a period is {units.own_period}{time})"
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
-    which = " in the computed cells" if a.get("computed_share", 1) < 1 else ""
-    return [f"Settling takes {times}{which}{own}."]
+    return [f"Settling takes {times}{own}."]
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:

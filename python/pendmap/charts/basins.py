@@ -134,13 +134,11 @@ def _layer(
     window: tuple[tuple[float, float], ...],
     listed: list[legend.Entry],
 ) -> list[Mark]:
-    """Return one layer; cells without a value have the colour of their label, or are grey."""
+    """Return one layer; cells without a value have the colour of their label."""
     label = plane.pixels(dataset, dataset["label"], cells)
     colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
-    classes = [("", colour) for colour in (*colours, palette.FILLED)]
+    classes = [("", colour) for colour in colours]
     shown = label.astype(np.int16) + 1
-    if layer != "labels" and has_filled(dataset):
-        shown[filled(dataset, cells)] = len(colours)
     if layer == "labels":
         texts = [("", "")] * len(classes)
         for entry in listed:
@@ -150,7 +148,7 @@ def _layer(
         return [Image(shown, *window, classes=classes, labels=texts)]
     labels = Image(shown, *window, classes=classes)
     own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
-    absent, values = missing(dataset, layer, own) | (label < 0), own.astype(np.float32)
+    absent, values = missing(layer, own) | (label < 0), own.astype(np.float32)
     if layer == "settle":
         np.maximum(values, 1.0, out=values)
     values[absent] = np.nan
@@ -219,22 +217,9 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
     return Panel("section", title, *sides, dots, share=SMALL, note=note)
 
 
-def missing(dataset: xr.Dataset, layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Return which values of a layer are missing: of cells that never settled or were filled."""
-    if layer == "settle":
-        return np.asarray(values < 0)
-    fill = dataset[VARIABLES[layer]].attrs.get("_FillValue", np.nan)
-    return np.asarray(~np.isfinite(values) | (values == fill))
-
-
-def has_filled(dataset: xr.Dataset) -> bool:
-    """Return whether an adaptive map has cells that were not computed."""
-    return "computed" in dataset and not bool(dataset["computed"].all())
-
-
-def filled(dataset: xr.Dataset, cells: int) -> npt.NDArray[np.bool_]:
-    """Return which pixels of an image are cells that were not computed."""
-    return np.asarray(plane.pixels(dataset, dataset["computed"], cells) == 0)
+def missing(layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return which values of a layer are missing: of cells that never settled or failed."""
+    return np.asarray(values < 0 if layer == "settle" else ~np.isfinite(values))
 
 
 def reliable(dataset: xr.Dataset) -> bool:
@@ -328,11 +313,10 @@ def what(dataset: xr.Dataset, layer: str) -> str:
         turns = f"after {periods}"
     elif not settles(dataset):
         turns = f"after {counted(int(dataset.attrs['max_periods']), 'period')}"
-    grey = "; filled cells grey" if has_filled(dataset) else ""
     return {
         "labels": "basins of attraction",
-        "settle": f"settle time{grey}",
-        "turns": f"net turns {turns}{grey}",
+        "settle": "settle time",
+        "turns": f"net turns {turns}",
         "exponent": f"finite-time exponent over {periods}",
         "probability": f"most likely end over {draws}",
         "entropy": f"doubt of the end over {draws}",

@@ -36,9 +36,6 @@ UNDECIDED = "#e4e4e4"
 FAILED = "#000000"
 """Cells whose integration failed or diverged (label -1)."""
 
-FILLED = "#c4c4c4"
-"""Cells of an adaptive map that were not computed, in layers other than labels."""
-
 UNNAMED = "#8a8a8a"
 """Attractors of unknown name and kind."""
 
@@ -73,7 +70,6 @@ _SINGLE: dict[str, _Shade] = {
     "libration_chaos": ("#ffa6d1", "pink"),
     "undecided": (UNDECIDED, "light grey"),
     "failed": (FAILED, "black"),
-    "filled": (FILLED, "grey"),
 }
 _DIRECTED: dict[str, dict[int, tuple[_Shade, ...]]] = {
     "rotation": {

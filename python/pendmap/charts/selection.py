@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.adaptive import Tally
 from pendmap.analysis.basins import RELIABLE
 from pendmap.analysis.result import shares
 from pendmap.charts import plane
@@ -58,9 +57,6 @@ _OF_THE_WHOLE = (
     "boundary_",
     "uncertainty_",
     "neighbours_",
-    "computed_share",
-    "audited",
-    "label_error",
 )
 """Prefixes of facts that hold for a whole map alone."""
 
@@ -164,9 +160,6 @@ def _rising(dataset: xr.Dataset) -> xr.Dataset:
 def _basins(dataset: xr.Dataset) -> xr.Dataset:
     """Recompute the shares of a part of a basin map from its cells."""
     label = dataset["label"].values
-    cells = {
-        name: dataset[name].values for name in ("settle_periods", "computed") if name in dataset
-    }
     whole = int(dataset.attrs["cells"])
     ids = dataset["id"].values.astype(int)
     present = np.unique(label)
@@ -175,11 +168,11 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
     if label.size == whole:
         return dataset
     counts = np.zeros(int(ids.max(initial=0)) + 2, dtype=np.int64)
-    tally = Tally()
     for rows in np.array_split(np.arange(label.shape[0]), -(-label.size // _BLOCK)):
         counts += np.bincount(label[rows].ravel().astype(np.int64) + 1, minlength=counts.size)
-        tally.add({name: values[rows] for name, values in cells.items()})
     share = counts / label.size
+    settle = dataset["settle_periods"].values
+    settled = settle[settle >= 0]
     fraction = share[ids + 1]
     part = dataset.assign(shares(("attractor",), fraction, label.size))
     gone = [name for name in facts(part) if name.startswith(_OF_THE_WHOLE)]
@@ -190,8 +183,8 @@ def _basins(dataset: xr.Dataset) -> xr.Dataset:
         cells=label.size,
         failed=float(share[0]),
         undecided=float(share[1]),
-        mean_settle=tally.mean_settle,
-        longest_settle=tally.longest,
+        mean_settle=float(settled.mean()) if settled.size else -1.0,
+        longest_settle=int(settled.max(initial=-1)),
     )
     return _note_selection(part, f"{counted(label.size, 'cell')} of {whole}")
 

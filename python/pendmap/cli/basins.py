@@ -8,7 +8,6 @@ from pendmap.cli.analysis import analysis_command
 from pendmap.cli.parse.groups import group
 from pendmap.cli.parse.options import (
     draws_option,
-    flag,
     max_periods_option,
     option,
     seed_option,
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 
 _CELLS = 1000  # Default number of cells on each side
-_ANALYSIS = group("Analysis", "--adaptive")
+_ANALYSIS = group("Analysis", "--draws 100")
 
 
 @analysis_command(
@@ -38,11 +37,6 @@ _ANALYSIS = group("Analysis", "--adaptive")
         " is small, less if chaos coexists]"
     ),
     seed_option("Shifts the samples, and draws the models of --draws."),
-    flag(
-        "--adaptive",
-        "Compute the cells at boundaries alone, and a sample of the others.",
-        group=_ANALYSIS,
-    ),
     option(
         "--layer-periods",
         whole(1, MOST_PERIODS),
@@ -53,7 +47,6 @@ _ANALYSIS = group("Analysis", "--adaptive")
     examples=(
         "pendmap basins --p 1.7",
         "pendmap basins --p 1 --theta-r 0.05 --grid 400 --out friction.nc",
-        "pendmap basins --p 0.6 --grid 2000 --adaptive",
     ),
     stored=True,
 )

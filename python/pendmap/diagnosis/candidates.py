@@ -137,12 +137,6 @@ class Candidate:
         given = self.effect(units).parameters if self.shape else {}
         return {name: given[name] for name in self.shape}
 
-    @property
-    def title(self) -> str:
-        """Name with the shape, nondimensional: different for each candidate."""
-        shape = ", ".join(f"{name} = {value:.3g}" for name, value in self.shape.items())
-        return f"{self.name} ({shape})" if shape else self.name
-
 
 def count_choices(pool: Collection[Candidate]) -> dict[str, int]:
     """Return the number of shapes to choose from, by effect."""

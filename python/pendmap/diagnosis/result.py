@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
+from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
-from pendmap.diagnosis.next_experiment.limits import Advice, advise
 from pendmap.formatting import Estimate
 from pendmap.identification.results import FitResult, Followed
 from pendmap.model.effects import definition
@@ -225,7 +225,7 @@ class Discrepancy(FitResult):
     @functools.cached_property
     def not_computed(self) -> Reasons:
         """Reasons for parts that were not computed, by field of the JSON object."""
-        for part in (self.forecasts, self.advice, self.cycles):
+        for part in (self.forecasts, self.cycles):
             del part
         return self.reasons
 
@@ -237,14 +237,7 @@ class Discrepancy(FitResult):
     @functools.cached_property
     def advice(self) -> Advice:
         """Recommended next record, and detection limits of effects that were not found."""
-        return advise(
-            self.data,
-            self.best,
-            self.nearest,
-            self.assessment,
-            self.beside,
-            self.reasons,
-        )
+        return advise(self.best, self.nearest, self.assessment, self.effects, self.beside)
 
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:

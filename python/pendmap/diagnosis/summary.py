@@ -74,7 +74,6 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         ],
         "where": None if "where" in unknown else found.where,
         "next_experiment": found.advice.next_experiment,
-        "proposals": _proposals(found),
         "detection_limits": None
         if "detection_limits" in unknown
         else {name: limit.size for name, limit in found.advice.limits.items()},
@@ -105,41 +104,4 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
         "not_computed": unknown,
         "attempts": [dataclasses.asdict(attempt) for attempt in found.attempts],
         "findings": [one.text for _, one in found.data.experiment.findings_of(found.data.runs)],
-    }
-
-
-def _proposals(found: Discrepancy) -> dict[str, Any] | None:
-    """Return the aim and the best proposal of each kind of run; None without an outlook."""
-    outlook = found.advice.outlook
-    if outlook is None:
-        return None
-    return {
-        "aim": outlook.aim,
-        "about": list(outlook.about),
-        "now": outlook.now,
-        "wanted": outlook.wanted,
-        "not_told_apart": [list(pair) for pair in outlook.equals],
-        "experiments": [
-            {
-                "what": prospect.proposal.what,
-                "seconds": prospect.proposal.seconds,
-                "wait_s": prospect.proposal.wait_s,
-                "predicted": prospect.value,
-                "chance_of_wrong_name": prospect.wrong,
-                "chance_of_one_name": prospect.resolved,
-                "recommended": prospect is outlook.best,
-                "runs": [
-                    {
-                        "kind": "free" if start.drive is None else "forced",
-                        "theta_rad": start.theta,
-                        "velocity_rad_s": start.velocity,
-                        "seconds": prospect.proposal.length_s,
-                        "lab_time_s": start.lab_time_s,
-                        "drive": None if start.drive is None else dict(start.drive),
-                    }
-                    for start in prospect.proposal.runs
-                ],
-            }
-            for prospect in outlook.by_start
-        ],
     }

@@ -232,7 +232,6 @@ def _pivot(where: str, value: object) -> dict[str, Any]:
 _RIG: Final[Checks] = {
     **dict.fromkeys(("gravity", "length_m", "w0"), _positive),
     "encoder_counts": lambda name, value: check_whole(name, value, 1, _MOST_COUNTS),
-    **dict.fromkeys(("max_angle", "max_velocity", "max_frequency"), _positive),
 }
 _COLUMN: Final[Checks] = {
     "name": _text,

@@ -187,8 +187,7 @@ class Experiment:
     runs : tuple of Run
         Runs in the order of the experiment.
     known : mapping
-        Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``; the limits
-        ``max_angle`` (rad), ``max_velocity`` and ``max_frequency`` (rad/s).
+        Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``.
     findings : tuple of Finding
         Findings about the experiment or a whole file with several releases.
     sha256 : mapping of str to str

@@ -5,22 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.next_experiment.limits import DETECTION_PROBABILITY, MARGIN
+from pendmap.diagnosis.advice import DETECTION_PROBABILITY
 from pendmap.diagnosis.result import shape_text
 from pendmap.formatting import counted
 from pendmap.identification.report import left_out
 from pendmap.model.labels import unit_of
 from pendmap.report.document import bullets, code, plain, table
-from pendmap.report.wording import chance, gained, joined, number
+from pendmap.report.wording import gained, joined, number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pendmap.diagnosis import Discrepancy
-    from pendmap.diagnosis.next_experiment.limits import Limit
-    from pendmap.diagnosis.next_experiment.power import Outlook
-
-ROWS: Final = 8  # Number of rows in the table of proposals
+    from pendmap.diagnosis.advice import Limit
 
 LIMITS: Final = (
     "effect",
@@ -35,72 +32,12 @@ LIMITS: Final = (
 MORE: Final = 1.5
 """Effective noise over that of the readings above which the report explains the difference."""
 
-FIGURES: Final = {
-    "separation": "separation",
-    "interval": "half an interval of 95 %, over the value",
-    "limits": "detection limit, over that now",
-}
-"""Name of the figure of merit of a proposal, by aim."""
-
 
 def following(found: Discrepancy) -> Iterator[str]:
-    """Yield the recommended next record, and the prediction for each kind of run."""
-    yield "## The next experiment"
-    advice = found.advice
-    if advice.next_experiment is not None:
-        yield plain(advice.next_experiment)
-    elif "proposals" in found.reasons:
-        yield f"Not computed: {plain(found.reasons['proposals'])}."
-    outlook = advice.outlook
-    if outlook is not None and outlook.prospects:
-        yield (
-            "Each line is the best of a kind of run that this rig could do: simulated with the "
-            "model at the sampling rate and noise of these records, and added to them. "
-            + _meaning(outlook)
-        )
-        yield _proposals(outlook)
-
-
-def _meaning(outlook: Outlook) -> str:
-    """Return an explanation of the figure of merit in the table of proposals."""
-    if outlook.aim == "separation":
-        return (
-            "The separation is the part of the gain of one name that the other cannot explain; "
-            f"from {outlook.wanted:g} on a wrong name is improbable. Now it is "
-            f"{gained(outlook.now)}."
-        )
-    if outlook.aim == "interval":
-        return (
-            f"Half the interval of {code(outlook.about[0])} over its value is now "
-            f"{number(outlook.now, 2)}; half of that is wanted."
-        )
-    return (
-        "The last column is the median over all effects that were not found; half is wanted. Most "
-        f"would be gained for {joined(outlook.about)}."
-    )
-
-
-def _proposals(outlook: Outlook) -> str:
-    """Return the table of proposals."""
-    separates = outlook.aim == "separation"
-    head = ["record", "recorded (s)", "wait (s)", FIGURES[outlook.aim]]
-    head += ["wrong name", "one name left"] if separates else []
-    rows = []
-    for prospect in outlook.by_start[:ROWS]:
-        proposal = prospect.proposal
-        what = plain(proposal.what)
-        row = [
-            f"**{what}**" if prospect is outlook.best else what,
-            f"{proposal.seconds:g}",
-            f"{proposal.wait_s:g}",
-            gained(prospect.value) if separates else number(prospect.value, 2),
-        ]
-        if separates:
-            wrong = prospect.wrong or 0.0
-            said = number(wrong, 1) if wrong >= MARGIN else f"below {number(MARGIN, 1)}"
-            row += [said, chance(prospect.resolved or 0.0)]
-        rows.append(row)
-    return table(head, rows)
+    """Yield the recommended next record."""
+    if found.advice.next_experiment is not None:
+        yield "## The next experiment"
+        yield plain(found.advice.next_experiment)
 
 
 def exclusions(found: Discrepancy) -> Iterator[str]:

@@ -141,8 +141,8 @@ def _scalar(
     """Log a scalar layer; cells without a value have their label's colour on top."""
     array = dataset[layering.VARIABLES[layer]]
     values, sample = (plane.pixels(dataset, array, most) for most in (CELLS, SAMPLE))
-    absent = layering.missing(dataset, layer, values)
-    known = sample[~layering.missing(dataset, layer, sample)]
+    absent = layering.missing(layer, values)
+    known = sample[~layering.missing(layer, sample)]
     low, high = 0.0, 1.0
     if layer == "settle":
         high = max(1.0, float(np.quantile(known, 0.995)) if known.size else 1.0)
@@ -171,16 +171,13 @@ def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame)
     """Log the net turns as classes named by their number: class = turns + offset."""
     turns, sample = (plane.pixels(dataset, dataset["net_turns"], n) for n in (CELLS, SAMPLE))
     label = plane.pixels(dataset, dataset["label"], CELLS)
-    absent = layering.missing(dataset, "turns", turns)
-    turns = np.where(absent, 0, turns)
-    sample = sample[~layering.missing(dataset, "turns", sample)]
     most = int(min(max(-int(turns.min()), int(turns.max()), 1), _TURNS_MOST))
     offset = most + 1
     classes = np.clip(turns, -most, most)
     classes += offset
     classes = classes.astype(np.uint16)
     classes[label < 0] = 0
-    top = max(1.0, float(np.quantile(np.abs(sample), 0.98)) if sample.size else 0.0)
+    top = max(1.0, float(np.quantile(np.abs(sample), 0.98)))
     span = np.arange(-most, most + 1)
     colours = palette.diverging(span / top)
     context: list[Any] = [(0, "failed", palette.rgb("failed"))]
@@ -194,8 +191,6 @@ def _turns(stream: rr.RecordingStream, dataset: xr.Dataset, around: frame.Frame)
     column = np.round(np.linspace(-top, top, 256)).astype(int) + offset
     bar = rr.SegmentationImage(column.astype(np.uint16)[:, None], opacity=1.0)
     around.bar(stream, ROOTS["turns"], bar, low=-top, high=top)
-    if absent.any():
-        _cover(stream, dataset, around, "turns", absent)
 
 
 def _cover(
@@ -205,18 +200,11 @@ def _cover(
     layer: str,
     absent: npt.NDArray[np.bool_],
 ) -> None:
-    """Log the labels, shifted by 2, of cells without a value over a layer; 0 is transparent.
-
-    Cells that were not computed are grey, with the number after those of the labels.
-    """
+    """Log the labels, shifted by 2, of cells without a value over a layer; 0 is transparent."""
     label = plane.pixels(dataset, dataset["label"], CELLS)
     cover = np.where(absent, label + 2, 0).astype(np.uint16)
     path = f"{ROOTS[layer]}/data/without"
     context: list[Any] = [(0, "", (0, 0, 0, 0)), *_classes(dataset, 2)]
-    if layering.has_filled(dataset):
-        last = max(number for number, *_ in context) + 1
-        context.append((last, "filled", palette.rgb("filled")))
-        cover[layering.filled(dataset, CELLS)] = last
     stream.log(path, rr.AnnotationContext(context), static=True)
     stream.log(path, around.of_pixels(cover.shape), static=True)
     stream.log(path, rr.SegmentationImage(cover, opacity=1.0, draw_order=1.0), static=True)

@@ -58,14 +58,13 @@ def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
     unknown = told["not_computed"]
     for part in {name.partition(".")[0] for name in unknown}:
         assert told[part] is None or told[part] != whole[part], part
-    for part in ("forecast", "cycles", "proposals", "next_experiment"):
+    for part in ("forecast", "cycles"):
         if told[part] != whole[part]:
-            wanted = "proposals" if part == "next_experiment" else part
-            assert any(name.partition(".")[0] == wanted for name in unknown), part
+            assert any(name.partition(".")[0] == part for name in unknown), part
+    assert told["next_experiment"] == whole["next_experiment"]
     assert all("range of numbers" in reason for reason in unknown.values())
     if share == 1.0:
-        assert told["next_experiment"] is None
-        assert {name.partition(".")[0] for name in unknown} >= {"forecast", "cycles", "proposals"}
+        assert {name.partition(".")[0] for name in unknown} >= {"forecast", "cycles"}
     text = "\n".join(result.as_text(found))
     assert "Verdict: named" in text
     for name in unknown:

@@ -54,7 +54,7 @@ def test_a_killed_run_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["chaos", "adaptive", "bifurcation", "lifetime", "list", "sweep"])
+@pytest.mark.parametrize("name", ["chaos", "slow", "bifurcation", "lifetime", "list", "sweep"])
 def test_every_killed_analysis_goes_on(tmp_path: Path, name: str) -> None:
     killed_often(name, tmp_path, 5)
 

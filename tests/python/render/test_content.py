@@ -111,22 +111,6 @@ def test_values_of_settle_time_and_cells_without_one() -> None:
     assert (drawn[expected >= 0] == np.maximum(expected, 1)[expected >= 0]).all()
 
 
-def test_cells_that_were_filled_are_grey() -> None:
-    dataset = pendmap.basins(pendmap.Pendulum(p=0.6), 100, adaptive=True)
-    filled = dataset["computed"].values == 0
-    assert 0.1 < filled.mean() < 0.9
-    assert titles(made(dataset)) == ["basins of attraction", "settle time; filled cells grey"]
-    for layer, variable in (("settle", "settle_periods"), ("turns", "net_turns")):
-        under, over = made(dataset, layer).axes[0].images
-        drawn: Floats = np.ma.filled(np.ma.asarray(over.get_array()), np.nan)
-        assert (np.isnan(drawn) == filled).all()
-        assert (drawn[~filled] == dataset[variable].values[~filled]).all()
-        grey = np.asarray(under.get_array()) == palette.rgb("filled")
-        assert (grey.all(axis=-1) == filled).all()
-    (labels,) = made(dataset, "labels").axes[0].images
-    assert not (np.asarray(labels.get_array()) == palette.rgb("filled")).all(axis=-1).any()
-
-
 def test_unreliable_labels_come_last_small_and_marked() -> None:
     figure = made(synthetic.painted(**synthetic.UNRELIABLE))
     assert titles(figure) == ["settle time", "net turns until settled", "basins of attraction"]

@@ -103,17 +103,6 @@ def test_a_selection_of_a_basin_map_is_drawn(
         assert float(entry.share.split()[0]) == pytest.approx(100 * share, abs=0.51)
 
 
-def test_a_selection_of_an_adaptive_map_estimates_its_own_settling_time() -> None:
-    model = Pendulum(p=0.6)
-    full, own = (pendmap.basins(model, 300, adaptive=on) for on in (False, True))
-    full, own = (shown(each.isel(velocity=slice(0, 150))) for each in (full, own))
-    drawn = own["settle_periods"].values[own["computed"] > 1]
-    error = drawn.std() / np.sqrt(drawn.size)
-    assert abs(float(own["mean_settle"]) - float(full["mean_settle"])) < 4 * error
-    gone = {"computed_share", "audited", "audited_wrong", "label_error", "label_error_low"}
-    assert not gone & {*own.variables}
-
-
 @settings(max_examples=5, phases=FEW)
 @given(theta=parts, velocity=parts, turned=st.booleans())
 @pytest.mark.usefixtures("strict_recordings")

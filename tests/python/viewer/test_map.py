@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import motions
-import pendmap
 import synthetic
 from pendmap.charts import palette
 from pendmap.viewer import basins
@@ -49,22 +48,6 @@ def test_a_map_is_read_back(tmp_path: Path) -> None:
     none = int(back.one("/turns/data/turns", "class_of_no_turn"))
     assert (classes - none == dataset["net_turns"].values)[kept].all()
     assert (classes[~kept] == 0).all()
-
-
-def test_cells_that_were_filled_are_covered_by_grey(tmp_path: Path) -> None:
-    dataset = pendmap.basins(pendmap.Pendulum(p=0.6), 100, adaptive=True)
-    filled = dataset["computed"].values == 0
-    back = recorded(dataset, tmp_path)
-    for layer in ("settle", "turns"):
-        without = back.image(f"/{layer}/data/without", "SegmentationImage", np.uint16)
-        names = back.names(f"/{layer}/data/without")
-        assert names[without.max()] == "filled"
-        assert ((without == without.max()) == filled).all()
-        assert (without[~filled] == 0).all()
-    classes = back.image("/turns/data/turns", "SegmentationImage", np.uint16).astype(int)
-    none = int(back.one("/turns/data/turns", "class_of_no_turn"))
-    assert (classes - none == dataset["net_turns"].values)[~filled].all()
-    assert classes.max() < 100, "filled cells need no class of turns"
 
 
 def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:

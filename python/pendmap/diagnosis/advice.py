@@ -1,0 +1,175 @@
+"""Advice on the next record, and detection limits of the effects that were not found."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import TYPE_CHECKING, Final
+
+from pendmap.diagnosis.candidates import count_choices
+from pendmap.formatting import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from pendmap.diagnosis.candidates import Candidate
+    from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.diagnosis.named import NamedEffect
+    from pendmap.diagnosis.scores import Scores
+    from pendmap.diagnosis.state import ScoredModel
+    from pendmap.diagnosis.verdict import Assessment, Identifiability
+
+DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
+
+UNDETECTABLE: Final = 10.0
+"""Limit over the largest typical size above which an effect is undetectable."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Limit:
+    """Smallest size of an effect that would have been found with 95 % probability."""
+
+    size: float  # SI, for the least detectable of its detectable shapes; infinite if none is
+    candidate: Candidate  # The effect in that shape
+    unseen: tuple[Candidate, ...] = ()  # Undetectable shapes, if others are detectable
+
+
+@dataclasses.dataclass(frozen=True)
+class Advice:
+    """The recommended next record, and the detection limits."""
+
+    next_experiment: str | None  # In a few sentences; None if limits were not computed
+    limits: dict[str, Limit]  # Of each effect that was not found
+
+
+def detection_limits(
+    scores: Scores, level: float, found: FittedModel, chance: float
+) -> dict[str, Limit]:
+    """Return the smallest size of each effect that would have been found with 95 % probability.
+
+    A size ``a`` has the expected gain ``a^2`` times the information ``x' x`` of the effect,
+    orthogonal to the fitted parameters and initial states. The gain has a noncentral chi-squared
+    distribution and must exceed the threshold of the search, which noise alone exceeds with the
+    probability ``chance``.
+    """
+    from scipy.special import chdtri  # noqa: PLC0415 (where it is needed)
+
+    choices = count_choices([score.candidate for score in scores.scores])
+    shapes: dict[str, list[tuple[float, Candidate]]] = {}
+    for score in scores.scores:
+        candidate = score.candidate
+        if candidate.name in found.names:
+            continue
+        among = len(choices) * choices[candidate.name]
+        threshold = float(chdtri(candidate.count, chance / among))
+        wanted = required_gain(threshold, len(candidate.free))
+        shown = score.information / level
+        size = math.sqrt(wanted / shown) if shown > 0 else math.inf
+        most = max(map(abs, candidate.definition.parameters[0].typical))
+        if size > UNDETECTABLE * abs(
+            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+        ):
+            size = math.inf
+        shapes.setdefault(candidate.name, []).append((size, candidate))
+    limits = {}
+    for name, sizes in shapes.items():
+        seen = [pair for pair in sizes if math.isfinite(pair[0])]
+        size, candidate = max(seen or sizes, key=lambda pair: pair[0])
+        unseen = tuple(c for s, c in sizes if seen and not math.isfinite(s))
+        limits[name] = Limit(size, candidate, unseen)
+    return limits
+
+
+@functools.cache
+def required_gain(threshold: float, count: int) -> float:
+    """Return the expected gain that exceeds a threshold with 95 % probability.
+
+    ``count`` is the number of fitted parameters.
+    """
+    from scipy.optimize import brentq  # noqa: PLC0415 (where it is needed)
+    from scipy.stats import ncx2  # noqa: PLC0415
+
+    most = (math.sqrt(threshold) + 4.0) ** 2
+    return float(
+        brentq(
+            lambda g: float(ncx2.sf(threshold, count, g)) - DETECTION_PROBABILITY,
+            threshold / 2,
+            most,
+        )
+    )
+
+
+def advise(
+    best: ScoredModel,
+    nearest: ScoredModel,
+    assessment: Assessment,
+    effects: Sequence[NamedEffect],
+    scores: Scores,
+) -> Advice:
+    """Return the recommended next record and the detection limits.
+
+    The aim is to distinguish equivalent names, whatever the verdict; else to narrow the widest
+    interval of named effects; else to lower the detection limits. The information of independent
+    runs adds up, and intervals and limits are proportional to its inverse root.
+    """
+    chance = assessment.thresholds.chance
+    limits = detection_limits(scores, nearest.fitted.level, best.fitted, chance)
+    sentences: list[str | None] = []
+    if assessment.verdict in {"unknown", "partial"}:
+        sentences.append(
+            "Repeat one free decay several times over an hour: whether the residual repeats, and "
+            "what it varies with, indicates its cause."
+        )
+    classes = [one for one in assessment.identified if len(one.equivalent) > 1]
+    if classes:
+        sentences += map(_distinguishing, classes)
+    elif assessment.verdict in {"none", "named"}:
+        sentences.append(_narrowing(assessment, effects) or _lowering(limits))
+    return Advice(" ".join(filter(None, sentences)) or None, limits)
+
+
+def _distinguishing(one: Identifiability) -> str:
+    """Return the sentence on names that the records do not distinguish."""
+    alike = [r.candidate for r in one.alternatives if r.alike and not r.contains]
+    revealed: dict[str, list[str]] = {}
+    for candidate in (one.candidate, *alike):
+        revealed.setdefault(candidate.definition.revealed_by, []).append(candidate.name)
+    groups = [f"{', '.join(names)} ({what or 'unknown'})" for what, names in revealed.items()]
+    return f"To distinguish equally good names, record what reveals {', '.join(groups)}."
+
+
+def _narrowing(assessment: Assessment, effects: Sequence[NamedEffect]) -> str | None:
+    """Return the sentence on the widest interval; None without intervals."""
+    sizes = {
+        one.candidate.name: one.candidate.size
+        for one in assessment.identified
+        if not one.candidate.once  # An effect that acts once does not occur in a new record.
+    }
+    widths = {}
+    for effect in effects:
+        size = sizes.get(effect.name, "")
+        if size in effect.ci95:
+            low, high = effect.ci95[size]
+            widths[f"{effect.name}.{size}"] = (high - low) / 2 / abs(effect.parameters[size])
+    if not widths:
+        return None
+    widest = max(widths, key=lambda name: widths[name])
+    return (
+        f"{widest} has the widest interval, +- {100 * widths[widest]:.2g} % (95 %): about four "
+        "times as many such records halve it."
+    )
+
+
+def _lowering(limits: Mapping[str, Limit]) -> str | None:
+    """Return the sentences on the detection limits; None without limits."""
+    if not limits:
+        return None
+    text = "About four times as many such records halve the detection limits."
+    unseen = sum(math.isinf(limit.size) for limit in limits.values())
+    if unseen:
+        text += (
+            f" {counted(unseen, 'effect')} cannot be detected in such records at any size: "
+            "pendmap effects lists the records that reveal each."
+        )
+    return text

@@ -1,1 +1,0 @@
-"""Proposals of the next record, and detection limits of effects."""
