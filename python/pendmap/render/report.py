@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pendmap.diagnosis import Discrepancy
-    from pendmap.report.document import Document
 
 SUFFIXES: Final = (".html", ".md")  # File suffixes of a report
 
@@ -36,20 +35,18 @@ def figures(found: Discrepancy) -> dict[str, Figure]:
 
 def write(found: Discrepancy, path: Path) -> Path:
     """Write the report of a diagnosis; see :func:`pendmap.render.write_report`."""
-    document = report.diagnosis(found)
     with style.DRAWING, mpl.rc_context(style.RC):
-        drawn = figures(found)
-        pictures = {name: _png(drawn[name]) for name in document.pictures if name in drawn}
+        pictures = {name: _png(drawn) for name, drawn in figures(found).items()}
     suffix = "" if path.is_dir() else path.suffix.lower()
     if suffix == ".html":
-        _put({path: report.as_html(document, pictures).encode()})
+        _put({path: report.as_html(found, pictures).encode()})
     elif suffix == ".md":
-        _put(_markdown(path, document, pictures, f"{path.stem}_"))
+        _put(_markdown(path, found, pictures, f"{path.stem}_"))
     else:
         with contextlib.nullcontext(path) if path.is_dir() else whole_folder(path) as folder:
             folder.mkdir(exist_ok=True)
-            files = _markdown(folder / "report.md", document, pictures)
-            files[folder / "report.html"] = report.as_html(document, pictures).encode()
+            files = _markdown(folder / "report.md", found, pictures)
+            files[folder / "report.html"] = report.as_html(found, pictures).encode()
             _put(files)
     return path
 
@@ -68,9 +65,9 @@ def _png(made: Figure) -> bytes:
 
 
 def _markdown(
-    path: Path, document: Document, pictures: dict[str, bytes], prefix: str = ""
+    path: Path, found: Discrepancy, pictures: dict[str, bytes], prefix: str = ""
 ) -> dict[Path, bytes]:
     """Return a Markdown file and its figures, whose names begin with a prefix."""
     names = {name: f"{prefix}{name}.png" for name in pictures}
     files = {path.with_name(names[name]): content for name, content in pictures.items()}
-    return files | {path: report.as_markdown(document, names).encode()}
+    return files | {path: report.as_markdown(found, names).encode()}

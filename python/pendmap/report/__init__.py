@@ -1,8 +1,7 @@
-"""Reports in Markdown and HTML from one document structure."""
+"""A diagnosis as a report in Markdown and HTML."""
 
 from __future__ import annotations
 
-from pendmap.report.diagnosis import diagnosis
-from pendmap.report.document import as_html, as_markdown
+from pendmap.report.diagnosis import as_html, as_markdown
 
-__all__ = ["as_html", "as_markdown", "diagnosis"]
+__all__ = ["as_html", "as_markdown"]

@@ -107,7 +107,7 @@ def record_discrepancy(found: Discrepancy, path: str | os.PathLike[str]) -> Path
     arrays = (a for one in shown for a in (one.time, one.record, one.before, one.after))
 
     def log(stream: rr.RecordingStream) -> None:
-        frame.text(stream, "summary", report.as_markdown(report.diagnosis(found), {}))
+        frame.text(stream, "summary", report.as_markdown(found, {}))
         for number, one in enumerate(shown, 1):
             _log(stream, f"run_{number}", one, larger)
         for place in panels:

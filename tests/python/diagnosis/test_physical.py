@@ -140,7 +140,7 @@ def test_the_printed_model_equals_the_written_one(tmp_path: Path) -> None:
     assert "Tr" not in fields["parameters"]
     (line,) = (line for line in as_text(found) if line.startswith("Tr is fixed at 0"))
     assert "unphysical" in line
-    assert line in report.as_markdown(report.diagnosis(found), {})
+    assert line in report.as_markdown(found, {})
     path = save_model(diagnosed_model(found), tmp_path / "model.toml")
     content = tomllib.loads(path.read_text(encoding="utf-8"))
     assert content["pendulum"].get("Tr", 0.0) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import html
 import math
 import re
 import resource
@@ -19,11 +20,13 @@ from hidden import once
 from pendmap import InputError, render, report
 from pendmap.charts import diagnosis
 from pendmap.diagnosis import Thresholds
+from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.summary import as_json
+from pendmap.formatting import Estimate, estimate_text, interval
+from pendmap.model.labels import unit_of
 from pendmap.render import drawing, style
 from pendmap.render.report import figures
-from pendmap.report.document import Document, Picture, bullets, code, plain, table
-from pendmap.report.wording import chance, number, stated, within
+from pendmap.report.markdown import as_page, markdown_templates, plain
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,10 +103,15 @@ def test_each_verdict_has_a_report(verdict: str, tmp_path: Path) -> None:
     claims = verdict in {"named", "partial", "ambiguous"}
     assert ("after" in page.words) == claims
     assert ("baseline" in page.words) or claims
-    assert bool(re.search(r"- q v \|v\|", markdown)) == claims
+    assert ("`-q v |v|`" in markdown) == claims
+    # What the command prints is in the report.
+    first, *lines = [line.strip() for line in as_text(found)]
+    meaning = first.removeprefix(f"Verdict: {verdict}: ")
+    assert f"**{verdict.capitalize()}**: {meaning}." in markdown
+    assert all(f"- {plain(line)}\n" in markdown for line in lines)
     if verdict == "ambiguous":
         (names,) = found.equivalent
-        assert all(f"`{name}`" in markdown.split("\n")[2] for name in names)
+        assert f"- indistinguishable in these records: {', '.join(names)}\n" in markdown
         assert "To distinguish equally good names, record what reveals" in markdown
 
 
@@ -112,7 +120,7 @@ def test_a_report_states_the_thresholds_of_its_diagnosis() -> None:
     limits = Thresholds(rest=0.02, alike=12.5)
     assessment = dataclasses.replace(found.assessment, thresholds=limits)
     found = dataclasses.replace(found, assessment=assessment)
-    text = report.as_markdown(report.diagnosis(found), {})
+    text = report.as_markdown(found, {})
     assert "Below 0.02 the residuals are significant." in text
     assert "indistinguishable: behind by less than 12.5, or by one run alone" in text
 
@@ -120,13 +128,14 @@ def test_a_report_states_the_thresholds_of_its_diagnosis() -> None:
 def test_the_numbers_of_a_report_are_those_of_the_json() -> None:
     found = once("quadratic_drag")
     fields = as_json(found)
-    text = report.as_markdown(report.diagnosis(found), {})
+    text = report.as_markdown(found, {})
     lines = [line for line in text.split("\n") if line.startswith("|")]
     rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
     told: dict[object, list[str]] = {(row[0], row[1]): row for row in rows}
     told |= {row[0]: row for row in rows}
     gap = fields["gap"]
     floor = gap["noise_floor"]
+    assert told["residual (mrad)"] == ["residual (mrad)", "before", "after", "noise"]
     assert told["fitted runs"][1:] == [mrad(gap["before"]), mrad(gap["after"]), mrad(floor)]
     held = [mrad(gap[f"held_out_{what}"]) for what in ("before", "after", "noise_floor")]
     assert told["held out"][1:] == held
@@ -135,46 +144,23 @@ def test_the_numbers_of_a_report_are_those_of_the_json() -> None:
         numbers = [mrad(run[key]) for key in ("before", "after", "noise_floor")]
         assert [name, *numbers] in rows
     for forecast in fields["forecast"]:
-        ahead = f"{forecast['horizon_s'][-1]:.3g} s"
+        ahead = f"{forecast['horizon_s'][-1]:.3g}"
         last = [mrad(forecast[key][-1]) for key in ("before", "after")]
         assert told[forecast["runs"], ahead][2:4] == last
     (effect,) = fields["effects"]
-    value, low, high = re.search(  # type: ignore[union-attr]
-        r"q = ([\d.]+) 1/rad \(95 %: ([\d.]+) to ([\d.]+)\)", text
-    ).groups()
-    assert float(value) == pytest.approx(effect["parameters"]["q"], rel=1e-2)
-    bounds = effect["ci95"]["q"]
-    assert [float(low), float(high)] == pytest.approx(bounds, rel=1e-2)
+    assert f"probability {effect['probability']:.3f}" in text
+    for name, value in found.parameters.items():
+        assert told[f"`{name}`", unit_of(name)][3:] == [estimate_text(value), interval(value)]
+    assert found.parameters["quadratic_drag.q"].value == effect["parameters"]["q"]
     for row in fields["ranking"][:8]:
         assert told[f"`{row['name']}`"][0] == f"`{row['name']}`"
         assert any(r[0] == f"`{row['name']}`" and f"{row['score']:.1f}" in r for r in rows)
     for name, limit in fields["detection_limits"].items():
-        assert told[f"`{name}`"][2].startswith(number(limit, 2))
+        size = found.definition(name).parameters[0].name
+        assert told[f"`{name}.{size}`"][1].split()[0] == f"{limit:.2g}"
     for run, each in zip(found.data.fitted, fields["runs"]["quadratic_drag.q"], strict=True):
-        assert any(r[0] == f"`{run.name}`" and r[2] == number(each["stderr"], 2) for r in rows)
-
-
-def test_numbers_have_one_format_and_errors_two_digits() -> None:
-    assert [number(v, 2) for v in (0.00085, 6.3e-7, -190.4, 0.0, 1e-9, 3200.0)] == [
-        "0.00085",
-        "6.3 \N{MULTIPLICATION SIGN} 10⁻⁷",
-        "-190",
-        "0",
-        "10⁻⁹",
-        "3200",
-    ]
-    assert within(6.34e-7, 1.2e-7) == "6.3 \N{MULTIPLICATION SIGN} 10⁻⁷"
-    assert within(0.00020563, 2.3e-6) == "0.0002056"
-    assert stated(0.5292, 0.11) == "0.53 \N{PLUS-MINUS SIGN} 0.11"
-    assert stated(-8.349e-5, 1.9e-7) == (
-        "(-8.349 \N{PLUS-MINUS SIGN} 0.019) \N{MULTIPLICATION SIGN} 10⁻⁵"
-    )
-    assert [chance(p) for p in (0.00758, 0.129, 0.99537, 0.9999)] == [
-        "0.76 %",
-        "13 %",
-        "99.5 %",
-        "above 99.9 %",
-    ]
+        value = estimate_text(Estimate(each["value"], each["stderr"]))
+        assert ["`quadratic_drag.q`", f"`{run.name}`", value] in rows
 
 
 @pytest.mark.parametrize("size", [1.0, -1.0])
@@ -196,35 +182,56 @@ def test_the_band_of_all_runs_is_the_interval_that_is_stated(size: float) -> Non
 
 
 def mrad(value: float) -> str:
-    return f"{1e3 * value:.3g} mrad"
+    return f"{1e3 * value:.3g}"
 
 
 NASTY = "a|b <script>alert(1)</script> *c* _d_ `e` [f](g) # & \\ $h$ ``i"
 
 
 def test_text_of_a_user_is_shown_unchanged() -> None:
-    """HTML of each block, and Markdown of the whole file, contain the given text."""
-    formula = "th'' = -a |v| <b>"
-    document = Document(
-        f"Title {NASTY}",
-        (
-            f"**Strong** and {plain(NASTY)}",
-            f"## {plain(NASTY)}",
-            plain(f"1. {NASTY}"),
-            plain(f"- {NASTY}"),
-            bullets([plain(NASTY), f"{code(NASTY)} and {code('`')}", plain("+ more")]),
-            f"```\n{formula}\n```",
-            table(("one", "two|three"), ((code(NASTY), plain(NASTY)), ("", "-4.5"))),
-            Picture("absent", "Nothing."),
-        ),
-    )
+    """HTML and Markdown of what a template prints contain the given text."""
+    template = """# Title {{ text }}
+
+**Strong** and {{ text }}
+
+## {{ text }}
+
+{{ "1. " ~ text }}
+
+{{ "- " ~ text }}
+
+- {{ text }}
+- {{ text|code }} and {{ "`"|code }}
+- {{ more }}
+
+{{ ["one", none, "two|three"]|head }}
+{{ [text|code, none, text]|row }}
+{{ ["", none, -4.5]|row }}
+"""
+    text = markdown_templates().from_string(template).render(text=NASTY, more="+ more")
     given = [f"Title {NASTY}", f"Strong and {NASTY}", NASTY, f"1. {NASTY}", f"- {NASTY}", NASTY]
-    given += [f"{NASTY} and ` + more", formula, "one two|three", NASTY, NASTY, "-4.5"]
-    page = Page(report.as_html(document, {}))
+    given += [f"{NASTY} and ` + more", "one two|three", NASTY, NASTY, "-4.5"]
+    page = as_page(text)
+    assert f"<title>{html.escape(f'Title {NASTY}')}</title>" in page
+    assert "script" not in Page(page).tags
+    assert Page(page).words == " ".join(given).split()
+    read = MarkdownIt("commonmark").enable("table").render(text)
+    assert Page(read).words == Page(page).words
+
+
+def test_a_name_in_a_report_is_shown_unchanged() -> None:
+    found = once("quadratic_drag")
+    runs = [dataclasses.replace(run, name=NASTY, file=NASTY) for run in found.data.runs]
+    fitted = [dataclasses.replace(run, name=NASTY) for run in found.data.fitted]
+    gap = [dataclasses.replace(run, name=NASTY) for run in found.gap.by_run]
+    renamed = dataclasses.replace(
+        found,
+        data=dataclasses.replace(found.data, runs=tuple(runs), fitted=tuple(fitted)),
+        gap=dataclasses.replace(found.gap, by_run=gap),
+    )
+    page = Page(report.as_html(renamed, {}))
     assert "script" not in page.tags
-    assert page.words == " ".join(given).split()
-    read = MarkdownIt("commonmark").enable("table").render(report.as_markdown(document, {}))
-    assert Page(read).words == page.words
+    assert " ".join(page.words).count(NASTY) >= len(runs) + len(fitted) + len(gap)
 
 
 def test_a_report_is_written_in_each_format(tmp_path: Path) -> None:

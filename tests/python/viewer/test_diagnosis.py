@@ -125,7 +125,7 @@ def test_no_view_is_empty(found: Discrepancy, back: ReadBack) -> None:
 
 def test_the_report_is_in_the_recording(found: Discrepancy, back: ReadBack) -> None:
     text = back.one("/summary", "TextDocument:text")
-    assert text == report.as_markdown(report.diagnosis(found), {})
+    assert text == report.as_markdown(found, {})
     assert back.one("/__properties/pendmap", "verdict") == "named"
 
 
