@@ -1,28 +1,31 @@
 """Recordings for the Rerun viewer; the only package that imports rerun.
 
-``record`` writes the recording of a dataset, ``record_identification`` that of an identification,
-``record_discrepancy`` that of a diagnosis, ``view`` that of any of them; ``open_viewer`` shows a
+``record`` writes the recording of a result, ``view`` writes it or opens it; ``open_viewer`` shows a
 recording; ``Live`` sends a trajectory to a running viewer during its computation.
 """
 
 from __future__ import annotations
 
 import functools
-import importlib
 import os
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
 from pendmap.charts import registry
 from pendmap.errors import InputError, MissingExtraError, ViewerError, short_repr
+from pendmap.files import facts
 
 try:
-    from pendmap.viewer import basin_sweep, basins, chart, frame, trajectory
-    from pendmap.viewer.frame import SUFFIXES
+    import rerun.blueprint as rrb
+
+    from pendmap.viewer import moving, recording, sweep, trajectory
+    from pendmap.viewer.chart import CELLS, drawings, plain
     from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
+    from pendmap.viewer.recording import SUFFIXES
     from pendmap.viewer.window import (
         NoDisplayError,
         NotARecordingError,
@@ -35,10 +38,11 @@ except ModuleNotFoundError as error:
     raise MissingExtraError(text) from error
 
 if TYPE_CHECKING:
-    from pendmap.diagnosis import Discrepancy
-    from pendmap.identification import IdentificationReport
-    from pendmap.viewer.discrepancy import record_discrepancy
-    from pendmap.viewer.identification import record_identification
+    from collections.abc import Iterable
+
+    import rerun as rr
+
+    from pendmap.viewer.chart import Drawing
 
 __all__ = [
     "ADDRESS",
@@ -53,65 +57,40 @@ __all__ = [
     "check_display",
     "open_viewer",
     "record",
-    "record_discrepancy",
-    "record_identification",
     "view",
 ]
 
-_KINDS = {
-    "basin_sweep": (basin_sweep.blueprint, basin_sweep.log),
-    "basins": (basins.blueprint, basins.log),
-    "trajectory": (trajectory.blueprint, trajectory.log),
-}
-
-_OF_RECORDS = {
-    "record_discrepancy": "pendmap.viewer.discrepancy",
-    "record_identification": "pendmap.viewer.identification",
-}
-
-_RECORDS = {
-    "Discrepancy": "record_discrepancy",
-    "IdentificationReport": "record_identification",
-}
-"""Functions of results of records, by their type: importing the types takes half a second."""
+_OF_A_RUN = ("seconds", "summary", "history")  # Facts that differ between equal results
+_PLAIN = (str, bool, int, float, np.generic)
+ASIDE = rrb.Vertical(
+    rrb.TextDocumentView(origin="/legend", name="Legend"),
+    rrb.TextDocumentView(origin="/summary", name="Summary"),
+)
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 (functions)
-    """Import recordings of records on demand: importing fits takes half a second."""
-    if name not in _OF_RECORDS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_OF_RECORDS[name]), name)
+def record(
+    result: Any,  # noqa: ANN401 (a dataset, records, or what was found in records)
+    path: str | os.PathLike[str],
+) -> Path:
+    """Write the recording of a result, with the layout in which the viewer shows it.
 
-
-def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write the recording of a dataset, with the layout in which the viewer shows it.
-
-    Basin map: ``/basin/data/{labels,attractors}``, ``/settle/data/steps``,
-    ``/turns/data/turns``, ``/exponent/data/exponent`` (meaningful layers, the leading one in
-    front), ``/legend`` and ``/summary``. Sweep: ``/basin/data/{labels,attractors}`` of each model,
-    on the timeline of the parameter (of two: ``map``), its chart, ``/legend`` and ``/summary``.
-    Closed orbits: ``/phase/data/NUMBER`` with ``path`` and ``points``, ``/legend`` and
-    ``/summary``. Map over two parameters: ``/kinds/data/kinds``,
-    ``/{exponent,attractors,undecided}/data/values``. Bifurcation diagram:
-    ``/{bifurcation,velocity,exponent}/data/NUMBER``. Exponent: ``/growth/data/own``,
-    ``/average/data/{own,band,value}`` and ``/distribution/data/density`` or, for a closed orbit,
-    ``/exponent/data/{own,value}``, and ``/attractor/data/points``. Lifetime:
-    ``/survival/data/NUMBER`` (0: all), ``/survival/data/{tail,band}``,
-    ``/tail/data/{mean,error,fitted}`` and ``/legend``. Critical curves:
-    ``/tongues/data/{plus,minus,undamped,fold,own}``, also under ``/paper`` in the plane of
-    eq. 1.4. Melnikov's criterion: ``/melnikov/data/{forward,backward,own}``. Trajectory:
+    A recording has every panel of the result's chart, marks under ``/PANEL/data``, their names and
+    colours in ``/legend``, and ``/summary``. Basin map: ``/basin/data/{labels,attractors}``,
+    ``/settle/data/steps``, ``/turns/data/turns``, ``/exponent/data/exponent``. Sweep: the basins of
+    each model on the timeline of the parameter (of two: ``map``), and its chart. Map over two
+    parameters: ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``.
+    Bifurcation diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Trajectory:
     ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
-    ``/phase/data/{curve,now}``, ``/poincare/data/points`` and ``/summary``, on the timelines
-    ``sim_time`` (nondimensional time, shown as seconds) and ``period``.
+    ``/phase/data/{curve,now}``, ``/poincare/data/points``, on the timelines ``sim_time``
+    (nondimensional time, shown as seconds) and ``period``. Identification and diagnosis, of each
+    run, on the record's own seconds: ``/run_1/angle/{record,model}``,
+    ``/run_1/residual/{residual,above,below}`` (mrad) and moving pendulums in
+    ``/run_1/pendulum/data``; a diagnosis has the models ``before`` and ``after``.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        Result of ``pendmap.basins``, ``pendmap.sweep``, ``pendmap.orbit``,
-        ``pendmap.parameter_map``,
-        ``pendmap.bifurcation``, ``pendmap.lyapunov``, ``pendmap.lifetime``, ``pendmap.tongues``,
-        ``pendmap.melnikov`` or ``pendmap.simulate``; ``attrs["kind"]`` names the kind. A
-        selection is shown with its own cells, as by :func:`pendmap.render.draw`.
+    result : xarray.Dataset or other result
+        Whatever has a figure. A selection of a dataset is shown with its own cells.
     path : str or path
         The file to write, ``.rrd``; an existing one is replaced.
 
@@ -123,41 +102,108 @@ def record(dataset: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        For an unknown kind of dataset or suffix.
+        If there is no recording of such a result, for another suffix, or for times that a recording
+        cannot hold.
     MemoryError
         If the dataset is too large.
     OSError
         If the file cannot be written.
     """
-    dataset = registry.ready(dataset, "record")
-    kind = dataset.attrs["kind"]
-    if kind in _KINDS:
-        layout, log = _KINDS[kind]
-        view = layout(dataset)
+    if isinstance(result, xr.Dataset):
+        made = _of_dataset(registry.ready(result, "record"))
+    elif type(result).__name__ in registry.RESULTS:
+        made = _of_records(result)
     else:
-        made = registry.build(dataset, cells=basins.CELLS)
-        view, log = chart.blueprint(made), functools.partial(chart.log, chart=made)
-    return frame.save(
-        path,
-        view,
-        lambda stream: log(stream, dataset),
-        name=": ".join(str(dataset.attrs[k]) for k in ("kind", "title") if k in dataset.attrs),
-        content=frame.identifier(dataset),
-        known=frame.properties(dataset),
-    )
+        raise InputError(
+            "result must be a dataset, records, an identification, a comparison or a diagnosis, "
+            f"got {short_repr(result)}"
+        )
+    return recording.save(path, **made)
+
+
+def _of_dataset(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return layout, contents and name of the recording of a dataset."""
+    attrs, kind = dataset.attrs, dataset.attrs["kind"]
+    known = {str(k): v for k, v in facts(dataset).items() if k not in _OF_A_RUN}
+    arrays = (v.values for k, v in sorted(dataset.variables.items()) if v.ndim)
+    made: dict[str, Any] = {
+        "name": ": ".join(str(attrs[key]) for key in ("kind", "title") if key in attrs),
+        "content": recording.content_of([sorted(known.items()), *arrays]),
+        "known": {k: _property(v) for k, v in known.items() if isinstance(v, _PLAIN)},
+    }
+    if kind == "trajectory":
+        layout = trajectory.blueprint(dataset)
+        return made | {"layout": layout, "log": functools.partial(trajectory.log, dataset=dataset)}
+    drawn = drawings(registry.build(dataset, cells=CELLS))
+    front: list[rrb.View | rrb.Container] = [drawn[0].container]
+    line = recording.TIMELINE
+    if kind == "basin_sweep":
+        front, line = [sweep.view(dataset), *front], sweep.timeline(dataset)
+
+    def log(stream: rr.RecordingStream) -> None:
+        lines = str(attrs.get("summary", "")).splitlines()
+        _pages(stream, drawn, "\n\n".join(lines))
+        if kind == "basin_sweep":
+            sweep.log(stream, dataset, drawn[0].places)
+
+    shares = [*([6] * len(front)), 5]
+    return made | {
+        "layout": recording.screen(*front, ASIDE, shares=shares, timeline=line),
+        "log": log,
+    }
+
+
+def _of_records(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
+    """Return layout, contents and name of the recording of what was found in records."""
+    from pendmap.viewer import runs  # noqa: PLC0415 (importing fits takes half a second)
+
+    shown = registry.of_result(result, cells=CELLS)
+    drawn, summary = drawings(shown), runs.summary(result)
+    motions, larger = runs.motions(result)
+    moving.refuse_late(shown.title, (one.time for one in motions))
+    tabs = [runs.container(f"run_{k}", one, larger) for k, one in enumerate(motions, 1)]
+    tabs += [one.container for one in drawn]
+
+    def log(stream: rr.RecordingStream) -> None:
+        _pages(stream, drawn, summary)
+        for number, one in enumerate(motions, 1):
+            runs.log(stream, f"run_{number}", one, larger)
+
+    arrays = (v for one in motions for v in (one.time, one.record, *(m[2] for m in one.models)))
+    return {
+        "name": plain(shown.title),
+        "content": recording.content_of([shown.title, summary, *arrays]),
+        "known": {"deviations_drawn_larger": larger, **runs.known(result)},
+        "layout": recording.screen(rrb.Tabs(*tabs, active_tab=0), ASIDE, shares=[11, 5]),
+        "log": log,
+    }
+
+
+def _pages(stream: rr.RecordingStream, drawn: Iterable[Drawing], summary: str) -> None:
+    """Log the panels of charts, their legend and a summary."""
+    recording.text(stream, "summary", summary)
+    recording.text(stream, "legend", "\n".join(line for one in drawn for line in one.legend()))
+    for one in drawn:
+        for place in one.places:
+            place.log(stream)
+
+
+def _property(value: Any) -> float | str:  # noqa: ANN401 (text or a number)
+    """Return a property, which has one type in all recordings of a process."""
+    return value if isinstance(value, str) else float(value)
 
 
 def view(
-    result: xr.Dataset | IdentificationReport | Discrepancy | str | os.PathLike[str],
+    result: Any,  # noqa: ANN401 (a dataset, records, or what was found in records)
     path: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the Rerun recording of a result, or open it in the viewer.
 
     Parameters
     ----------
-    result : xarray.Dataset, IdentificationReport, Discrepancy or path
-        A result of any analysis, of :func:`pendmap.identify` or :func:`pendmap.diagnose`; or a
-        recording (.rrd), which is opened.
+    result : xarray.Dataset, other result or path
+        A result of any analysis, records, a result of :func:`pendmap.identify`,
+        :func:`pendmap.compare` or :func:`pendmap.diagnose`; or a recording (.rrd), which is opened.
     path : str or path, optional
         The recording to write, ``.rrd``; an existing one is replaced. Without it the viewer shows
         the result, from a file in a temporary folder.
@@ -188,19 +234,8 @@ def view(
             raise InputError(f"path must be left out where a recording is opened, got {path!r}")
         open_viewer(result)
         return Path(result)
-    kind = type(result).__name__
-    if isinstance(result, xr.Dataset):
-        write: Any = record
-    elif kind in _RECORDS:
-        write = __getattr__(_RECORDS[kind])
-    else:
-        raise InputError(
-            "result must be a dataset, an identification, a diagnosis or the path of a recording, "
-            f"got {short_repr(result)}"
-        )
     if path is not None:
-        return Path(write(result, path))
-    target = Path(tempfile.mkdtemp(prefix="pendmap-")) / "result.rrd"
-    write(result, target)
+        return record(result, path)
+    target = record(result, Path(tempfile.mkdtemp(prefix="pendmap-")) / "result.rrd")
     open_viewer(target)
     return target

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, ViewerError
-from pendmap.viewer import frame, trajectory
+from pendmap.viewer import recording, trajectory
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -86,19 +86,19 @@ class Live:
         self._attrs = dict(model.attributes)
         self._period = model.period
         fastest = max(abs(start[1]), 2 * math.sqrt(1 + abs(model.p)) * model.units.w0)
-        self._around = trajectory.frame_of(self._attrs, np.array([-fastest, fastest]))
+        self._around = trajectory.places(self._attrs, np.array([-fastest, fastest]))
         self._waiting: list[Floats] = []
         self._before = np.empty((3, 0))
         self._sent = 0
         # A new name each time: the viewer merges recordings of equal name.
-        self._stream: rr.RecordingStream = frame.identified(uuid.uuid4().hex)
-        with frame.strict():
+        self._stream: rr.RecordingStream = recording.identified(uuid.uuid4().hex)
+        with recording.strict():
             url = f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
             layout = trajectory.layout(self._attrs, self._around)
             self._stream.connect_grpc(url, default_blueprint=layout)
             self._stream.send_recording_name(f"trajectory: {model.title}")
             trajectory.still(self._stream, self._attrs, self._around)
-            frame.text(self._stream, "summary", f"{model.title}\n\nRunning.")
+            recording.text(self._stream, "summary", f"{model.title}\n\nRunning.")
 
     def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
         """Collect samples; send them once there are enough."""
@@ -116,7 +116,7 @@ class Live:
         """
         self._send()
         motion = trajectory.motion_of(dataset)
-        with frame.strict():
+        with recording.strict():
             self._frame(motion[2])
             trajectory.curve(self._stream, self._attrs, motion)
             trajectory.summary(self._stream, dataset)
@@ -133,16 +133,16 @@ class Live:
         time, theta, velocity = block = np.concatenate(self._waiting, axis=1)
         self._waiting = []
         trajectory.refuse_beyond(time, velocity)
-        with frame.strict():
+        with recording.strict():
             fastest = float(np.abs(velocity).max())
-            if fastest > self._around.y[1]:
+            if fastest > self._around[0].y[1]:
                 self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
             early = self._sent < _MOVING
             bins = trajectory.BINS if early else _LATER
             trajectory.series(self._stream, self._attrs, block, bins)
             whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
             every = 1 if early else -(-time.size // _LATER)
-            trajectory.moving(self._stream, self._attrs, whole, since=since, every=every)
+            trajectory.moving_parts(self._stream, self._attrs, whole, since=since, every=every)
             period = np.round(time / self._period).astype(np.int64)
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
             trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
@@ -152,6 +152,6 @@ class Live:
 
     def _frame(self, velocity: Floats) -> None:
         """Draw the frames anew, for these velocities."""
-        self._around = trajectory.frame_of(self._attrs, velocity)
+        self._around = trajectory.places(self._attrs, velocity)
         trajectory.still(self._stream, self._attrs, self._around)
         self._stream.send_blueprint(trajectory.layout(self._attrs, self._around))

@@ -12,14 +12,17 @@ import rerun.blueprint as rrb
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
+from pendmap.charts.chart import Panel
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import TIME, Units
-from pendmap.viewer import columns, frame
-from pendmap.viewer.columns import FASTEST, LATEST, Look
+from pendmap.viewer import moving, recording
+from pendmap.viewer.chart import Place
+from pendmap.viewer.moving import FASTEST, LATEST, Look
+from pendmap.viewer.recording import INK, TIMELINE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import xarray as xr
 
@@ -41,8 +44,8 @@ TRAILS = 20000
 
 MANY = 1000  # Number of points of a section above which they are drawn smaller
 
-MOVING = 100_000
-"""Samples at each end of a long trajectory for which the moving pendulum is logged."""
+MOVING = 200_000
+"""Greatest number of positions of the pendulum; of a longer trajectory every k-th sample moves."""
 
 BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
 
@@ -64,13 +67,13 @@ def motion_of(dataset: xr.Dataset) -> Floats:
 def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
     """Return the layout: pendulum and summary left; phase plane, section and state right."""
     attrs = facts(dataset)
-    return layout(attrs, frame_of(attrs, dataset["velocity"].values))
+    return layout(attrs, places(attrs, dataset["velocity"].values))
 
 
-def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
-    """Return the layout for a trajectory with these attributes, in a given frame."""
+def layout(attrs: Attributes, around: Sequence[Place]) -> rrb.Blueprint:
+    """Return the layout for a trajectory with these attributes, in given frames."""
     so_far = rrb.VisibleTimeRange(
-        frame.TIMELINE,
+        TIMELINE,
         start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
@@ -89,14 +92,10 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
         rrb.TextDocumentView(origin="/summary", name="Summary"),
         row_shares=[3, 2],
     )
-    planes = rrb.Horizontal(
-        around.view("phase", "Phase plane"),
-        around.view(
-            "poincare", "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section", time_ranges=[so_far]
-        ),
-    )
+    phase, section = around
+    planes = rrb.Horizontal(phase.view(), section.view(time_ranges=[so_far]))
     right = rrb.Vertical(planes, rrb.Tabs(*state, active_tab=0), row_shares=[3, 2])
-    return frame.screen(left, right, shares=[2, 5])
+    return recording.screen(left, right, shares=[2, 5])
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
@@ -104,14 +103,10 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     attrs, motion = facts(dataset), motion_of(dataset)
     time, _, velocity = motion
     refuse_beyond(time, velocity)
-    still(stream, attrs, frame_of(attrs, velocity))
+    still(stream, attrs, places(attrs, velocity))
     summary(stream, dataset)
     series(stream, attrs, motion, BINS)
-    first, last = min(time.size, MOVING), max(time.size - MOVING, MOVING)
-    moving(stream, attrs, motion[:, :first])
-    if last < time.size:
-        rest(stream, float(time[first]))
-        moving(stream, attrs, motion[:, last:])
+    moving_parts(stream, attrs, motion, every=-(-time.size // MOVING))
     curve(stream, attrs, motion)
     section(
         stream,
@@ -123,21 +118,19 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
 
 
 def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the summary of the trajectory, and the part shown of a long one."""
+    """Log the summary of the trajectory, and how a long one is thinned."""
     clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
     units = Units.of(facts(dataset))
     if units.si:
         clock = "The time of the viewer is that of the rig."
-    time, parts = dataset["time"].values, [clock]
-    if time.size > 2 * MOVING:
-        ends = (units.at(f"{time[k]:.6g}") for k in (MOVING, time.size - MOVING))
-        parts.append(
-            "This is a long run: the pendulum moves up to {} and from {} on; curves against time "
-            "are drawn by their lowest and highest values; the section has all points.".format(
-                *ends
-            )
+    lines = [*str(dataset.attrs.get("summary", "")).splitlines(), clock]
+    every = -(-dataset.sizes["time"] // MOVING)
+    if every > 1:
+        lines.append(
+            f"This is a long run: the pendulum moves at every {every}th sample; curves against time "
+            "are drawn by their lowest and highest values; the section has all points."
         )
-    frame.summary(stream, dataset, *parts)
+    recording.text(stream, "summary", "\n\n".join(lines))
 
 
 def refuse_beyond(time: Floats, velocity: Floats) -> None:
@@ -149,9 +142,12 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
         raise InputError(f"until is {time[-1]:g}: a recording holds up to {LATEST:g}")
 
 
-def frame_of(attrs: Attributes, velocity: Floats) -> frame.Frame:
-    """Return the frame of the phase plane that contains these velocities."""
-    return frame.Frame.phase((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
+def places(attrs: Attributes, velocity: Floats) -> list[Place]:
+    """Return phase plane and section in frames that contain these velocities."""
+    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), plane.padded(velocity)
+    sides, ratio = names.phase_plane(theta, speeds, units), names.proportion(theta, speeds, units)
+    titles = {"phase": "Phase plane", "poincare": "Poincaré section"}
+    return [Place.of(Panel(name, title, *sides, ()), ratio) for name, title in titles.items()]
 
 
 def _stroke(attrs: Attributes) -> float:
@@ -160,17 +156,16 @@ def _stroke(attrs: Attributes) -> float:
     return abs(float(attrs["p"])) / omega**2 if omega else 0.0
 
 
-def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) -> None:
+def still(stream: rr.RecordingStream, attrs: Attributes, around: Sequence[Place]) -> None:
     """Log the static parts: frames, and the rail of the pivot."""
-    for root in ("phase", "poincare"):
-        around.log(stream, root)
+    for place in around:
+        place.log_frame(stream)
     stroke = _stroke(attrs)
-    stream.log("pendulum/data", rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0])), static=True)
+    stream.log("pendulum/data", moving.UPWARD, static=True)
     rail = [[[0.0, -stroke - 0.05], [0.0, stroke + 0.05]]]
     thin = rr.Radius.ui_points(0.75)
-    stream.log(
-        "pendulum/axes/rail", rr.LineStrips2D(rail, colors=[frame.INK], radii=thin), static=True
-    )
+    line = rr.LineStrips2D(rail, colors=[INK], radii=thin)
+    stream.log("pendulum/axes/rail", line, static=True)
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
@@ -178,14 +173,11 @@ def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: 
     units, (time, theta, velocity) = Units.of(attrs), motion
     every = (theta, velocity, energy(theta, velocity, attrs))
     for (name, (said, colour)), values in zip(_STATE.items(), every, strict=True):
-        path = f"state/{name}"
-        style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
-        stream.log(path, style, static=True)
         at, shown = plane.envelope(time, values, bins)
-        stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
+        moving.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=said(units)))
 
 
-def moving(
+def moving_parts(
     stream: rr.RecordingStream,
     attrs: Attributes,
     motion: Floats,
@@ -207,16 +199,16 @@ def moving(
     pivot = np.stack([np.zeros_like(height), height], axis=1)
     bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     new = np.arange(since, time.size, every)
-    columns.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
-    columns.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
+    moving.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
+    moving.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
     arm = np.stack([pivot[new], bob[new]], axis=1)
-    columns.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
+    moving.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
     chosen = new[:: max(1, -(-new.size // TRAILS))]
     back = behind(attrs, time)
     trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
-    columns.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    moving.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
     now = np.stack([plane.wrapped(theta[new]), velocity[new]], axis=1)
-    columns.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
+    moving.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
 
 
 def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
@@ -229,14 +221,6 @@ def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
     every = max(1, math.ceil(samples / TRAIL_POINTS))
     count = min(TRAIL_POINTS, max(2, math.ceil(samples / every)))
     return every * np.arange(count, dtype=np.int64)[::-1]
-
-
-def rest(stream: rr.RecordingStream, time: float) -> None:
-    """Clear the moving parts from this time on."""
-    stream.set_time(frame.TIMELINE, duration=time)
-    for path in ("pendulum/data", "phase/data/now"):
-        stream.log(path, rr.Clear(recursive=True))
-    stream.reset_time()
 
 
 def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Floats) -> None:
@@ -263,4 +247,4 @@ def section(
     at = np.stack([plane.wrapped(theta), velocity], axis=1)
     size = 1.4 if time.size > MANY else 2.5
     number = rr.TimeColumn("period", sequence=period.astype(np.int64))
-    columns.points(stream, "poincare/data/points", time, at, Look(BOB, size), number)
+    moving.points(stream, "poincare/data/points", time, at, Look(BOB, size), number)
