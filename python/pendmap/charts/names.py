@@ -67,7 +67,7 @@ def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
 
 def proportion(theta: Ends, velocity: Ends, units: Units) -> float:
     """Return the height of a phase plane over its width, within bounds."""
-    low, high = (units.bare(bound, VELOCITY) for bound in velocity)
+    low, high = (float(units.bare(bound, VELOCITY)) for bound in velocity)
     return min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
 
 

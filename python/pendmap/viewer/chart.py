@@ -1,4 +1,4 @@
-"""Any chart as a recording: panels in views with frame and ticks, marks in the axes' units."""
+"""Any chart as a recording: its panels, their marks, and a legend in words."""
 
 from __future__ import annotations
 
@@ -7,217 +7,29 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.charts import marks as charts
-from pendmap.charts import palette, plane
-from pendmap.charts.chart import Sheet, holding
-from pendmap.formatting import typographic
+from pendmap.charts import palette
+from pendmap.charts.chart import Sheet
 from pendmap.viewer import marks, recording
-from pendmap.viewer.recording import INK
+from pendmap.viewer.place import Place, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    import numpy.typing as npt
+    import rerun as rr
 
-    from pendmap.charts.chart import Axis, Chart, Panel
-    from pendmap.charts.marks import Ends, Floats, Mark
+    from pendmap.charts.chart import Chart
+    from pendmap.charts.marks import Mark
 
 CELLS: Final = 4096
 """Most rows and columns of an image; not all graphics processors take larger ones."""
-SIDE: Final = 1000.0  # Width of a frame, units of the view
-SHORT: Final = 8  # Greatest number of letters of an axis name beside the ticks
 FEW: Final = 3  # Number of views up to which they stand below one another
-_POWER: Final = re.compile(r"\$(-?)10\^\{(-?\d+)\}\$")
-
-
-def plain(text: str) -> str:
-    """Return a text of a chart in one line, without mathtext."""
-    return _POWER.sub(r"\g<1>10^\2", text).replace("\n", " ").strip()
-
-
-def scaled(axis: Axis, values: npt.ArrayLike) -> Floats:
-    """Return values as a linear axis shows them: powers of ten of a logarithmic one."""
-    x = np.asarray(values, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if axis.scale == "log":
-            return np.log10(x)
-        if axis.scale == "signed":
-            part = x / axis.straight
-            beyond = np.sign(part) * (1.0 + np.log10(np.abs(part)))
-            return np.where(np.abs(part) > 1.0, beyond, part)
-    return x
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Position of a panel in a recording and in its view.
-
-    A 2D view has y downward, linear axes and one scale for both. So all under ``root/data`` is
-    logged in the units of linear axes, one static transform maps it to the screen, and the frame
-    with its ticks is drawn under ``root/axes``, ``SIDE`` wide and ``height`` high.
-    """
-
-    panel: Panel
-    root: str
-    height: float
-    x: Ends
-    y: Ends
-
-    @classmethod
-    def of(cls, panel: Panel, ratio: float, root: str = "") -> Place:
-        """Return the place of a panel with this ratio of height to width."""
-        return cls(panel, root or panel.where, SIDE * ratio, _ends(panel, "x"), _ends(panel, "y"))
-
-    @property
-    def title(self) -> str:
-        """Title of the view."""
-        text = plain(self.panel.title or self.panel.name)
-        return text[:1].upper() + text[1:]
-
-    def points(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
-        """Return points, shape (n, 2), in the units of linear axes."""
-        both = scaled(self.panel.x, x), scaled(self.panel.y, y)
-        return np.stack(np.broadcast_arrays(*both), axis=-1)
-
-    def inside(self, points: Floats) -> npt.NDArray[np.bool_]:
-        """Return which points lie within the frame, because a view does not clip."""
-        (low, high), slack = np.sort([self.x, self.y]).T, 1e-9
-        slack *= high - low
-        return np.all((low - slack <= points) & (points <= high + slack), axis=1)
-
-    def lines(self, *lines: Floats) -> list[Floats]:
-        """Return the parts of lines within the frame, each of two or more points."""
-        parts: list[Floats] = []
-        for line in lines:
-            there = self.inside(line)
-            cuts = np.flatnonzero(np.diff(there.astype(np.int8))) + 1
-            pieces = zip(np.split(line, cuts), np.split(there, cuts), strict=True)
-            parts += [part for part, seen in pieces if len(part) > 1 and seen.all()]
-        return parts
-
-    def of_pixels(self, shape: tuple[int, ...], x: Ends, y: Ends) -> rr.Transform3D:
-        """Return the transform from an image's pixels, row 0 lowest, to the axes' units."""
-        (left, low), (right, high) = self.points(x, y)
-        scale = np.diag([(right - left) / shape[1], (high - low) / shape[0], 1.0])
-        return rr.Transform3D(translation=[left, low, 0.0], mat3x3=scale)
-
-    def view(
-        self, title: str = "", *, time_ranges: Sequence[rrb.VisibleTimeRange] | None = None
-    ) -> rrb.View:
-        """Return the view of this panel, with room for ticks and a colour bar."""
-        origin, name = f"/{self.root}", title or self.title
-        if self.panel.bare:
-            return rrb.TextDocumentView(origin=origin, name=name)
-        bounds = rrb.VisualBounds2D(
-            x_range=[-210.0, SIDE + 190.0], y_range=[-110.0, self.height + 150.0]
-        )
-        return rrb.Spatial2DView(
-            origin=origin, name=name, visual_bounds=bounds, time_ranges=time_ranges
-        )
-
-    def log_frame(self, stream: rr.RecordingStream) -> None:
-        """Log the transform, the frame, its ticks and the names of its axes."""
-        w, h = SIDE, self.height
-        sx, sy = w / (self.x[1] - self.x[0]), h / (self.y[1] - self.y[0])
-        to_screen = rr.Transform3D(
-            translation=[-sx * self.x[0], sy * self.y[1], 0.0], mat3x3=np.diag([sx, -sy, 1.0])
-        )
-        stream.log(f"{self.root}/data", to_screen, static=True)
-        below, along = _ticks(self.panel.x, self.x)
-        beside, up = _ticks(self.panel.y, self.y)
-        columns = [(sx * (at - self.x[0]), text) for at, text in along]
-        rows = [(sy * (self.y[1] - at), text) for at, text in up]
-        lines: list[list[list[float]]] = [[[0, 0], [w, 0], [w, h], [0, h], [0, 0]]]
-        lines += [[[at, h], [at, h + 12]] for at, _ in columns]
-        lines += [[[-12, at], [0, at]] for at, _ in rows]
-        thin = rr.LineStrips2D(lines, colors=[INK], radii=rr.Radius.ui_points(0.75))
-        stream.log(f"{self.root}/axes/frame", thin, static=True)
-        places = [[at, h + 20] for at, _ in columns] + [[-70, at - 22] for at, _ in rows]
-        # A long name does not fit beside the ticks.
-        places += [[w / 2, h + 75], [0, -85] if len(beside) > SHORT else [-135, h / 2 - 22]]
-        texts = [*(text for _, text in [*columns, *rows]), below, beside]
-        stream.log(f"{self.root}/axes/ticks", recording.labels(places, texts), static=True)
-
-    def log(self, stream: rr.RecordingStream) -> None:
-        """Log the panel: its frame and its marks, or the text of a panel without frame."""
-        if self.panel.bare:
-            recording.text(stream, self.root, "\n".join(_document(self.panel.marks)))
-            return
-        self.log_frame(stream)
-        for number, mark in enumerate(self.panel.marks):
-            self.log_mark(stream, mark, number)
-
-    def log_mark(
-        self, stream: rr.RecordingStream, mark: Mark, number: int, *, static: bool = True
-    ) -> None:
-        """Log a mark under its path, or else its number and name; it covers those before it."""
-        leaf = re.sub(r"\W+", "_", f"{number}_{mark.name}").strip("_")
-        path = f"{self.root}/data/{mark.path or leaf}"
-        for end, part, still in marks.parts(mark, self, number):
-            stream.log(f"{path}{end}", part, static=static or still)
-        if isinstance(mark, charts.Image) and mark.colours is not None:
-            self._log_bar(stream, mark.colours)
-
-    def _log_bar(self, stream: rr.RecordingStream, look: charts.Colours) -> None:
-        """Log the colour bar: an image one pixel wide, lowest value first, with ticks beside it."""
-        path, rows = f"{self.root}/axes/bar", 256
-        transform = rr.Transform3D(
-            translation=[SIDE + 35.0, self.height, 0.0],
-            mat3x3=np.diag([35.0, -self.height / rows, 1.0]),
-        )
-        column = palette.shades(look.map, np.linspace(0.0, 1.0, rows))
-        stream.log(f"{path}/colours", transform, static=True)
-        stream.log(f"{path}/colours", rr.Image(column.reshape(rows, 1, 3)), static=True)
-        ticks = [at for at, _ in plane.plain_ticks(look.low, look.high)]
-        ticks = ticks if look.ticks is None else list(look.ticks)
-        down = self.height * (1.0 - marks.position(look, np.array(ticks, dtype=float)))
-        places = [[SIDE + 120.0, y - 22] for y in down]
-        texts = [typographic(f"{tick:.6g}") for tick in ticks]
-        named = recording.labels([*places, [SIDE - 20, -55]], [*texts, plain(look.name)])
-        stream.log(f"{path}/ticks", named, static=True)
-
-
-def _ends(panel: Panel, which: str) -> Ends:
-    """Return the limits of an axis; those of its marks if it has none."""
-    axis: Axis = getattr(panel, which)
-    if axis.ends is not None and axis.ends[0] != axis.ends[1]:
-        low, high = (float(end) for end in scaled(axis, axis.ends))
-        return low, high
-    every = [axis.ends] if axis.ends else [marks.values(mark, which) for mark in panel.marks]
-    return holding(*(scaled(axis, some) for some in every))
-
-
-def _ticks(axis: Axis, ends: Ends) -> tuple[str, list[tuple[float, str]]]:
-    """Return the name of an axis and its ticks, in the units of a linear axis."""
-    low, high = sorted(ends)
-    name, ticks = axis.name, list(axis.ticks or ())
-    if axis.ticks is None and axis.scale == "log":
-        ticks = [(at, plane.power(at)) for at in plane.log_ticks(10.0**low, 10.0**high)]
-    elif axis.ticks is None and axis.scale == "signed":
-        powers = (axis.straight * 10.0**k for k in range(int(max(-low, high))))
-        ticks = [(at, plane.power(at)) for p in powers for at in (-p, p)] + [(0.0, "0")]
-    elif axis.ticks is None:
-        size, angle = axis.factor, axis.scale == "angle"
-        shift, short = plane.short_ticks(low * size, high * size, angle=angle)
-        name = plane.shifted(name, shift)
-        ticks = [((shift + at) / size, text) for at, text in short]
-    placed = [(float(scaled(axis, at)), plain(text)) for at, text in ticks]
-    return plain(name), [(at, text) for at, text in placed if low <= at <= high]
-
-
-def _document(every: Sequence[Mark]) -> Iterator[str]:
-    """Yield tables and texts of a panel without a frame as lines of Markdown."""
-    for mark in every:
-        if isinstance(mark, charts.Table):
-            head, *rows = ([plain(cell) for cell in row] for row in (mark.head, *mark.rows))
-            lines = [head, ["---"] * len(head), *rows]
-            yield from (f"| {' | '.join(cells)} |" for cells in lines)
-        elif isinstance(mark, charts.Text):
-            yield from ("", plain(mark.text))
+ASIDE: Final = rrb.Vertical(
+    rrb.TextDocumentView(origin="/legend", name="Legend"),
+    rrb.TextDocumentView(origin="/summary", name="Summary"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,3 +76,27 @@ def drawings(shown: Chart | Sheet) -> list[Drawing]:
             places[root] = Place.of(chart.whole(panel), chart.ratio, root)
         made.append(Drawing(chart, list(places.values())))
     return made
+
+
+def log(stream: rr.RecordingStream, drawn: Iterable[Drawing], summary: str) -> None:
+    """Log the panels of charts, their legend and a summary."""
+    recording.text(stream, "summary", summary)
+    recording.text(stream, "legend", "\n".join(line for one in drawn for line in one.legend()))
+    for place in (place for one in drawn for place in one.places):
+        if place.panel.bare:
+            recording.text(stream, place.root, "\n".join(_document(place.panel.marks)))
+            continue
+        place.log_frame(stream)
+        for number, mark in enumerate(place.panel.marks):
+            marks.log(stream, place, mark, number)
+
+
+def _document(every: Sequence[Mark]) -> Iterator[str]:
+    """Yield tables and texts of a panel without a frame as lines of Markdown."""
+    for mark in every:
+        if isinstance(mark, charts.Table):
+            head, *rows = ([plain(cell) for cell in row] for row in (mark.head, *mark.rows))
+            lines = [head, ["---"] * len(head), *rows]
+            yield from (f"| {' | '.join(cells)} |" for cells in lines)
+        elif isinstance(mark, charts.Text):
+            yield from ("", plain(mark.text))

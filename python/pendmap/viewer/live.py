@@ -24,9 +24,7 @@ ADDRESS: Final = "127.0.0.1:9876"  # Default address of a viewer
 BLOCK: Final = 1000  # Least number of samples sent at a time
 _PROBE: Final = 2.0
 _FLUSH: Final = 20.0
-_MOVING: Final = 200_000
-"""Number of samples up to which the pendulum moves at each; later at some of each block."""
-_LATER: Final = 1000
+_LATER: Final = 1000  # Positions of the pendulum in each block of a long trajectory
 _PORTS: Final = 65_535
 
 
@@ -97,7 +95,7 @@ class Live:
             layout = trajectory.layout(self._attrs, self._around)
             self._stream.connect_grpc(url, default_blueprint=layout)
             self._stream.send_recording_name(f"trajectory: {model.title}")
-            trajectory.still(self._stream, self._attrs, self._around)
+            trajectory.still(self._stream, self._around)
             recording.text(self._stream, "summary", f"{model.title}\n\nRunning.")
 
     def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
@@ -118,8 +116,8 @@ class Live:
         motion = trajectory.motion_of(dataset)
         with recording.strict():
             self._frame(motion[2])
-            trajectory.curve(self._stream, self._attrs, motion)
-            trajectory.summary(self._stream, dataset)
+            trajectory.curve(self._stream, motion)
+            trajectory.page(self._stream, dataset)
         try:
             self._stream.flush(timeout_sec=_FLUSH)
         except (RuntimeError, ValueError, TimeoutError) as error:
@@ -130,14 +128,14 @@ class Live:
     def _send(self) -> None:
         if not self._waiting:
             return
-        time, theta, velocity = block = np.concatenate(self._waiting, axis=1)
+        time, _, velocity = block = np.concatenate(self._waiting, axis=1)
         self._waiting = []
         trajectory.refuse_beyond(time, velocity)
         with recording.strict():
             fastest = float(np.abs(velocity).max())
             if fastest > self._around[0].y[1]:
                 self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
-            early = self._sent < _MOVING
+            early = self._sent < trajectory.MOVING
             bins = trajectory.BINS if early else _LATER
             trajectory.series(self._stream, self._attrs, block, bins)
             whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
@@ -145,7 +143,7 @@ class Live:
             trajectory.moving_parts(self._stream, self._attrs, whole, since=since, every=every)
             period = np.round(time / self._period).astype(np.int64)
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
-            trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
+            trajectory.section(self._stream, time[once], block[1:, once], period[once])
         self._sent += time.size
         kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
         self._before = whole[:, -kept:]
@@ -153,5 +151,5 @@ class Live:
     def _frame(self, velocity: Floats) -> None:
         """Draw the frames anew, for these velocities."""
         self._around = trajectory.places(self._attrs, velocity)
-        trajectory.still(self._stream, self._attrs, self._around)
+        trajectory.still(self._stream, self._around)
         self._stream.send_blueprint(trajectory.layout(self._attrs, self._around))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
 
 from pendmap.charts import marks as charts
-from pendmap.charts import palette
+from pendmap.charts import palette, plane
 from pendmap.formatting import typographic
 from pendmap.viewer import recording
+from pendmap.viewer.place import SIDE, Place, plain
 from pendmap.viewer.recording import INK
 
 if TYPE_CHECKING:
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from pendmap.charts.marks import Floats, Mark
-    from pendmap.viewer.chart import Place
 
     Part = tuple[str, Any, bool]  # leaf of the path, components, whether always static
 
@@ -28,22 +29,17 @@ IMAGES, AREAS, LINES, POINTS = 0.0, 10.0, 20.0, 30.0  # Drawing order, the lowes
 STEPS: Final = 254  # Shades of an image of numbers, so that a class of it is one byte
 
 
-def parts(mark: Mark, place: Place, number: int) -> Iterator[Part]:
-    """Yield the components of a mark of a panel, one that covers the marks before it."""
+def log(
+    stream: rr.RecordingStream, place: Place, mark: Mark, number: int, *, static: bool = True
+) -> None:
+    """Log a mark under its path, or else its number and name; it covers those before it."""
+    leaf = re.sub(r"\W+", "_", f"{number}_{mark.name}").strip("_")
+    path = f"{place.root}/data/{mark.path or leaf}"
     order = 0.01 * number if mark.order is None else mark.order
-    yield from _PARTS[type(mark)](mark, place, order)
-
-
-def values(mark: Mark, which: str) -> Floats:
-    """Return the coordinates of a mark that an axis must contain."""
-    arrays: list[npt.ArrayLike] = []
-    if isinstance(mark, charts.Band):
-        arrays = [mark.x] if which == "x" else [mark.low, mark.high]
-    elif isinstance(mark, charts.Steps):
-        arrays = [mark.edges] if which == "x" else [mark.values, 0.0]
-    elif isinstance(mark, charts.Line | charts.Points | charts.Image):
-        arrays = [getattr(mark, which)]
-    return np.concatenate([np.empty(0), *(np.ravel(array) for array in arrays)])
+    for end, part, still in _PARTS[type(mark)](mark, place, order):
+        stream.log(f"{path}{end}", part, static=static or still)
+    if isinstance(mark, charts.Image) and mark.colours is not None:
+        _log_bar(stream, place, mark.colours)
 
 
 def legend(every: Sequence[Mark]) -> dict[str, str]:
@@ -93,7 +89,10 @@ def _points(mark: charts.Points, place: Place, order: float) -> Iterator[Part]:
     discs.append(("", mark.fill if hollow else mark.colour, size))
     for k, (leaf, colour, radius) in enumerate(discs):
         if colour:
-            look = {"colors": [_shade(colour)], "radii": rr.Radius.ui_points(radius)}
+            look: dict[str, Any] = {
+                "colors": [_shade(colour)],
+                "radii": rr.Radius.ui_points(radius),
+            }
             yield leaf, rr.Points2D(at, draw_order=POINTS + order + 0.001 * k, **look), False
 
 
@@ -157,7 +156,8 @@ def _image(mark: charts.Image, place: Place, order: float) -> Iterator[Part]:
     if mark.colours is not None and mark is not first:
         context[0] = (0, "", (0, 0, 0, 0))  # cells without a value show the image below
     kind = np.uint8 if len(context) <= STEPS + 2 else np.uint16
-    image = rr.SegmentationImage(shown.astype(kind), opacity=1.0, draw_order=IMAGES + order)
+    image: Any = shown.astype(kind)
+    image = rr.SegmentationImage(image, opacity=1.0, draw_order=IMAGES + order)
     yield "", place.of_pixels(shown.shape, mark.x, mark.y), True
     yield "", rr.AnnotationContext(context), True
     yield "", image, False
@@ -184,14 +184,33 @@ def position(look: charts.Colours, numbers: npt.NDArray[Any]) -> Floats:
     """Return the places of values on a colour scale, 0 to 1."""
     low, high = look.low, look.high
     if look.scale == "log":
-        return np.clip(np.log(numbers / low) / np.log(high / low), 0.0, 1.0)
-    if look.scale == "centred":
-        half = np.where(numbers < 0, -low, high)
-        return np.clip(0.5 + 0.5 * numbers / half, 0.0, 1.0)
-    if look.scale == "counts":
-        numbers = np.floor(numbers - low)
-        return np.clip(numbers / max(round(high - low) - 1, 1), 0.0, 1.0)
-    return np.clip((numbers - low) / (high - low), 0.0, 1.0)
+        at = np.log(numbers / low) / np.log(high / low)
+    elif look.scale == "centred":
+        at = 0.5 + 0.5 * numbers / np.where(numbers < 0, -low, high)
+    elif look.scale == "counts":
+        at = np.floor(numbers - low) / max(round(high - low) - 1, 1)
+    else:
+        at = (numbers - low) / (high - low)
+    return np.asarray(np.clip(at, 0.0, 1.0), dtype=float)
+
+
+def _log_bar(stream: rr.RecordingStream, place: Place, look: charts.Colours) -> None:
+    """Log the colour bar: an image one pixel wide, lowest value first, with ticks beside it."""
+    path, rows = f"{place.root}/axes/bar", 256
+    transform = rr.Transform3D(
+        translation=[SIDE + 35.0, place.height, 0.0],
+        mat3x3=np.diag([35.0, -place.height / rows, 1.0]),
+    )
+    column = palette.shades(look.map, np.linspace(0.0, 1.0, rows))
+    stream.log(f"{path}/colours", transform, static=True)
+    stream.log(f"{path}/colours", rr.Image(column.reshape(rows, 1, 3)), static=True)
+    ticks = [at for at, _ in plane.plain_ticks(look.low, look.high)]
+    ticks = ticks if look.ticks is None else list(look.ticks)
+    down = place.height * (1.0 - position(look, np.array(ticks, dtype=float)))
+    places = [[SIDE + 120.0, y - 22] for y in down]
+    texts = [typographic(f"{tick:.6g}") for tick in ticks]
+    named = recording.labels([*places, [SIDE - 20, -55]], [*texts, plain(look.name)])
+    stream.log(f"{path}/ticks", named, static=True)
 
 
 _PARTS: Final[dict[type[Mark], Callable[[Any, Place, float], Iterator[Part]]]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -34,6 +34,12 @@ class Look:
     order: float | None = None
     name: str = ""
 
+    @property
+    def style(self) -> dict[str, Any]:
+        """Fields of points and line strips."""
+        radii = rr.Radius.ui_points(self.size)
+        return {"colors": [self.colour], "radii": radii, "draw_order": self.order}
+
 
 def refuse_late(name: object, times: Iterable[Floats]) -> None:
     """Raise InputError for times that a recording cannot hold."""
@@ -56,27 +62,15 @@ def points(
     *further: rr.TimeColumn,
 ) -> None:
     """Log one point per instant, shape (n, 2)."""
-    style = rr.Points2D.from_fields(
-        colors=[look.colour], radii=rr.Radius.ui_points(look.size), draw_order=look.order
-    )
-    stream.log(path, style, static=True)
+    stream.log(path, rr.Points2D.from_fields(**look.style), static=True)
     if time.size:
         columns = rr.Points2D.columns(positions=places.astype(np.float32))
         stream.send_columns(path, [at(time), *further], columns)
 
 
-def strips(
-    stream: rr.RecordingStream,
-    path: str,
-    time: Floats,
-    lines: Floats,
-    look: Look,
-) -> None:
+def strips(stream: rr.RecordingStream, path: str, time: Floats, lines: Floats, look: Look) -> None:
     """Log one strip per instant, shape (n, m, 2), as Arrow arrays: lists are 50 times slower."""
-    style = rr.LineStrips2D.from_fields(
-        colors=[look.colour], radii=rr.Radius.ui_points(look.size), draw_order=look.order
-    )
-    stream.log(path, style, static=True)
+    stream.log(path, rr.LineStrips2D.from_fields(**look.style), static=True)
     if not time.size:
         return
     count, length, _ = lines.shape

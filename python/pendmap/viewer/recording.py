@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    import numpy.typing as npt
+
 SUFFIXES: Final = (".rrd",)
 INK: Final = (150, 150, 150)  # Lines and labels; the background may be light or dark
 TIMELINE: Final = "sim_time"
@@ -103,11 +105,8 @@ def screen(
 
 
 def labels(
-    places: Sequence[Sequence[float]],
-    names: Sequence[str],
-    colour: tuple[int, int, int] = INK,
+    places: npt.ArrayLike, names: Sequence[str], colour: tuple[int, int, int] = INK
 ) -> rr.Points2D:
     """Return labels, each centred below its place."""
     points = np.asarray(places, dtype=np.float32).reshape(-1, 2)
-    look = {"labels": list(names), "colors": [colour], "radii": [0.0], "show_labels": True}
-    return rr.Points2D(points, **look)
+    return rr.Points2D(points, labels=list(names), colors=[colour], radii=[0.0], show_labels=True)

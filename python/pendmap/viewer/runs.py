@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.charts import names, palette
+from pendmap.charts import names, palette, registry
 from pendmap.charts.identification import simulated
 from pendmap.charts.methods import look
 from pendmap.comparison import Comparison
@@ -20,16 +20,18 @@ from pendmap.diagnosis.result import as_text as diagnosis_text
 from pendmap.formatting import MINUS
 from pendmap.identification import IdentificationReport
 from pendmap.identification.report import as_text as identification_text
-from pendmap.viewer import moving, recording
+from pendmap.viewer import chart, moving, recording
 from pendmap.viewer.moving import Look
+from pendmap.viewer.place import plain
 from pendmap.viewer.recording import INK
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from pendmap.charts.marks import Floats
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
+    from pendmap.records import Run
 
 RECORD: Final = Look((128, 128, 128), 1.0, 3.0, "record")
 INSTANTS: Final = 20000
@@ -73,39 +75,51 @@ class Motion:
         return math.sqrt(max(squares, default=0.0))
 
 
+def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
+    """Return layout, contents and name of the recording of what was found in records."""
+    kind, shown = (
+        registry.RESULTS[type(result).__name__],
+        registry.of_result(result, cells=chart.CELLS),
+    )
+    drawn, text = chart.drawings(shown), summary(result)
+    every, larger = motions(result)
+    moving.refuse_late(shown.title, (one.time for one in every))
+    tabs = [container(f"run_{k}", one, larger) for k, one in enumerate(every, 1)]
+    tabs += [one.container for one in drawn]
+
+    def write(stream: rr.RecordingStream) -> None:
+        chart.log(stream, drawn, text)
+        for number, one in enumerate(every, 1):
+            log(stream, f"run_{number}", one, larger)
+
+    arrays = (v for one in every for v in (one.time, one.record, *(m[2] for m in one.models)))
+    return {
+        "name": plain(shown.title),
+        "content": recording.content_of([shown.title, text, *arrays]),
+        "known": {"kind": kind, "deviations_drawn_larger": larger},
+        "layout": recording.screen(rrb.Tabs(*tabs, active_tab=0), chart.ASIDE, shares=[11, 5]),
+        "log": write,
+    }
+
+
 def motions(result: Any) -> tuple[list[Motion], float]:  # noqa: ANN401 (of several types)
     """Return the runs in motion, and the magnification of their deviations."""
     if isinstance(result, IdentificationReport):
         return of_identification(result), 1.0
-    if isinstance(result, Discrepancy):
-        shown = of_diagnosis(result)
-        return shown, magnified(shown)
-    return [], 1.0
+    shown = of_diagnosis(result) if isinstance(result, Discrepancy) else []
+    return shown, magnified(shown) if shown else 1.0
 
 
 def summary(result: Any) -> str:  # noqa: ANN401 (of several types)
     """Return the text of a result, as its command prints it."""
+    lines: Iterable[str] = [repr(result)]
     if isinstance(result, IdentificationReport):
         lines = identification_text(result)
     elif isinstance(result, Discrepancy):
         lines = diagnosis_text(result)
-    else:
-        lines = in_short(result) if isinstance(result, Comparison) else iter([repr(result)])
+    elif isinstance(result, Comparison):
+        lines = in_short(result)
     return "\n\n".join(line.strip() for line in lines)
-
-
-def known(result: Any) -> dict[str, float | str]:  # noqa: ANN401 (of several types)
-    """Return the properties of a recording: what was found, in text and numbers."""
-    if isinstance(result, Discrepancy):
-        gap, effects = result.gap, ", ".join(effect.name for effect in result.effects)
-        sizes = {key: float(getattr(gap, key)) for key in ("noise_floor", "before", "after")}
-        return {"kind": "diagnosis", "verdict": result.verdict, "effects": effects, **sizes}
-    if isinstance(result, IdentificationReport):
-        best = result.sound
-        estimates = {} if best is None else {n: float(e.value) for n, e in best.estimates.items()}
-        method = {} if best is None else {"method": best.method}
-        return {"kind": "identification", **method, **estimates}
-    return {"kind": type(result).__name__.lower()}
 
 
 def of_identification(report: IdentificationReport) -> list[Motion]:
@@ -137,16 +151,16 @@ def of_diagnosis(found: Discrepancy) -> list[Motion]:
     made = []
     for k, run in enumerate(data.fitted):
         angles = [_model(run, fit, k) for fit in fits]
-        if data.inside and data.fitted_of[k] in data.held_of:
-            # The stretches held back lie within the run, and the motion continues through them.
-            place = data.held_of.index(data.fitted_of[k])
-            back = [_model(data.held[place], fit, place) for fit in held]
-            angles = [np.where(np.isfinite(b), b, a) for a, b in zip(angles, back, strict=True)]
-        made.append(_thinned(run, w0, list(zip(looks, angles, strict=True))))
+        made.append(_thinned(run, w0, list(zip(looks, angles, strict=True)), _noise_of(run)))
     for k, run in enumerate(() if data.inside else data.held):
         pairs = list(zip(looks, [_model(run, fit, k) for fit in held], strict=True))
-        made.append(replace(_thinned(run, w0, pairs), name=f"{run.name}, held out"))
+        held_out = _thinned(run, w0, pairs, _noise_of(run))
+        made.append(replace(held_out, name=f"{run.name}, held out"))
     return made
+
+
+def _noise_of(run: FitRun) -> float:
+    return float(np.sqrt(np.mean(np.square(run.sigma))))
 
 
 def _look(name: str) -> Look:
@@ -162,7 +176,7 @@ def _model(run: FitRun, fit: TrajectoryFit, place: int) -> Floats:
 
 
 def _thinned(
-    run: FitRun, w0: float, angles: Sequence[tuple[Look, Floats]], sigma: float | None = None
+    run: FitRun | Run, w0: float, angles: Sequence[tuple[Look, Floats]], sigma: float
 ) -> Motion:
     """Return the drawn instants of a run, with NaN in gaps."""
     step = float(np.median(np.diff(run.time)))
@@ -176,8 +190,7 @@ def _thinned(
         for column in (run.theta, *(theta for _, theta in angles))
     )
     drawn = [(shade, time, theta) for (shade, _), theta in zip(angles, models, strict=True)]
-    noise = float(np.sqrt(np.mean(np.square(run.sigma)))) if sigma is None else sigma
-    return Motion(run.name, time, record, drawn, noise)
+    return Motion(run.name, time, record, drawn, sigma)
 
 
 def magnified(shown: Sequence[Motion]) -> float:
@@ -198,7 +211,7 @@ def container(root: str, one: Motion, larger: float) -> rrb.Container:
         visual_bounds=rrb.VisualBounds2D(x_range=wide, y_range=[-1.15, 1.5]),
     )
     named = [("angle", f"{names.ANGLE}, {one.name}")]
-    if any(True for _ in one.residuals()):
+    if one.rms:
         named.append(("residual", "Record less model (mrad)"))
     # A decay leaves this corner free.
     corner = rrb.Corner2D.RightTop
@@ -226,11 +239,11 @@ def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> No
     stream.log(f"{path}/axes/names", named, static=True)
     _pendulum(stream, f"{path}/data/record", (one.time, one.record), RECORD, 0.0)
     for pivot, (shade, time, theta) in zip(pivots[1:], one.models, strict=True):
-        leaf = shade.name
-        moving.series(stream, f"{root}/angle/{leaf}", time, theta, shade)
-        _pendulum(stream, f"{path}/data/{leaf}/record", (one.time, one.record), RECORD, pivot)
-        drawn = theta if time is not one.time else one.record - larger * (one.record - theta)
-        _pendulum(stream, f"{path}/data/{leaf}", (time, drawn), shade, pivot)
+        leaf = f"{path}/data/{shade.name}"
+        moving.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
+        _pendulum(stream, f"{leaf}/record", (one.time, one.record), RECORD, pivot)
+        drawn = one.record - larger * (one.record - theta) if time is one.time else theta
+        _pendulum(stream, leaf, (time, drawn), shade, pivot)
     for shade, residual in one.residuals():
         rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
         leaf = shade.name if len(one.models) > 1 else "residual"
@@ -250,11 +263,7 @@ def _noise(stream: rr.RecordingStream, path: str, one: Motion) -> None:
 
 
 def _pendulum(
-    stream: rr.RecordingStream,
-    path: str,
-    motion: tuple[Floats, Floats],
-    shade: Look,
-    pivot: float,
+    stream: rr.RecordingStream, path: str, motion: tuple[Floats, Floats], shade: Look, pivot: float
 ) -> None:
     """Log a pendulum; the record's is thin and on top beside a model."""
     time, theta = motion

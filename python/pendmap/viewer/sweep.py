@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Final
 from pendmap.analysis.sweeps.report import varied_names
 from pendmap.charts import basin_sweep
 from pendmap.charts.marks import Level
-from pendmap.viewer.chart import CELLS, Place
+from pendmap.viewer import marks
+from pendmap.viewer.chart import CELLS
+from pendmap.viewer.place import Place
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +46,7 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset, others: Sequence[Place]
             stream.set_time(line, duration=at[0][1])
             now = Level(at[0][1], axis="x", path="now")
             for other in others:
-                other.log_mark(stream, now, 0, static=False)
+                marks.log(stream, other, now, 0, static=False)
         for order, mark in enumerate(panel.marks):
-            place.log_mark(stream, mark, order, static=False)
+            marks.log(stream, place, mark, order, static=False)
     stream.reset_time()

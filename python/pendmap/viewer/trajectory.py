@@ -17,9 +17,9 @@ from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import TIME, Units
 from pendmap.viewer import moving, recording
-from pendmap.viewer.chart import Place
-from pendmap.viewer.moving import FASTEST, LATEST, Look
-from pendmap.viewer.recording import INK, TIMELINE
+from pendmap.viewer.moving import FASTEST, Look
+from pendmap.viewer.place import Place
+from pendmap.viewer.recording import TIMELINE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -39,18 +39,12 @@ TRAIL = (230, 159, 0)
 
 TRAIL_POINTS = 48  # Greatest number of points of the bob's trail, which is one forcing period long
 
-TRAILS = 20000
-"""Greatest number of trails logged; for a longer trajectory they are logged in larger steps."""
-
-MANY = 1000  # Number of points of a section above which they are drawn smaller
-
-MOVING = 200_000
+MOVING = 50_000
 """Greatest number of positions of the pendulum; of a longer trajectory every k-th sample moves."""
 
 BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
 
-CURVE, CURVE_PERIODS = 200_000, 100
-"""Greatest numbers of samples and periods of the phase curve, counted from the end."""
+CURVE = 20_000  # Samples of the phase curve, counted from the end
 
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
@@ -64,19 +58,10 @@ def motion_of(dataset: xr.Dataset) -> Floats:
     return np.stack([dataset[name].values for name in ("time", "theta", "velocity")], dtype=float)
 
 
-def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
-    """Return the layout: pendulum and summary left; phase plane, section and state right."""
-    attrs = facts(dataset)
-    return layout(attrs, places(attrs, dataset["velocity"].values))
-
-
 def layout(attrs: Attributes, around: Sequence[Place]) -> rrb.Blueprint:
     """Return the layout for a trajectory with these attributes, in given frames."""
-    so_far = rrb.VisibleTimeRange(
-        TIMELINE,
-        start=rrb.TimeRangeBoundary.infinite(),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
+    begin, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
+    so_far = rrb.VisibleTimeRange(TIMELINE, start=begin, end=now)
     reach = 1.25 + _stroke(attrs)
     pendulum = rrb.Spatial2DView(
         origin="/pendulum",
@@ -87,11 +72,8 @@ def layout(attrs: Attributes, around: Sequence[Place]) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=f"/state/{name}", name=text(Units.of(attrs)))
         for name, (text, _) in _STATE.items()
     ]
-    left = rrb.Vertical(
-        pendulum,
-        rrb.TextDocumentView(origin="/summary", name="Summary"),
-        row_shares=[3, 2],
-    )
+    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+    left = rrb.Vertical(pendulum, summary, row_shares=[3, 2])
     phase, section = around
     planes = rrb.Horizontal(phase.view(), section.view(time_ranges=[so_far]))
     right = rrb.Vertical(planes, rrb.Tabs(*state, active_tab=0), row_shares=[3, 2])
@@ -103,33 +85,24 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     attrs, motion = facts(dataset), motion_of(dataset)
     time, _, velocity = motion
     refuse_beyond(time, velocity)
-    still(stream, attrs, places(attrs, velocity))
-    summary(stream, dataset)
+    still(stream, places(attrs, velocity))
+    page(stream, dataset)
     series(stream, attrs, motion, BINS)
     moving_parts(stream, attrs, motion, every=-(-time.size // MOVING))
-    curve(stream, attrs, motion)
-    section(
-        stream,
-        dataset["section_time"].values.astype(float),
-        dataset["section_theta"].values,
-        dataset["section_velocity"].values,
-        dataset["period"].values,
-    )
+    curve(stream, motion)
+    at, *point = (dataset[f"section_{name}"].values for name in ("time", "theta", "velocity"))
+    section(stream, at.astype(float), np.array(point), dataset["period"].values)
 
 
-def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
+def page(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     """Log the summary of the trajectory, and how a long one is thinned."""
-    clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
-    units = Units.of(facts(dataset))
-    if units.si:
-        clock = "The time of the viewer is that of the rig."
-    lines = [*str(dataset.attrs.get("summary", "")).splitlines(), clock]
+    si = Units.of(facts(dataset)).si
+    clock = "that of the rig" if si else "nondimensional: 1 s is τ = 1"
+    lines = [*str(dataset.attrs.get("summary", "")).splitlines()]
+    lines.append(f"The time of the viewer is {clock}.")
     every = -(-dataset.sizes["time"] // MOVING)
     if every > 1:
-        lines.append(
-            f"This is a long run: the pendulum moves at every {every}th sample; curves against time "
-            "are drawn by their lowest and highest values; the section has all points."
-        )
+        lines.append(f"This is a long run: of each {every} samples the pendulum moves at one.")
     recording.text(stream, "summary", "\n\n".join(lines))
 
 
@@ -138,8 +111,7 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
-    if time.size and time[-1] > LATEST:
-        raise InputError(f"until is {time[-1]:g}: a recording holds up to {LATEST:g}")
+    moving.refuse_late("until", [time])
 
 
 def places(attrs: Attributes, velocity: Floats) -> list[Place]:
@@ -156,16 +128,11 @@ def _stroke(attrs: Attributes) -> float:
     return abs(float(attrs["p"])) / omega**2 if omega else 0.0
 
 
-def still(stream: rr.RecordingStream, attrs: Attributes, around: Sequence[Place]) -> None:
-    """Log the static parts: frames, and the rail of the pivot."""
+def still(stream: rr.RecordingStream, around: Sequence[Place]) -> None:
+    """Log the static parts: frames, and the direction of the pendulum's y axis."""
     for place in around:
         place.log_frame(stream)
-    stroke = _stroke(attrs)
     stream.log("pendulum/data", moving.UPWARD, static=True)
-    rail = [[[0.0, -stroke - 0.05], [0.0, stroke + 0.05]]]
-    thin = rr.Radius.ui_points(0.75)
-    line = rr.LineStrips2D(rail, colors=[INK], radii=thin)
-    stream.log("pendulum/axes/rail", line, static=True)
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
@@ -203,10 +170,8 @@ def moving_parts(
     moving.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
     arm = np.stack([pivot[new], bob[new]], axis=1)
     moving.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
-    chosen = new[:: max(1, -(-new.size // TRAILS))]
-    back = behind(attrs, time)
-    trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
-    moving.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    trail = bob[np.maximum(new[:, None] - behind(attrs, time), 0)]
+    moving.strips(stream, "pendulum/data/trail", time[new], trail, Look(TRAIL, 1.5))
     now = np.stack([plane.wrapped(theta[new]), velocity[new]], axis=1)
     moving.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
 
@@ -214,37 +179,24 @@ def moving_parts(
 def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
     """Return the sample offsets of the trail's points, falling to 0, over about one period."""
     tau = Units.of(attrs).bare(time, TIME)
-    turns = float(attrs["omega"]) or 1.0
-    samples = (
-        2 * math.pi / turns / max(float(np.median(np.diff(tau))), 1e-12) if time.size > 1 else 1
-    )
+    step = float(np.median(np.diff(tau))) if time.size > 1 else math.inf
+    samples = 2 * math.pi / (float(attrs["omega"]) or 1.0) / max(step, 1e-12)
     every = max(1, math.ceil(samples / TRAIL_POINTS))
     count = min(TRAIL_POINTS, max(2, math.ceil(samples / every)))
     return every * np.arange(count, dtype=np.int64)[::-1]
 
 
-def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Floats) -> None:
-    """Log the phase-plane curve of the last periods, broken where the angle wraps."""
-    period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
-    time, theta, velocity = motion
-    first = int(np.searchsorted(time, time[-1] - CURVE_PERIODS * period))
-    first = max(first, time.size - CURVE)
-    points = plane.broken_at_wrap(theta[first:], velocity[first:])
-    lines = rr.LineStrips2D(
-        [points.astype(np.float32)], colors=[LINE], radii=rr.Radius.ui_points(0.6)
-    )
+def curve(stream: rr.RecordingStream, motion: Floats) -> None:
+    """Log the end of the curve in the phase plane, broken where the angle wraps."""
+    points = plane.broken_at_wrap(*motion[1:, -CURVE:]).astype(np.float32)
+    lines = rr.LineStrips2D([points], colors=[LINE], radii=rr.Radius.ui_points(0.6))
     stream.log("phase/data/curve", lines, static=True)
 
 
 def section(
-    stream: rr.RecordingStream,
-    time: Floats,
-    theta: Floats,
-    velocity: Floats,
-    period: npt.NDArray[np.int64],
+    stream: rr.RecordingStream, time: Floats, points: Floats, period: npt.NDArray[np.int64]
 ) -> None:
     """Log one point per period; the view shows those up to the cursor, so the section grows."""
-    at = np.stack([plane.wrapped(theta), velocity], axis=1)
-    size = 1.4 if time.size > MANY else 2.5
+    at = np.stack([plane.wrapped(points[0]), points[1]], axis=1)
     number = rr.TimeColumn("period", sequence=period.astype(np.int64))
-    moving.points(stream, "poincare/data/points", time, at, Look(BOB, size), number)
+    moving.points(stream, "poincare/data/points", time, at, Look(BOB, 1.8), number)

@@ -10,7 +10,7 @@ import xarray as xr
 
 import synthetic
 from pendmap import InputError, viewer
-from pendmap.viewer.chart import Place
+from pendmap.viewer import chart
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def test_a_recording_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.M
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Place, "log", interrupted)
+    monkeypatch.setattr(chart, "log", interrupted)
     with pytest.raises(KeyboardInterrupt):
         viewer.record(synthetic.painted(), file)
     assert file.read_bytes() == b"old"

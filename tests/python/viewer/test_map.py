@@ -10,8 +10,8 @@ import pytest
 
 import motions
 import synthetic
-from pendmap import viewer
 from pendmap.charts import basins, palette
+from pendmap.viewer import chart
 from pendmap.viewer.chart import drawings
 from recordings import ReadBack, recorded
 
@@ -209,7 +209,7 @@ def test_a_failed_exponent_is_covered(tmp_path: Path) -> None:
 def test_a_map_beyond_the_largest_image_is_thinned(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "CELLS", 16)
+    monkeypatch.setattr(chart, "CELLS", 16)
     dataset = synthetic.painted(synthetic.USUAL[:3], (32, 40), undecided=5)
     back = recorded(dataset, tmp_path)
     labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
