@@ -116,10 +116,10 @@ def models(
     )
     classes = [("failed", palette.FAILED), ("undecided", palette.UNDECIDED)]
     classes += [(one.name, one.colour) for one in listed(dataset, None)]
-    kept = dataset[["label", "theta_bounds", "velocity_bounds"]]
+    planes = dataset[["label", "theta_bounds", "velocity_bounds"]]
     for place in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         at = [(dim, float(dataset[dim].values[k])) for dim, k in zip(dims, place, strict=True)]
-        one = kept.isel(dict(zip(dims, place, strict=True)))
+        one = planes.isel(dict(zip(dims, place, strict=True)))
         label = plane.pixels(one, one["label"], cells)
         here = np.ones(dataset.sizes["point"], dtype=bool)
         for dim, value in at:
@@ -129,7 +129,7 @@ def models(
         marks = [
             Image(label.astype(np.int32) + 1, theta, velocity, classes=classes, path="labels"),
             Points(*points.T, size=3.0, colour="#ffffff", path="attractors"),
-            Text(sum(theta) / 2, velocity[1], text, path="values"),
+            Text(sum(theta) / 2, velocity[1], text, colour="#ffffff", path="values"),
         ]
         yield at, Panel("basin", "basins of attraction", *sides, marks), ratio
 

@@ -106,7 +106,8 @@ def _recorded(
             for entry in listed:
                 at = plane.copies(dataset, entry.points[:1], *window[0])
                 if len(at) and not entry.chaotic:
-                    marks.append(Text(at[0, 0], at[0, 1], legend.typeset(entry.name)))
+                    name = legend.typeset(entry.name)
+                    marks.append(Text(at[0, 0], at[0, 1], name, colour="#ffffff"))
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
         root = "basin" if one == "labels" else one

@@ -145,8 +145,8 @@ class Live:
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
             trajectory.section(self._stream, time[once], block[1:, once], period[once])
         self._sent += time.size
-        kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
-        self._before = whole[:, -kept:]
+        trail = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
+        self._before = whole[:, -trail:]
 
     def _frame(self, velocity: Floats) -> None:
         """Draw the frames anew, for these velocities."""

@@ -142,11 +142,11 @@ def of_identification(report: IdentificationReport) -> list[Motion]:
     return made
 
 
-def of_diagnosis(found: Discrepancy) -> list[Motion]:
+def of_diagnosis(result: Discrepancy) -> list[Motion]:
     """Return all runs with both models, whole runs held out after the others."""
-    data, w0 = found.data, found.base.fitted.fit.model.w0
-    fits = (found.base.fitted.fit, found.best.fitted.fit)
-    held = (found.base.hold_out.fit, found.best.hold_out.fit)
+    data, w0 = result.data, result.base.fitted.fit.model.w0
+    fits = (result.base.fitted.fit, result.best.fitted.fit)
+    held = (result.base.hold_out.fit, result.best.hold_out.fit)
     looks = [_look(name) for name in ("before", "after")]
     made = []
     for k, run in enumerate(data.fitted):
@@ -247,8 +247,8 @@ def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> No
     for shade, residual in one.residuals():
         rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
         leaf = shade.name if len(one.models) > 1 else "residual"
-        said = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
-        moving.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, said)
+        named_look = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
+        moving.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
     if one.rms and one.sigma:
         _noise(stream, f"{root}/residual", one)
 

@@ -86,23 +86,22 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     time, _, velocity = motion
     refuse_beyond(time, velocity)
     still(stream, places(attrs, velocity))
-    page(stream, dataset)
+    every = -(-time.size // MOVING)
+    long = f"This is a long run: of each {every} samples the pendulum moves at one."
+    page(stream, dataset, *([long] if every > 1 else []))
     series(stream, attrs, motion, BINS)
-    moving_parts(stream, attrs, motion, every=-(-time.size // MOVING))
+    moving_parts(stream, attrs, motion, every=every)
     curve(stream, motion)
     at, *point = (dataset[f"section_{name}"].values for name in ("time", "theta", "velocity"))
     section(stream, at.astype(float), np.array(point), dataset["period"].values)
 
 
-def page(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the summary of the trajectory, and how a long one is thinned."""
+def page(stream: rr.RecordingStream, dataset: xr.Dataset, *further: str) -> None:
+    """Log the summary of the trajectory, and further paragraphs."""
     si = Units.of(facts(dataset)).si
     clock = "that of the rig" if si else "nondimensional: 1 s is τ = 1"
-    lines = [*str(dataset.attrs.get("summary", "")).splitlines()]
-    lines.append(f"The time of the viewer is {clock}.")
-    every = -(-dataset.sizes["time"] // MOVING)
-    if every > 1:
-        lines.append(f"This is a long run: of each {every} samples the pendulum moves at one.")
+    lines = str(dataset.attrs.get("summary", "")).splitlines()
+    lines += [f"The time of the viewer is {clock}.", *further]
     recording.text(stream, "summary", "\n\n".join(lines))
 
 
@@ -139,9 +138,9 @@ def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: 
     """Log angle, velocity and energy against time, by their extremes in each of ``bins`` bins."""
     units, (time, theta, velocity) = Units.of(attrs), motion
     every = (theta, velocity, energy(theta, velocity, attrs))
-    for (name, (said, colour)), values in zip(_STATE.items(), every, strict=True):
+    for (name, (text, colour)), values in zip(_STATE.items(), every, strict=True):
         at, shown = plane.envelope(time, values, bins)
-        moving.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=said(units)))
+        moving.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=text(units)))
 
 
 def moving_parts(
