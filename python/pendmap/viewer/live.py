@@ -33,16 +33,9 @@ class NobodyListensError(ViewerError):
 
 
 def check_address(address: str) -> tuple[str, int]:
-    """Return host and port of ``HOST:PORT``, at which a viewer listens.
+    """Return host and port of ``HOST:PORT``; raise an error if no viewer listens there.
 
     A connection without a listener would block for 15 seconds without an error.
-
-    Raises
-    ------
-    InputError
-        If the address is malformed.
-    NobodyListensError
-        If no viewer listens there; the message tells what to start.
     """
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
@@ -60,22 +53,7 @@ def check_address(address: str) -> tuple[str, int]:
 
 
 class Live:
-    """Sender of a trajectory's samples to a viewer, in blocks; the ``live`` of pendmap.simulate.
-
-    Parameters
-    ----------
-    model : Pendulum or Rig
-        The model.
-    start : (float, float)
-        Angle and velocity at the start.
-    address : str
-        ``HOST:PORT`` of the viewer.
-
-    Raises
-    ------
-    InputError, NobodyListensError
-        As for :func:`check_address`.
-    """
+    """Sender of a trajectory's samples to a viewer, in blocks; the ``live`` of pendmap.simulate."""
 
     def __init__(
         self, model: Pendulum | Rig, start: tuple[float, float], address: str = ADDRESS
@@ -105,13 +83,7 @@ class Live:
             self._send()
 
     def finish(self, dataset: xr.Dataset) -> None:
-        """Send the waiting samples, the whole phase curve and the summary.
-
-        Raises
-        ------
-        ViewerError
-            If the viewer is no longer there.
-        """
+        """Send the waiting samples, the end of the phase curve and the summary."""
         self._send()
         motion = trajectory.motion_of(dataset)
         with recording.strict():

@@ -77,10 +77,7 @@ class Motion:
 
 def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
     """Return layout, contents and name of the recording of what was found in records."""
-    kind, shown = (
-        registry.RESULTS[type(result).__name__],
-        registry.of_result(result, cells=chart.CELLS),
-    )
+    shown = registry.of_result(result)
     drawn, text = chart.drawings(shown), summary(result)
     every, larger = motions(result)
     moving.refuse_late(shown.title, (one.time for one in every))
@@ -96,7 +93,7 @@ def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
     return {
         "name": plain(shown.title),
         "content": recording.content_of([shown.title, text, *arrays]),
-        "known": {"kind": kind, "deviations_drawn_larger": larger},
+        "known": {"kind": type(result).__name__, "deviations_drawn_larger": larger},
         "layout": recording.screen(rrb.Tabs(*tabs, active_tab=0), chart.ASIDE, shares=[11, 5]),
         "log": write,
     }
