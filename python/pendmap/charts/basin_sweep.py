@@ -25,13 +25,17 @@ from pendmap.charts.marks import (
     Line,
     Mark,
     Points,
+    Text,
     bars,
 )
 from pendmap.errors import InputError
 from pendmap.files import facts
+from pendmap.formatting import typographic
 from pendmap.units import Units
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
 
     from pendmap.charts.marks import Ends, Floats
@@ -98,6 +102,36 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     if len(dims) == 1:
         return _line(dataset, dims[0], symbols[0], title, subtitle, layer)
     return _plane(dataset, symbols, title, subtitle, layer, cells)
+
+
+def models(
+    dataset: xr.Dataset, cells: int
+) -> Iterator[tuple[list[tuple[str, float]], Panel, float]]:
+    """Yield the parameters of each model, row by row, its basins, and their height over width."""
+    dims, units = varied_names(dataset), Units.of(facts(dataset))
+    theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
+    sides, ratio = (
+        names.phase_plane(theta, velocity, units),
+        names.proportion(theta, velocity, units),
+    )
+    classes = [("failed", palette.FAILED), ("undecided", palette.UNDECIDED)]
+    classes += [(one.name, one.colour) for one in listed(dataset, None)]
+    planes = dataset[["label", "theta_bounds", "velocity_bounds"]]
+    for place in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
+        at = [(dim, float(dataset[dim].values[k])) for dim, k in zip(dims, place, strict=True)]
+        one = planes.isel(dict(zip(dims, place, strict=True)))
+        label = plane.pixels(one, one["label"], cells)
+        here = np.ones(dataset.sizes["point"], dtype=bool)
+        for dim, value in at:
+            here &= dataset[f"point_{dim}"].values == value
+        points = plane.copies(dataset, plane.points(dataset)[here], *theta)
+        text = typographic(", ".join(f"{names.symbol(dim)} = {value:g}" for dim, value in at))
+        marks = [
+            Image(label.astype(np.int32) + 1, theta, velocity, classes=classes, path="labels"),
+            Points(*points.T, size=3.0, colour="#ffffff", path="attractors"),
+            Text(sum(theta) / 2, velocity[1], text, colour="#ffffff", path="values"),
+        ]
+        yield at, Panel("basin", "basins of attraction", *sides, marks), ratio
 
 
 def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)

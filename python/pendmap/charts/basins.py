@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -10,12 +11,12 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
-from pendmap.charts.chart import Chart, Panel
-from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Image, Mark, Points
+from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Ends, Image, Mark, Points, Text
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
-from pendmap.units import VELOCITY, Units
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -39,6 +40,7 @@ VARIABLES = {
 
 SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to the leading ones
 FLAT: Final = 0.55  # Height over width of panels below which they are stacked
+_PATHS: Final = {"settle": "steps"}  # Paths in a recording that are not the name of the layer
 _COLOUR_MAPS: Final = {
     "settle": "viridis",
     "turns": "RdBu_r",
@@ -58,32 +60,62 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     if "labels" not in shown and (layer or not finite_time(dataset)):
         own = not finite_time(dataset)  # else chaos is shown by the panel of its attractor alone
         listed = [entry for entry in listed if entry.id < 1 or (entry.chaotic and own)]
+    window = theta, velocity
+    sides = names.phase_plane(theta, velocity, units)
     panels = []
     for one in shown:
         small = len(shown) > 1 and one == "labels" and not reliable(dataset)
         alarm = [(warning(dataset), ALARM), (transients(dataset), QUIET)]
-        marks = _layer(dataset, one, cells, (theta, velocity), listed)
+        marks = _layer(dataset, one, cells, window, listed)
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
         alone = shown == ("labels",) and not reliable(dataset)
-        sides = names.phase_plane(theta, velocity, units)
         share = SMALL if small else 1.0
         look: dict[str, Any] = {"share": share, "note": alarm if small else ()}
         look["warning"] = warning(dataset) if alone else ""
         panels.append(Panel(one, what(dataset, one), *sides, marks, **look))
+    recorded = [] if layer else _recorded(dataset, cells, window, sides)
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
-    low, high = (units.bare(bound, VELOCITY) for bound in velocity)
-    ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
+        recorded.append(dataclasses.replace(panels[-1], root="basin"))
+    ratio = names.proportion(theta, velocity, units)
     rows, columns = dataset["label"].shape
     return Chart(
         _title(dataset, shown),
         f"{names.parameters(facts(dataset))};   {columns} × {rows} cells",
         [[panel] for panel in panels] if ratio < FLAT else [panels],
+        recorded=recorded,
         ratio=ratio,
+        tabs=True,
     )
+
+
+def _recorded(
+    dataset: xr.Dataset, cells: int, window: tuple[Ends, Ends], sides: tuple[Axis, Axis]
+) -> list[Panel]:
+    """Return a panel for each layer of a recording, the leading one first."""
+    listed, panels = legend.entries(dataset), []
+    shown = layers(dataset)
+    for one in shown:
+        marks = _layer(dataset, one, cells, window, listed, named=True)
+        if one == "labels" or not finite_time(dataset):
+            marks += _attractors(dataset, listed, *window)
+        if one == "labels":
+            for entry in listed:
+                at = plane.copies(dataset, entry.points[:1], *window[0])
+                if len(at) and not entry.chaotic:
+                    name = legend.typeset(entry.name)
+                    marks.append(Text(at[0, 0], at[0, 1], name, colour="#ffffff"))
+        if one == shown[0]:
+            marks += _names(dataset, listed, shown)
+        root = "basin" if one == "labels" else one
+        unsure = one == "labels" and not reliable(dataset)
+        alarm = warning(dataset) if unsure else ""
+        title = "labels (unreliable)" if unsure else what(dataset, one)
+        panels.append(Panel(one, title, *sides, marks, root=root, warning=alarm))
+    return panels
 
 
 def _leading(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -106,11 +138,7 @@ def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ..
     """Return the legend: each basin's colour with the attractor's marker."""
     named: list[Mark] = []
     for entry in listed:
-        text = entry.text
-        if finite_time(dataset) and entry.chaotic:
-            text = f"{legend.typeset(entry.name)}, {entry.share} of the starts"
-        elif entry.chaotic and "labels" in shown and len(entry.points):
-            text = f"{entry.text} (dots: its points)"
+        text = _said(dataset, entry, shown)
         look: dict[str, Any] = {"colour": entry.colour, "name": text, "edge": QUIET}
         named.append(Points(NONE, NONE, marker="s", size=9.0, edge_width=0.5, **look))
         if entry.id >= 1 and not entry.chaotic:
@@ -118,26 +146,43 @@ def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ..
     return named
 
 
+def _said(dataset: xr.Dataset, entry: legend.Entry, shown: tuple[str, ...]) -> str:
+    """Return the text of an attractor in the legend."""
+    if finite_time(dataset) and entry.chaotic:
+        return f"{legend.typeset(entry.name)}, {entry.share} of the starts"
+    dots = entry.chaotic and "labels" in shown and len(entry.points)
+    return f"{entry.text} (dots: its points)" if dots else entry.text
+
+
 def _marker(
     entry: legend.Entry, at: npt.NDArray[np.float64], name: str = "", size: float = 5.5
 ) -> Points:
+    path = "" if name else f"attractors/{entry.id}"
     shape = palette.marker(entry.name, entry.kind)
     look: dict[str, Any] = {"marker": shape, "size": size, "colour": entry.colour, "name": name}
-    look |= {"edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
+    look |= {"path": path, "edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
     return Points(*at.T, clip=False, order=5.0, **look)
 
 
-def _layer(
+def _layer(  # noqa: PLR0913 (parts of an image)
     dataset: xr.Dataset,
     layer: str,
     cells: int,
-    window: tuple[tuple[float, float], ...],
+    window: tuple[Ends, Ends],
     listed: list[legend.Entry],
+    *,
+    named: bool = False,
 ) -> list[Mark]:
-    """Return one layer; cells without a value have the colour of their label."""
+    """Return one layer; cells without a value have the colour of their label.
+
+    The classes are ``named`` in a recording, which shows the name where one points.
+    """
     label = plane.pixels(dataset, dataset["label"], cells)
     colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
     classes = [("", colour) for colour in colours]
+    for entry in listed if named else ():
+        text = _said(dataset, entry, layers(dataset))
+        classes[entry.id + 1] = (text, classes[entry.id + 1][1])
     shown = label.astype(np.int16) + 1
     if layer == "labels":
         texts = [("", "")] * len(classes)
@@ -145,15 +190,18 @@ def _layer(
             if not entry.chaotic:
                 short = f"{legend.typeset(entry.name)}\n{legend.percent(entry.fraction)}"
                 texts[entry.id + 1] = (short, entry.text)
-        return [Image(shown, *window, classes=classes, labels=texts)]
-    labels = Image(shown, *window, classes=classes)
+        return [Image(shown, *window, classes=classes, labels=texts, path="labels")]
+    labels = Image(shown, *window, classes=classes, path="without")
     own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
     absent, values = missing(layer, own) | (label < 0), own.astype(np.float32)
     if layer == "settle":
         np.maximum(values, 1.0, out=values)
     values[absent] = np.nan
     look = _colours(dataset, layer, values[~absent])
-    return [*([labels] if absent.any() else []), Image(values, *window, colours=look)]
+    return [
+        *([labels] if absent.any() else []),
+        Image(values, *window, colours=look, path=_PATHS.get(layer, layer)),
+    ]
 
 
 def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -> Colours:
@@ -199,7 +247,8 @@ def _attractors(
         at = plane.copies(dataset, entry.points, *theta)
         at = at[(at[:, 1] >= velocity[0]) & (at[:, 1] <= velocity[1])]
         if entry.chaotic:
-            marks.append(Points(*at.T, size=1.1, order=4.0))
+            path = f"attractors/{entry.id}"
+            marks.append(Points(*at.T, size=1.1, order=4.0, path=path))
         elif len(at):
             marks.append(_marker(entry, at))
     return marks
@@ -207,7 +256,10 @@ def _attractors(
 
 def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Panel:
     """Return the stroboscopic points of chaotic attractors in a separate plane."""
-    dots = [Points(*entry.points.T, size=1.1, colour=entry.colour) for entry in chaos]
+    dots = [
+        Points(*entry.points.T, size=1.1, colour=entry.colour, path=f"attractors/{entry.id}")
+        for entry in chaos
+    ]
     points = np.concatenate([entry.points for entry in chaos])
     pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
     speeds = float(points[:, 1].min()) - pad, float(points[:, 1].max()) + pad

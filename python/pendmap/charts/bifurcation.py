@@ -27,8 +27,6 @@ _BELOW: Final = ("sweeps", "exponent")
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
 _STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
-_SWEEPS: Final = (("up", 0.025), ("down", 0.055))
-"""Sweeps, and their height above the angles in a recording, over the range of the angles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +84,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         size=_SIZE,
         letters=False,
         tabs=True,
-        remark="The two lines above the angles: on which attractor the sweep up (lower) and the"
-        " sweep down (upper) are.",
     ).only(shown if alone else None)
 
 
@@ -114,12 +110,6 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
         of = 0.45 if "chaos" in one.name else size
         points = one.points[:, [0, column]]
         drawn.append(_dots(dataset, one, points, of, f"{k}/points", _said(every, k)))
-    low, high = plane.angles(dataset, dataset["point_theta"].values)
-    for name, height in _SWEEPS if which == "theta" else ():
-        for k, one in enumerate(every):
-            on = values[getattr(one, name)]
-            at = np.stack([on, np.full(on.size, high + height * (high - low))], axis=1)
-            drawn.append(_dots(dataset, one, at, 2.0, f"{k}/{name}"))
     return drawn
 
 
@@ -136,7 +126,7 @@ def _sweeps(
         classes[0] = ("sweep on none", "#ffffff")
     texts = [("" if name == "sweep on none" else name, name) for name, _ in classes]
     shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), cells)]
-    image = Image(shown, ends, (-1.0, 1.0), classes=classes, labels=texts)
+    image = Image(shown, ends, (-1.0, 1.0), classes=classes, labels=texts, path="attractors")
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
 
 

@@ -167,7 +167,7 @@ def _points(some: Triplets, up: Axis, *, absolute: bool) -> list[Mark]:
         inside = (y >= low) & (y <= high)
         look: dict[str, Any] = {"colour": colour, "order": 3.0}
         name = f"from an {'odd' if odd else 'even'} peak"
-        fill = colour if odd else "white"
+        fill = colour if odd else "#ffffff"
         spots: dict[str, Any] = {"marker": marker, "size": 3.0, "edge_width": 0.8, "name": name}
         marks.append(Points(x[inside], y[inside], fill=fill, **spots, **look))
         for beyond, edge, arrow in ((y > high, high, "^"), (y < low, low, "v")):

@@ -192,7 +192,7 @@ def by_run(found: Discrepancy) -> Panel:
     return Panel("by run", "Residual by run", across, up, marks)
 
 
-def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel:
+def forecast(found: Discrepancy, one: Forecast) -> Panel:
     """Return the forecast error against the horizon, with the noise."""
     floor = 1e3 * one.noise_floor
     marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
@@ -205,7 +205,7 @@ def forecast(found: Discrepancy, one: Forecast, *, plain: bool = False) -> Panel
     across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
     title = f"Error of forecasts, {one.kind} runs"
     root = f"forecast/{one.kind}"
-    up = Axis(RMS, holding(0.0, *shown)) if plain else names.sizes(RMS, *shown)
+    up = names.sizes(RMS, *shown)
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
@@ -248,11 +248,6 @@ def torque(found: Discrepancy, over: str) -> Panel:
 def _torques(found: Discrepancy) -> list[Panel]:
     """Return the missing torque over each quantity that has bins."""
     return [torque(found, over) for over in OVER_SAID if _torque_rows(found, over)]
-
-
-def recorded(found: Discrepancy) -> list[Panel]:
-    """Return the panels of a recording: torques and forecasts."""
-    return [*_torques(found), *(forecast(found, one, plain=True) for one in found.forecasts)]
 
 
 def ranking(found: Discrepancy) -> Panel:

@@ -86,7 +86,7 @@ def part(report: IdentificationReport) -> Chart:
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     """Return the whole record, as a line if ``thin``, else as its peaks alone."""
     cross: dict[str, Any] = {"marker": "|", "edge_width": 1.2, "name": "crossings of zero"}
-    circle: dict[str, Any] = {"fill": "white", "edge_width": 0.9, "name": "peaks"}
+    circle: dict[str, Any] = {"fill": "#ffffff", "edge_width": 0.9, "name": "peaks"}
     marks: list[Mark] = [
         Line(NONE, NONE, colour=EVEN, width=2.0, name="even half cycles"),
         Line(NONE, NONE, colour=ODD, width=2.0, name="odd half cycles"),
@@ -137,7 +137,7 @@ def _coloured(time: Floats, values: Floats, half: NDArray[np.int64], width: floa
 
 
 def _peaks(peaks: Peaks, size: float, *, by_parity: bool = False) -> list[Mark]:
-    look: dict[str, Any] = {"fill": "white", "edge_width": 0.4 + 0.11 * size, "order": 4.0}
+    look: dict[str, Any] = {"fill": "#ffffff", "edge_width": 0.4 + 0.11 * size, "order": 4.0}
     return [
         Points(
             peaks.time[peaks.odd == odd],

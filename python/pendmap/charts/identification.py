@@ -104,7 +104,7 @@ class Decay:
         return cls(peak_time, peak + zero, time, theta)
 
 
-def _decays(report: IdentificationReport) -> dict[str, Decay]:
+def simulated(report: IdentificationReport) -> dict[str, Decay]:
     """Return the simulation of each method's model; empty if there is too little to compare."""
     if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return {}
@@ -126,7 +126,7 @@ def _line(x: Floats, y: Floats, method: str, width: float) -> Line:
 def decays(report: IdentificationReport) -> Chart:
     """Return peaks, their differences, close views and residuals of every model."""
     title = "The decay by each model"
-    made, run, turned = _decays(report), report.run, report.peaks.turned
+    made, run, turned = simulated(report), report.run, report.peaks.turned
     last = []
     if (joint := report.joint) is not None:
         said, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma

@@ -159,7 +159,7 @@ def _tail(dataset: xr.Dataset) -> Panel:
     marks += [
         Line(*bars(begin, mean - error, mean + error), colour=QUIET, width=0.8, path="error"),
         Points(begin, mean, name=said, path="mean", **spots),
-        Points(begin[rough], mean[rough], fill="white", name=not_so, **spots),
+        Points(begin[rough], mean[rough], fill="#ffffff", name=not_so, **spots),
     ]
     precise = error < np.maximum(0.25 * mean, 1e-9)
     low = float(np.min((mean - error)[precise], initial=float(mean.min())))

@@ -1,8 +1,8 @@
 """Marks of charts: lines, points, bands, images and text, as arrays and plain values.
 
 Marks are in the units of their axes. A mark with a ``name`` is in the legend; marks of equal
-name share one entry. A mark with a ``path`` is in the recording, below the data of its
-panel.
+name share one entry. In a recording a mark has its ``path`` below the data of its panel, by
+default its number and name.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from pendmap.formatting import typographic
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.units import Units
+from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -63,6 +63,12 @@ def per_time(units: Units) -> str:
 def phase_plane(theta: Ends, velocity: Ends, units: Units) -> tuple[Axis, Axis]:
     """Return the axes of the phase plane."""
     return Axis(ANGLE, theta, "angle"), Axis(speed(units), velocity)
+
+
+def proportion(theta: Ends, velocity: Ends, units: Units) -> float:
+    """Return the height of a phase plane over its width, within bounds."""
+    low, high = (float(units.bare(bound, VELOCITY)) for bound in velocity)
+    return min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
 
 
 def symbol(name: str, unit: str = "1") -> str:

@@ -80,7 +80,7 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     # Pale colours on white, and all colours in grey, need an edge.
     line: dict[str, Any] = {"halo": QUIET, "path": f"{number}/path"}
     line |= {"width": 1.6} if stable else {"width": 1.0, "dash": DASHED}
-    spots: dict[str, Any] = {"edge": INK, "edge_width": 1.0, "fill": "" if stable else "white"}
+    spots: dict[str, Any] = {"edge": INK, "edge_width": 1.0, "fill": "" if stable else "#ffffff"}
     spots |= {"size": 5.0, "order": 4.0, "clip": False, "path": f"{number}/points"}
     return [Line(*path.T, **(line | look)), Points(*at.T, **(spots | look))]
 

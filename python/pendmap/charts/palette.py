@@ -44,22 +44,13 @@ _LINEAR = 0.04045  # Value of sRGB up to which it is proportional to luminance
 CONTRAST = 2.0
 """Least contrast (WCAG 2.2) of points with a white ground; yellow has 1.3, sky blue 2.3."""
 
-_DIVERGING = np.array(
-    [
-        (5, 48, 97),
-        (33, 102, 172),
-        (67, 147, 195),
-        (146, 197, 222),
-        (209, 229, 240),
-        (247, 247, 247),
-        (253, 219, 199),
-        (244, 165, 130),
-        (214, 96, 77),
-        (178, 24, 43),
-        (103, 0, 31),
-    ],
-    dtype=float,
-)  # Brewer's red and blue, for signed quantities
+_SCALES = {
+    "RdBu_r": "053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f",
+    "cividis": "00224e 083370 35456c 4f576c 666970 7d7c78 948e77 aea371 c8b866 e5cf52 fee838",
+    "magma": "000004 140e36 3b0f70 641a80 8c2981 b73779 de4968 f7705c fe9f6d fecf92 fcfdbf",
+    "viridis": "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725",
+}
+"""Colours at equal steps of the colour maps that charts name, for recordings."""
 
 _Shade = tuple[str, str]  # the colour, and its name in words
 
@@ -190,11 +181,6 @@ def marker(name: str, kind: str | None = None) -> str:
     return shapes[_place(read)[1] % len(shapes)]
 
 
-def describe(name: str, kind: str | None = None) -> str:
-    """Return the colour's name in words, for a legend that cannot show it: ``"sky blue"``."""
-    return in_words(colour(name, kind))
-
-
 @functools.cache
 def _words() -> dict[str, str]:
     """Return every colour of this module, with its name."""
@@ -230,11 +216,11 @@ def lap(name: str, kind: str | None = None) -> int:
     return _place(_read(name, kind))[1]
 
 
-def diverging(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-    """Return colours, shape (n, 3): -1 and below dark blue, 0 white, 1 and above dark red."""
-    at = (np.clip(np.asarray(values, dtype=float), -1.0, 1.0) + 1.0) / 2.0 * (len(_DIVERGING) - 1)
-    steps = np.arange(len(_DIVERGING))
-    mixed = [np.interp(at, steps, _DIVERGING[:, channel]) for channel in range(3)]
+def shades(scale: str, at: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Return colours of a colour map, shape (n, 3), at places from 0 to 1."""
+    colours = np.array([parts(f"#{code}") for code in _SCALES[scale].split()], dtype=float)
+    steps = np.linspace(0.0, 1.0, len(colours))
+    mixed = [np.interp(np.asarray(at, dtype=float), steps, channel) for channel in colours.T]
     return np.round(np.stack(mixed, axis=-1)).astype(np.uint8)
 
 

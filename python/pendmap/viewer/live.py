@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, ViewerError
-from pendmap.viewer import frame, trajectory
+from pendmap.viewer import recording, trajectory
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -24,9 +24,7 @@ ADDRESS: Final = "127.0.0.1:9876"  # Default address of a viewer
 BLOCK: Final = 1000  # Least number of samples sent at a time
 _PROBE: Final = 2.0
 _FLUSH: Final = 20.0
-_MOVING: Final = 200_000
-"""Number of samples up to which the pendulum moves at each; later at some of each block."""
-_LATER: Final = 1000
+_LATER: Final = 1000  # Positions of the pendulum in each block of a long trajectory
 _PORTS: Final = 65_535
 
 
@@ -35,16 +33,9 @@ class NobodyListensError(ViewerError):
 
 
 def check_address(address: str) -> tuple[str, int]:
-    """Return host and port of ``HOST:PORT``, at which a viewer listens.
+    """Return host and port of ``HOST:PORT``; raise an error if no viewer listens there.
 
     A connection without a listener would block for 15 seconds without an error.
-
-    Raises
-    ------
-    InputError
-        If the address is malformed.
-    NobodyListensError
-        If no viewer listens there; the message tells what to start.
     """
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
@@ -62,22 +53,7 @@ def check_address(address: str) -> tuple[str, int]:
 
 
 class Live:
-    """Sender of a trajectory's samples to a viewer, in blocks; the ``live`` of pendmap.simulate.
-
-    Parameters
-    ----------
-    model : Pendulum or Rig
-        The model.
-    start : (float, float)
-        Angle and velocity at the start.
-    address : str
-        ``HOST:PORT`` of the viewer.
-
-    Raises
-    ------
-    InputError, NobodyListensError
-        As for :func:`check_address`.
-    """
+    """Sender of a trajectory's samples to a viewer, in blocks; the ``live`` of pendmap.simulate."""
 
     def __init__(
         self, model: Pendulum | Rig, start: tuple[float, float], address: str = ADDRESS
@@ -86,19 +62,19 @@ class Live:
         self._attrs = dict(model.attributes)
         self._period = model.period
         fastest = max(abs(start[1]), 2 * math.sqrt(1 + abs(model.p)) * model.units.w0)
-        self._around = trajectory.frame_of(self._attrs, np.array([-fastest, fastest]))
+        self._around = trajectory.places(self._attrs, np.array([-fastest, fastest]))
         self._waiting: list[Floats] = []
         self._before = np.empty((3, 0))
         self._sent = 0
         # A new name each time: the viewer merges recordings of equal name.
-        self._stream: rr.RecordingStream = frame.identified(uuid.uuid4().hex)
-        with frame.strict():
+        self._stream: rr.RecordingStream = recording.identified(uuid.uuid4().hex)
+        with recording.strict():
             url = f"rerun+http://{f'[{host}]' if ':' in host else host}:{port}/proxy"
             layout = trajectory.layout(self._attrs, self._around)
             self._stream.connect_grpc(url, default_blueprint=layout)
             self._stream.send_recording_name(f"trajectory: {model.title}")
-            trajectory.still(self._stream, self._attrs, self._around)
-            frame.text(self._stream, "summary", f"{model.title}\n\nRunning.")
+            trajectory.still(self._stream, self._around)
+            recording.text(self._stream, "summary", f"{model.title}\n\nRunning.")
 
     def __call__(self, time: Floats, theta: Floats, velocity: Floats) -> None:
         """Collect samples; send them once there are enough."""
@@ -107,19 +83,13 @@ class Live:
             self._send()
 
     def finish(self, dataset: xr.Dataset) -> None:
-        """Send the waiting samples, the whole phase curve and the summary.
-
-        Raises
-        ------
-        ViewerError
-            If the viewer is no longer there.
-        """
+        """Send the waiting samples, the end of the phase curve and the summary."""
         self._send()
         motion = trajectory.motion_of(dataset)
-        with frame.strict():
+        with recording.strict():
             self._frame(motion[2])
-            trajectory.curve(self._stream, self._attrs, motion)
-            trajectory.summary(self._stream, dataset)
+            trajectory.curve(self._stream, motion)
+            trajectory.page(self._stream, dataset)
         try:
             self._stream.flush(timeout_sec=_FLUSH)
         except (RuntimeError, ValueError, TimeoutError) as error:
@@ -130,28 +100,28 @@ class Live:
     def _send(self) -> None:
         if not self._waiting:
             return
-        time, theta, velocity = block = np.concatenate(self._waiting, axis=1)
+        time, _, velocity = block = np.concatenate(self._waiting, axis=1)
         self._waiting = []
         trajectory.refuse_beyond(time, velocity)
-        with frame.strict():
+        with recording.strict():
             fastest = float(np.abs(velocity).max())
-            if fastest > self._around.y[1]:
+            if fastest > self._around[0].y[1]:
                 self._frame(1.5 * fastest * np.array([-1.0, 1.0]))
-            early = self._sent < _MOVING
+            early = self._sent < trajectory.MOVING
             bins = trajectory.BINS if early else _LATER
             trajectory.series(self._stream, self._attrs, block, bins)
             whole, since = np.concatenate([self._before, block], axis=1), self._before.shape[1]
             every = 1 if early else -(-time.size // _LATER)
-            trajectory.moving(self._stream, self._attrs, whole, since=since, every=every)
+            trajectory.moving_parts(self._stream, self._attrs, whole, since=since, every=every)
             period = np.round(time / self._period).astype(np.int64)
             once = np.abs(time / self._period - period) < 1e-9 * (1 + np.abs(period))
-            trajectory.section(self._stream, time[once], theta[once], velocity[once], period[once])
+            trajectory.section(self._stream, time[once], block[1:, once], period[once])
         self._sent += time.size
-        kept = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
-        self._before = whole[:, -kept:]
+        trail = int(trajectory.behind(self._attrs, whole[0])[0]) + 1
+        self._before = whole[:, -trail:]
 
     def _frame(self, velocity: Floats) -> None:
         """Draw the frames anew, for these velocities."""
-        self._around = trajectory.frame_of(self._attrs, velocity)
-        trajectory.still(self._stream, self._attrs, self._around)
+        self._around = trajectory.places(self._attrs, velocity)
+        trajectory.still(self._stream, self._around)
         self._stream.send_blueprint(trajectory.layout(self._attrs, self._around))

@@ -1,8 +1,7 @@
-"""Recordings of runs: time series, residuals with the noise, moving pendulums."""
+"""Records with their models in motion: angles, residuals with the noise, pendulums side by side."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
@@ -11,115 +10,263 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pendmap.errors import InputError
+from pendmap.charts import names, palette, registry
+from pendmap.charts.identification import simulated
+from pendmap.charts.methods import look
+from pendmap.comparison import Comparison
+from pendmap.comparison.experiment import in_short
+from pendmap.diagnosis import Discrepancy
+from pendmap.diagnosis.result import as_text as diagnosis_text
 from pendmap.formatting import MINUS
-from pendmap.viewer import columns, frame
-from pendmap.viewer.columns import Look
+from pendmap.identification import IdentificationReport
+from pendmap.identification.report import as_text as identification_text
+from pendmap.viewer import chart, moving, recording
+from pendmap.viewer.moving import Look
+from pendmap.viewer.place import plain
+from pendmap.viewer.recording import INK
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
     from pendmap.charts.marks import Floats
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
+    from pendmap.records import Run
 
-SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
-BAND: Final = 2.0  # Half width of the band of noise, standard deviations
+RECORD: Final = Look((128, 128, 128), 1.0, 3.0, "record")
+INSTANTS: Final = 20000
+"""Greatest number of drawn instants of a run; of a longer one every k-th is drawn, unless too few
+per swing would remain."""
+PER_SWING: Final = 24  # Least number of drawn instants per swing
+GAP: Final = 8.0  # Interval, over the median, above which a gap is not bridged
 MILLI: Final = 1e3  # Residuals are in mrad, which needs fewer digits on the axis
-LEGEND: Final = rrb.Corner2D.RightTop  # Corner of a legend, which a decay leaves free
+BAND: Final = 2.0  # Half width of the band of noise, standard deviations
+APART: Final = 2.5  # Distance between two pivots, arm lengths
+SEEN: Final = 0.3
+"""Angle between record and model that is drawn at a residual of three times the root mean square,
+rad."""
+MOST: Final = 1000.0  # Greatest magnification of the drawn deviations
 
 
 @dataclass(frozen=True)
-class Series:
-    """Name and colour of a time series; lines have a width, points a size."""
+class Motion:
+    """A record and its models, in s and rad; a row of NaN marks a gap.
+
+    ``models`` have a look, times and angles; the times are those of the record if the model was
+    fitted to it. ``sigma`` is the noise of a reading, 0 if unknown.
+    """
 
     name: str
-    colour: tuple[int, int, int]
-    width: float = 0.0
-    size: float = 3.0
+    time: Floats
+    record: Floats
+    models: Sequence[tuple[Look, Floats, Floats]]
+    sigma: float
+
+    def residuals(self) -> Iterator[tuple[Look, Floats]]:
+        """Yield record less model of each fitted model."""
+        for shade, time, theta in self.models:
+            if time is self.time and np.isfinite(theta).any():
+                yield shade, self.record - theta
+
+    @property
+    def rms(self) -> float:
+        """Largest root mean square residual of the models, rad."""
+        squares = (float(np.nanmean(residual**2)) for _, residual in self.residuals())
+        return math.sqrt(max(squares, default=0.0))
 
 
-def content_of(found: object, arrays: Iterable[Floats]) -> str:
-    """Return an identifier of the recorded content, which changes with readings and estimates."""
-    digest = hashlib.blake2b(repr(found).encode(), digest_size=12)
-    for each in arrays:
-        digest.update(np.ascontiguousarray(each).data)
-    return digest.hexdigest()
+def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
+    """Return layout, contents and name of the recording of what was found in records."""
+    shown = registry.of_result(result)
+    drawn, text = chart.drawings(shown), summary(result)
+    every, larger = motions(result)
+    moving.refuse_late(shown.title, (one.time for one in every))
+    tabs = [container(f"run_{k}", one, larger) for k, one in enumerate(every, 1)]
+    tabs += [one.container for one in drawn]
+
+    def write(stream: rr.RecordingStream) -> None:
+        chart.log(stream, drawn, text)
+        for number, one in enumerate(every, 1):
+            log(stream, f"run_{number}", one, larger)
+
+    arrays = (v for one in every for v in (one.time, one.record, *(m[2] for m in one.models)))
+    return {
+        "name": plain(shown.title),
+        "content": recording.content_of([shown.title, text, *arrays]),
+        "known": {"kind": type(result).__name__, "deviations_drawn_larger": larger},
+        "layout": recording.screen(rrb.Tabs(*tabs, active_tab=0), chart.ASIDE, shares=[11, 5]),
+        "log": write,
+    }
 
 
-def refuse_late(name: object, times: Iterable[Floats]) -> None:
-    """Raise InputError for times that a recording cannot hold."""
-    latest = max(float(np.max(np.abs(time), initial=0.0)) for time in times)
-    if latest > columns.LATEST:
-        raise InputError(
-            f"{name}: time is {latest:g} s: a recording holds up to {columns.LATEST:g} s"
-        )
+def motions(result: Any) -> tuple[list[Motion], float]:  # noqa: ANN401 (of several types)
+    """Return the runs in motion, and the magnification of their deviations."""
+    if isinstance(result, IdentificationReport):
+        return of_identification(result), 1.0
+    shown = of_diagnosis(result) if isinstance(result, Discrepancy) else []
+    return shown, magnified(shown) if shown else 1.0
 
 
-def view(path: str, name: str, **axes: Any) -> rrb.TimeSeriesView:  # noqa: ANN401 (of the view)
-    """Return the view of the time series under a path."""
-    return rrb.TimeSeriesView(origin=f"/{path}", name=name, plot_legend=LEGEND, **axes)
+def summary(result: Any) -> str:  # noqa: ANN401 (of several types)
+    """Return the text of a result, as its command prints it."""
+    lines: Iterable[str] = [repr(result)]
+    if isinstance(result, IdentificationReport):
+        lines = identification_text(result)
+    elif isinstance(result, Discrepancy):
+        lines = diagnosis_text(result)
+    elif isinstance(result, Comparison):
+        lines = in_short(result)
+    return "\n\n".join(line.strip() for line in lines)
 
 
-def series(
-    stream: rr.RecordingStream, path: str, time: Floats, values: Floats, look: Series
-) -> None:
-    """Log a time series, if not empty; a line is thinned to its lowest and highest values."""
-    if not time.size:
-        return
-    style: rr.SeriesLines | rr.SeriesPoints = (
-        rr.SeriesLines(
-            colors=[look.colour],
-            names=[look.name],
-            widths=[look.width],
-            aggregation_policy=rr.components.AggregationPolicy.MinMax,
-        )
-        if look.width
-        else rr.SeriesPoints(colors=[look.colour], names=[look.name], marker_sizes=[look.size])
+def of_identification(report: IdentificationReport) -> list[Motion]:
+    """Return every fitted run, or else the record with the best method's simulation."""
+    joint, run, best = report.joint, report.run, report.sound
+    if joint is None:
+        decay = None if best is None else simulated(report).get(best.method)
+        models = [] if decay is None else [(_look("model"), decay.time, decay.theta)]
+        time, theta = run.time, run.theta
+        if run.peaks_only:
+            time, theta = report.peaks.time, report.peaks.amplitude
+        return [Motion(run.name, time, theta, models, report.peaks.sigma)]
+    made = []
+    for k, (one, reading) in enumerate(zip(joint.runs, joint.readings, strict=True)):
+        angle, residual = joint.fit.curves[k][0], joint.fit.residuals[k]
+        # Errors of a sensor on the rod do not apply to the angle.
+        theta = one.theta - residual if one.rod_sensor is None else angle
+        theta = np.where(one.trusted & np.isfinite(angle), theta, math.nan)
+        made.append(_thinned(one, report.model.w0, [(_look("model"), theta)], reading.sigma))
+    return made
+
+
+def of_diagnosis(result: Discrepancy) -> list[Motion]:
+    """Return all runs with both models, whole runs held out after the others."""
+    data, w0 = result.data, result.base.fitted.fit.model.w0
+    fits = (result.base.fitted.fit, result.best.fitted.fit)
+    held = (result.base.hold_out.fit, result.best.hold_out.fit)
+    looks = [_look(name) for name in ("before", "after")]
+    made = []
+    for k, run in enumerate(data.fitted):
+        angles = [_model(run, fit, k) for fit in fits]
+        made.append(_thinned(run, w0, list(zip(looks, angles, strict=True)), _noise_of(run)))
+    for k, run in enumerate(() if data.inside else data.held):
+        pairs = list(zip(looks, [_model(run, fit, k) for fit in held], strict=True))
+        held_out = _thinned(run, w0, pairs, _noise_of(run))
+        made.append(replace(held_out, name=f"{run.name}, held out"))
+    return made
+
+
+def _noise_of(run: FitRun) -> float:
+    return float(np.sqrt(np.mean(np.square(run.sigma))))
+
+
+def _look(name: str) -> Look:
+    return Look(palette.parts(look(name).colour), 1.6, 1.0, look(name).label)
+
+
+def _model(run: FitRun, fit: TrajectoryFit, place: int) -> Floats:
+    """Return the reading of a model, NaN at samples that are not used."""
+    used = np.isfinite(fit.curves[place][0])
+    if run.trusted is not None:
+        used &= run.trusted
+    return np.where(used, run.theta - fit.residuals[place], math.nan)
+
+
+def _thinned(
+    run: FitRun | Run, w0: float, angles: Sequence[tuple[Look, Floats]], sigma: float
+) -> Motion:
+    """Return the drawn instants of a run, with NaN in gaps."""
+    step = float(np.median(np.diff(run.time)))
+    most = int(min(math.tau / w0 / step, run.time.size) / PER_SWING)
+    every = max(1, min(-(-run.time.size // INSTANTS), most))
+    chosen = run.time[::every]
+    cuts = np.flatnonzero(np.diff(chosen) > GAP * every * step) + 1
+    time = np.insert(chosen, cuts, (chosen[cuts - 1] + chosen[cuts]) / 2)
+    record, *models = (
+        np.insert(column[::every], cuts, math.nan)
+        for column in (run.theta, *(theta for _, theta in angles))
     )
-    stream.log(path, style, static=True)
-    stream.send_columns(path, [columns.at(time)], rr.Scalars.columns(scalars=values))
+    drawn = [(shade, time, theta) for (shade, _), theta in zip(angles, models, strict=True)]
+    return Motion(run.name, time, record, drawn, sigma)
 
 
-def residual(
-    stream: rr.RecordingStream, path: str, time: Floats, left: Floats, look: Series
-) -> None:
-    """Log a residual (rad) in mrad, with its root mean square in the name."""
-    known = left[np.isfinite(left)]
-    if known.size:
-        rms = MILLI * math.sqrt(float(np.mean(known**2)))
-        named = replace(look, name=f"{look.name}, {rms:.3g} mrad rms")
-        series(stream, path, time, MILLI * left, named)
+def magnified(shown: Sequence[Motion]) -> float:
+    """Return the magnification of the pendulums' deviations: 1, 2, 5, 10, ..."""
+    wanted = SEEN / (3 * max(*(one.rms for one in shown), 1e-12))
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return float(np.clip(max(m * power for m in (1, 2, 5) if m * power <= wanted), 1.0, MOST))
 
 
-def noise(stream: rr.RecordingStream, path: str, time: Floats, sigma: float) -> None:
+def container(root: str, one: Motion, larger: float) -> rrb.Container:
+    """Return the views of a run: pendulums above, angles and residuals below."""
+    who = ", ".join(["record", *(shade.name for shade, *_ in one.models)])
+    times = f"; deviations {larger:g} times larger" if larger > 1 else ""
+    wide = [-APART / 2, APART * (len(one.models) + 0.5)]
+    pendulums = rrb.Spatial2DView(
+        origin=f"/{root}/pendulum",
+        name=f"{who[:1].upper()}{who[1:]}{times}",
+        visual_bounds=rrb.VisualBounds2D(x_range=wide, y_range=[-1.15, 1.5]),
+    )
+    named = [("angle", f"{names.ANGLE}, {one.name}")]
+    if one.rms:
+        named.append(("residual", "Record less model (mrad)"))
+    # A decay leaves this corner free.
+    corner = rrb.Corner2D.RightTop
+    below = [
+        rrb.TimeSeriesView(origin=f"/{root}/{leaf}", name=name, plot_legend=corner)
+        for leaf, name in named
+    ]
+    return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4][: 1 + len(below)], name=one.name)
+
+
+def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> None:
+    """Log one run: angles, residuals with the noise, and pendulums side by side.
+
+    The record is behind the pendulum of each model, at whose side the deviation of a fitted model
+    is magnified by ``larger``.
+    """
+    moving.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
+    path = f"{root}/pendulum"
+    stream.log(f"{path}/data", moving.UPWARD, static=True)
+    pivots = [APART * place for place in range(1 + len(one.models))]
+    spots = rr.Points2D([[x, 0.0] for x in pivots], colors=[INK], radii=rr.Radius.ui_points(3.0))
+    stream.log(f"{path}/axes/pivots", spots, static=True)
+    words = ["record", *(shade.name for shade, *_ in one.models)]
+    named = recording.labels([[x, 1.2] for x in pivots], words)
+    stream.log(f"{path}/axes/names", named, static=True)
+    _pendulum(stream, f"{path}/data/record", (one.time, one.record), RECORD, 0.0)
+    for pivot, (shade, time, theta) in zip(pivots[1:], one.models, strict=True):
+        leaf = f"{path}/data/{shade.name}"
+        moving.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
+        _pendulum(stream, f"{leaf}/record", (one.time, one.record), RECORD, pivot)
+        drawn = one.record - larger * (one.record - theta) if time is one.time else theta
+        _pendulum(stream, leaf, (time, drawn), shade, pivot)
+    for shade, residual in one.residuals():
+        rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
+        leaf = shade.name if len(one.models) > 1 else "residual"
+        named_look = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
+        moving.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
+    if one.rms and one.sigma:
+        _noise(stream, f"{root}/residual", one)
+
+
+def _noise(stream: rr.RecordingStream, path: str, one: Motion) -> None:
     """Log the lines between which noise alone would keep 95 % of a residual."""
-    for name, sign, said in (("above", 1, "+"), ("below", -1, MINUS)):
-        band = np.full(2, MILLI * sign * BAND * sigma)
-        text = f"{said}{BAND:g} {SIGMA} of the noise, {said}{abs(band[0]):.3g} mrad"
-        series(stream, f"{path}/{name}", time[[0, -1]], band, Series(text, frame.INK, 1.5))
+    size = MILLI * BAND * one.sigma
+    for leaf, sign, text in (("above", 1.0, "+"), ("below", -1.0, MINUS)):
+        name = f"{text}{BAND:g} σ of the noise, {text}{size:.3g} mrad"
+        ends = np.full(2, sign * size)
+        moving.series(stream, f"{path}/{leaf}", one.time[[0, -1]], ends, Look(INK, 1.5, name=name))
 
 
-def pendulum(  # noqa: PLR0913, PLR0917 (where, when, how)
-    stream: rr.RecordingStream,
-    root: str,
-    time: Floats,
-    theta: Floats,
-    look: Series,
-    size: tuple[float, float, float],
-    pivot: float = 0.0,
+def _pendulum(
+    stream: rr.RecordingStream, path: str, motion: tuple[Floats, Floats], shade: Look, pivot: float
 ) -> None:
-    """Log a pendulum: radii of arm and bob in points, and drawing order (greater is on top)."""
-    arm, bob, order = size
+    """Log a pendulum; the record's is thin and on top beside a model."""
+    time, theta = motion
     known = np.isfinite(theta)
     at = np.stack([pivot + np.sin(theta), -np.cos(theta)], axis=1)[known]
-    lines = np.stack([np.broadcast_to((pivot, 0.0), at.shape), at], axis=1)
-    columns.strips(stream, f"{root}/arm", time[known], lines, Look(look.colour, arm, order))
-    columns.points(stream, f"{root}/bob", time[known], at, Look(look.colour, bob, order + 1))
-
-
-def pivots(stream: rr.RecordingStream, path: str, places: Iterable[float]) -> None:
-    """Log the pivots at these positions, and the upward y axis of the pendulums."""
-    upward = rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0]))
-    stream.log(f"{path}/data", upward, static=True)
-    at = [[place, 0.0] for place in places]
-    spots = rr.Points2D(at, colors=[frame.INK], radii=rr.Radius.ui_points(3.0))
-    stream.log(f"{path}/axes/pivots", spots, static=True)
+    arms = np.stack([np.broadcast_to((pivot, 0.0), at.shape), at], axis=1)
+    arm, bob = (0.8, 4.0) if shade is RECORD and pivot else (3.0, 10.0)
+    moving.strips(stream, f"{path}/arm", time[known], arms, replace(shade, size=arm))
+    moving.points(stream, f"{path}/bob", time[known], at, replace(shade, size=bob, order=2.0))

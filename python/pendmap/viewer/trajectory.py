@@ -12,14 +12,17 @@ import rerun.blueprint as rrb
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
+from pendmap.charts.chart import Panel
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import TIME, Units
-from pendmap.viewer import columns, frame
-from pendmap.viewer.columns import FASTEST, LATEST, Look
+from pendmap.viewer import moving, recording
+from pendmap.viewer.moving import FASTEST, Look
+from pendmap.viewer.place import Place
+from pendmap.viewer.recording import TIMELINE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import xarray as xr
 
@@ -36,18 +39,12 @@ TRAIL = (230, 159, 0)
 
 TRAIL_POINTS = 48  # Greatest number of points of the bob's trail, which is one forcing period long
 
-TRAILS = 20000
-"""Greatest number of trails logged; for a longer trajectory they are logged in larger steps."""
-
-MANY = 1000  # Number of points of a section above which they are drawn smaller
-
-MOVING = 100_000
-"""Samples at each end of a long trajectory for which the moving pendulum is logged."""
+MOVING = 50_000
+"""Greatest number of positions of the pendulum; of a longer trajectory every k-th sample moves."""
 
 BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
 
-CURVE, CURVE_PERIODS = 200_000, 100
-"""Greatest numbers of samples and periods of the phase curve, counted from the end."""
+CURVE = 20_000  # Samples of the phase curve, counted from the end
 
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
@@ -61,19 +58,10 @@ def motion_of(dataset: xr.Dataset) -> Floats:
     return np.stack([dataset[name].values for name in ("time", "theta", "velocity")], dtype=float)
 
 
-def blueprint(dataset: xr.Dataset) -> rrb.Blueprint:
-    """Return the layout: pendulum and summary left; phase plane, section and state right."""
-    attrs = facts(dataset)
-    return layout(attrs, frame_of(attrs, dataset["velocity"].values))
-
-
-def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
-    """Return the layout for a trajectory with these attributes, in a given frame."""
-    so_far = rrb.VisibleTimeRange(
-        frame.TIMELINE,
-        start=rrb.TimeRangeBoundary.infinite(),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
+def layout(attrs: Attributes, around: Sequence[Place]) -> rrb.Blueprint:
+    """Return the layout for a trajectory with these attributes, in given frames."""
+    begin, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
+    so_far = rrb.VisibleTimeRange(TIMELINE, start=begin, end=now)
     reach = 1.25 + _stroke(attrs)
     pendulum = rrb.Spatial2DView(
         origin="/pendulum",
@@ -84,19 +72,12 @@ def layout(attrs: Attributes, around: frame.Frame) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=f"/state/{name}", name=text(Units.of(attrs)))
         for name, (text, _) in _STATE.items()
     ]
-    left = rrb.Vertical(
-        pendulum,
-        rrb.TextDocumentView(origin="/summary", name="Summary"),
-        row_shares=[3, 2],
-    )
-    planes = rrb.Horizontal(
-        around.view("phase", "Phase plane"),
-        around.view(
-            "poincare", "Poincar\N{LATIN SMALL LETTER E WITH ACUTE} section", time_ranges=[so_far]
-        ),
-    )
+    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+    left = rrb.Vertical(pendulum, summary, row_shares=[3, 2])
+    phase, section = around
+    planes = rrb.Horizontal(phase.view(), section.view(time_ranges=[so_far]))
     right = rrb.Vertical(planes, rrb.Tabs(*state, active_tab=0), row_shares=[3, 2])
-    return frame.screen(left, right, shares=[2, 5])
+    return recording.screen(left, right, shares=[2, 5])
 
 
 def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
@@ -104,40 +85,24 @@ def log(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
     attrs, motion = facts(dataset), motion_of(dataset)
     time, _, velocity = motion
     refuse_beyond(time, velocity)
-    still(stream, attrs, frame_of(attrs, velocity))
-    summary(stream, dataset)
+    still(stream, places(attrs, velocity))
+    every = -(-time.size // MOVING)
+    long = f"This is a long run: of each {every} samples the pendulum moves at one."
+    page(stream, dataset, *([long] if every > 1 else []))
     series(stream, attrs, motion, BINS)
-    first, last = min(time.size, MOVING), max(time.size - MOVING, MOVING)
-    moving(stream, attrs, motion[:, :first])
-    if last < time.size:
-        rest(stream, float(time[first]))
-        moving(stream, attrs, motion[:, last:])
-    curve(stream, attrs, motion)
-    section(
-        stream,
-        dataset["section_time"].values.astype(float),
-        dataset["section_theta"].values,
-        dataset["section_velocity"].values,
-        dataset["period"].values,
-    )
+    moving_parts(stream, attrs, motion, every=every)
+    curve(stream, motion)
+    at, *point = (dataset[f"section_{name}"].values for name in ("time", "theta", "velocity"))
+    section(stream, at.astype(float), np.array(point), dataset["period"].values)
 
 
-def summary(stream: rr.RecordingStream, dataset: xr.Dataset) -> None:
-    """Log the summary of the trajectory, and the part shown of a long one."""
-    clock = "The time of the viewer is nondimensional: 1 s is \N{GREEK SMALL LETTER TAU} = 1."
-    units = Units.of(facts(dataset))
-    if units.si:
-        clock = "The time of the viewer is that of the rig."
-    time, parts = dataset["time"].values, [clock]
-    if time.size > 2 * MOVING:
-        ends = (units.at(f"{time[k]:.6g}") for k in (MOVING, time.size - MOVING))
-        parts.append(
-            "This is a long run: the pendulum moves up to {} and from {} on; curves against time "
-            "are drawn by their lowest and highest values; the section has all points.".format(
-                *ends
-            )
-        )
-    frame.summary(stream, dataset, *parts)
+def page(stream: rr.RecordingStream, dataset: xr.Dataset, *further: str) -> None:
+    """Log the summary of the trajectory, and further paragraphs."""
+    si = Units.of(facts(dataset)).si
+    clock = "that of the rig" if si else "nondimensional: 1 s is τ = 1"
+    lines = str(dataset.attrs.get("summary", "")).splitlines()
+    lines += [f"The time of the viewer is {clock}.", *further]
+    recording.text(stream, "summary", "\n\n".join(lines))
 
 
 def refuse_beyond(time: Floats, velocity: Floats) -> None:
@@ -145,13 +110,15 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
-    if time.size and time[-1] > LATEST:
-        raise InputError(f"until is {time[-1]:g}: a recording holds up to {LATEST:g}")
+    moving.refuse_late("until", [time])
 
 
-def frame_of(attrs: Attributes, velocity: Floats) -> frame.Frame:
-    """Return the frame of the phase plane that contains these velocities."""
-    return frame.Frame.phase((-math.pi, math.pi), plane.padded(velocity), Units.of(attrs))
+def places(attrs: Attributes, velocity: Floats) -> list[Place]:
+    """Return phase plane and section in frames that contain these velocities."""
+    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), plane.padded(velocity)
+    sides, ratio = names.phase_plane(theta, speeds, units), names.proportion(theta, speeds, units)
+    titles = {"phase": "Phase plane", "poincare": "Poincaré section"}
+    return [Place.of(Panel(name, title, *sides, ()), ratio) for name, title in titles.items()]
 
 
 def _stroke(attrs: Attributes) -> float:
@@ -160,32 +127,23 @@ def _stroke(attrs: Attributes) -> float:
     return abs(float(attrs["p"])) / omega**2 if omega else 0.0
 
 
-def still(stream: rr.RecordingStream, attrs: Attributes, around: frame.Frame) -> None:
-    """Log the static parts: frames, and the rail of the pivot."""
-    for root in ("phase", "poincare"):
-        around.log(stream, root)
-    stroke = _stroke(attrs)
-    stream.log("pendulum/data", rr.Transform3D(mat3x3=np.diag([1.0, -1.0, 1.0])), static=True)
-    rail = [[[0.0, -stroke - 0.05], [0.0, stroke + 0.05]]]
-    thin = rr.Radius.ui_points(0.75)
-    stream.log(
-        "pendulum/axes/rail", rr.LineStrips2D(rail, colors=[frame.INK], radii=thin), static=True
-    )
+def still(stream: rr.RecordingStream, around: Sequence[Place]) -> None:
+    """Log the static parts: frames, and the direction of the pendulum's y axis."""
+    for place in around:
+        place.log_frame(stream)
+    stream.log("pendulum/data", moving.UPWARD, static=True)
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
     """Log angle, velocity and energy against time, by their extremes in each of ``bins`` bins."""
     units, (time, theta, velocity) = Units.of(attrs), motion
     every = (theta, velocity, energy(theta, velocity, attrs))
-    for (name, (said, colour)), values in zip(_STATE.items(), every, strict=True):
-        path = f"state/{name}"
-        style = rr.SeriesLines(colors=[colour], names=[said(units)], widths=[1.5])
-        stream.log(path, style, static=True)
+    for (name, (text, colour)), values in zip(_STATE.items(), every, strict=True):
         at, shown = plane.envelope(time, values, bins)
-        stream.send_columns(path, [columns.at(at)], rr.Scalars.columns(scalars=shown))
+        moving.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=text(units)))
 
 
-def moving(
+def moving_parts(
     stream: rr.RecordingStream,
     attrs: Attributes,
     motion: Floats,
@@ -207,60 +165,37 @@ def moving(
     pivot = np.stack([np.zeros_like(height), height], axis=1)
     bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     new = np.arange(since, time.size, every)
-    columns.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
-    columns.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
+    moving.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
+    moving.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
     arm = np.stack([pivot[new], bob[new]], axis=1)
-    columns.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
-    chosen = new[:: max(1, -(-new.size // TRAILS))]
-    back = behind(attrs, time)
-    trail = bob[np.maximum(chosen[:, None] - back[None, :], 0)]
-    columns.strips(stream, "pendulum/data/trail", time[chosen], trail, Look(TRAIL, 1.5))
+    moving.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
+    trail = bob[np.maximum(new[:, None] - behind(attrs, time), 0)]
+    moving.strips(stream, "pendulum/data/trail", time[new], trail, Look(TRAIL, 1.5))
     now = np.stack([plane.wrapped(theta[new]), velocity[new]], axis=1)
-    columns.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
+    moving.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
 
 
 def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
     """Return the sample offsets of the trail's points, falling to 0, over about one period."""
     tau = Units.of(attrs).bare(time, TIME)
-    turns = float(attrs["omega"]) or 1.0
-    samples = (
-        2 * math.pi / turns / max(float(np.median(np.diff(tau))), 1e-12) if time.size > 1 else 1
-    )
+    step = float(np.median(np.diff(tau))) if time.size > 1 else math.inf
+    samples = 2 * math.pi / (float(attrs["omega"]) or 1.0) / max(step, 1e-12)
     every = max(1, math.ceil(samples / TRAIL_POINTS))
     count = min(TRAIL_POINTS, max(2, math.ceil(samples / every)))
     return every * np.arange(count, dtype=np.int64)[::-1]
 
 
-def rest(stream: rr.RecordingStream, time: float) -> None:
-    """Clear the moving parts from this time on."""
-    stream.set_time(frame.TIMELINE, duration=time)
-    for path in ("pendulum/data", "phase/data/now"):
-        stream.log(path, rr.Clear(recursive=True))
-    stream.reset_time()
-
-
-def curve(stream: rr.RecordingStream, attrs: Attributes, motion: Floats) -> None:
-    """Log the phase-plane curve of the last periods, broken where the angle wraps."""
-    period = Units.of(attrs).given(2 * math.pi / (float(attrs["omega"]) or 1.0), TIME)
-    time, theta, velocity = motion
-    first = int(np.searchsorted(time, time[-1] - CURVE_PERIODS * period))
-    first = max(first, time.size - CURVE)
-    points = plane.broken_at_wrap(theta[first:], velocity[first:])
-    lines = rr.LineStrips2D(
-        [points.astype(np.float32)], colors=[LINE], radii=rr.Radius.ui_points(0.6)
-    )
+def curve(stream: rr.RecordingStream, motion: Floats) -> None:
+    """Log the end of the curve in the phase plane, broken where the angle wraps."""
+    points = plane.broken_at_wrap(*motion[1:, -CURVE:]).astype(np.float32)
+    lines = rr.LineStrips2D([points], colors=[LINE], radii=rr.Radius.ui_points(0.6))
     stream.log("phase/data/curve", lines, static=True)
 
 
 def section(
-    stream: rr.RecordingStream,
-    time: Floats,
-    theta: Floats,
-    velocity: Floats,
-    period: npt.NDArray[np.int64],
+    stream: rr.RecordingStream, time: Floats, points: Floats, period: npt.NDArray[np.int64]
 ) -> None:
     """Log one point per period; the view shows those up to the cursor, so the section grows."""
-    at = np.stack([plane.wrapped(theta), velocity], axis=1)
-    size = 1.4 if time.size > MANY else 2.5
+    at = np.stack([plane.wrapped(points[0]), points[1]], axis=1)
     number = rr.TimeColumn("period", sequence=period.astype(np.int64))
-    columns.points(stream, "poincare/data/points", time, at, Look(BOB, size), number)
+    moving.points(stream, "poincare/data/points", time, at, Look(BOB, 1.8), number)

@@ -37,29 +37,7 @@ class NotARecordingError(ViewerError, InputError):
 
 
 def open_viewer(path: str | os.PathLike[str]) -> int:
-    """Start the viewer on a recording and leave it running.
-
-    Parameters
-    ----------
-    path : str or path
-        An ``.rrd`` file.
-
-    Returns
-    -------
-    int
-        Process number of the viewer, which keeps running.
-
-    Raises
-    ------
-    RecordingNotFoundError
-        If there is no such file.
-    NotARecordingError
-        If the file is not a recording, or empty.
-    NoDisplayError
-        If there is no display; the message tells what to do instead.
-    ViewerError
-        If the viewer is not installed or ends at once; the message contains its output.
-    """
+    """Start the viewer on a recording, leave it running, and return its process number."""
     file = _checked(Path(path))
     if not _display():
         raise NoDisplayError(_elsewhere(file, _NO_DISPLAY))
@@ -96,15 +74,7 @@ def _checked(file: Path) -> Path:
 
 
 def check_display() -> None:
-    """Raise an error if no window can be opened.
-
-    Raises
-    ------
-    NoDisplayError
-        If there is no display.
-    ViewerError
-        If the viewer is not installed.
-    """
+    """Raise an error if no window can be opened: without a display or the viewer."""
     if not _display():
         raise NoDisplayError(
             f"{_NO_DISPLAY}; leave it out, copy the .rrd to a computer with a screen"

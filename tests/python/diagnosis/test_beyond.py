@@ -71,7 +71,7 @@ def test_a_part_that_cannot_be_computed_is_null_with_its_reason(
         assert f"Not computed: {name}: " in text
     render.draw(found, tmp_path / "a.png")
     render.write_report(found, tmp_path / "a.html")
-    viewer.record_discrepancy(found, tmp_path / "a.rrd")
+    viewer.record(found, tmp_path / "a.rrd")
     report = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert all(name in report for name in unknown)
 

@@ -15,6 +15,7 @@ from pendmap import Effect, InputError, Rig, Run
 from pendmap.comparison import Comparison
 from pendmap.diagnosis import Discrepancy, diagnosed_model
 from pendmap.diagnosis.summary import as_json
+from recordings import ReadBack
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -127,8 +128,8 @@ def test_what_is_loaded_has_the_same_numbers(found: Discrepancy, tmp_path: Path)
 
 
 def test_view_says_what_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"result must be a dataset, an identification, .*, got 3"):
-        pendmap.view(3, tmp_path / "a.rrd")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"result must be a dataset, .*, got 3"):
+        pendmap.view(3, tmp_path / "a.rrd")
     with pytest.raises(InputError, match="path must be left out where a recording is opened"):
         pendmap.view("a.rrd", tmp_path / "a.rrd")
     opened: list[object] = []
@@ -140,8 +141,12 @@ def test_view_says_what_it_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert opened == [made, made]
 
 
-def test_a_comparison_has_no_recording(tmp_path: Path) -> None:
-    compared = pendmap.compare(TRUE, made("a", 1.0))
+def test_a_comparison_and_its_records_have_recordings(tmp_path: Path) -> None:
+    experiment = made("a", 1.0)
+    compared = pendmap.compare(TRUE, experiment)
     assert isinstance(compared, Comparison)
-    with pytest.raises(InputError, match="result must be a dataset"):
-        pendmap.view(compared, tmp_path / "a.rrd")  # type: ignore[arg-type]
+    back = ReadBack(pendmap.view(compared, tmp_path / "a.rrd"))
+    panels = {f"/part_1/{name}" for name in ("record", "residual", "errors")}
+    assert panels | {"/legend", "/summary"} <= set(back.views)
+    assert "- model: blue" in back.one("/legend", "TextDocument:text")
+    assert pendmap.view(experiment, tmp_path / "b.rrd").exists()

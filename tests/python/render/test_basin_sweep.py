@@ -97,11 +97,14 @@ def test_a_recording_has_the_labels_of_each_model_on_its_timeline(
 ) -> None:
     back = recorded(dataset, tmp_path)
     images = back.columns["/basin/data/labels"]["SegmentationImage:buffer"]
+    assert {f"/{panel.where}" for panel in basin_sweep.chart(shown(dataset)).recorded} <= set(
+        back.views
+    )
     label = dataset.label.values.reshape(-1, *dataset.label.shape[-2:])
     assert len([one for one in images if one is not None]) == len(label)
     read = np.array([np.asarray(one[0], np.uint8) for one in images if one is not None])
     np.testing.assert_array_equal(read.reshape(label.shape), label + 1)
-    named = back.names("/basin")
+    named = back.names("/basin/data/labels")
     assert len(named) == 2 + dataset.sizes["attractor"]
     if dataset is LINE:
         column = back.columns["/basin/data/labels"]["p"]

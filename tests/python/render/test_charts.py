@@ -9,10 +9,14 @@ import pytest
 import xarray as xr
 from matplotlib.text import Text
 
+import pendmap
 from drawn import made, named, written
 from pendmap import InputError, render, viewer
 from pendmap.charts import chart as charts
 from pendmap.charts import marks, registry
+from pendmap.viewer.chart import drawings
+from pendmap.viewer.marks import PALE
+from pendmap.viewer.place import Place, scaled
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -95,6 +99,51 @@ def test_a_builder_is_enough_for_a_recording(dataset: xr.Dataset, tmp_path: Path
     assert (cells == np.eye(4)).all()
     assert "- a line: vermillion" in back.one("/legend", "TextDocument:text")
     assert back.views["/curves"] == "Curves"
+    assert {f"/curves/data/{k}" for k in ("4_a_span", "5_an_area", "6")} <= set(back.columns)
+    assert back.one("/curves/data/line", "LineStrips2D:labels") == "a line"
+    assert back.one("/curves/data/line", "LineStrips2D:colors") == 0xD55E00FF
+    assert back.one("/curves/data/6", "Points2D:labels") == "words"
+    names = back.names("/heights/data/heights")
+    heights = back.image("/heights/data/heights", "SegmentationImage", np.uint8)
+    assert [[names[number] for number in row] for row in heights[:2, :2]] == [
+        ["1", "0"],
+        ["0", "1"],
+    ]
+
+
+def test_marks_of_a_recording_have_the_colours_of_the_chart(tmp_path: Path) -> None:
+    for dataset in (
+        pendmap.basins(pendmap.Pendulum(p=0.6), 20),
+        pendmap.bifurcation(pendmap.Pendulum(), {"p": (0.5, 1.5, 5)}),
+        pendmap.tongues(pendmap.Pendulum()),
+    ):
+        back = recorded(dataset, tmp_path)
+        (drawing,) = drawings(registry.build(registry.ready(dataset, "record")))
+        assert {f"/{place.root}" for place in drawing.places} <= set(back.views)
+        for place in drawing.places:
+            for mark in place.panel.marks:
+                shade = back.columns.get(f"/{place.root}/data/{mark.path}", {})
+                for kind in ("Points2D", "LineStrips2D"):
+                    if mark.path and mark.colour not in PALE and f"{kind}:colors" in shade:
+                        assert shade[f"{kind}:colors"][0] == [int(f"{mark.colour[1:]}ff", 16)]
+
+
+def test_a_panel_without_a_frame_is_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    table = marks.Table(["method", "w0 (rad/s)"], [["decay", "6.2"]])
+    note = marks.Text(0.0, 1.0, "a note")
+    page = charts.Chart("Title", "", [[charts.bare("table", table, note)]])
+    monkeypatch.setitem(registry.BUILDERS, "example", lambda *_, **__: page)
+    back = recorded(xr.Dataset({"p": ("x", X)}, attrs={"kind": "example"}), tmp_path)
+    text = back.one("/table", "TextDocument:text")
+    assert text == "| method | w0 (rad/s) |\n| --- | --- |\n| decay | 6.2 |\n\na note"
+
+
+def test_axes_that_are_logarithmic_on_both_sides_of_0_have_ticks() -> None:
+    axis = charts.Axis("error\nlog beyond $10^{-2}$", (-1.0, 10.0), "signed", straight=0.01)
+    panel = charts.Panel("errors", "", axis, charts.Axis("y", (0.0, 1.0)), ())
+    assert Place.of(panel, 1.0).x == pytest.approx((-3.0, 4.0))
+    at = scaled(axis, [-1.0, -0.01, -0.005, 0.0, 0.1])
+    assert at == pytest.approx([-3.0, -1.0, -0.5, 0.0, 2.0])
 
 
 def test_without_a_builder_there_is_no_figure_and_no_recording(tmp_path: Path) -> None:

@@ -152,7 +152,7 @@ def test_a_selection_of_a_parameter_map_is_drawn(
     image = back.image("/kinds/data/kinds", "SegmentationImage", np.uint8)
     extent = _extent(back, "/kinds/data/kinds", image.shape)
     assert extent == pytest.approx([*wide, *high], abs=1e-5)
-    names = back.names("/kinds")
+    names = back.names("/kinds/data/kinds")
     for x in part["p"].values:
         for y in part["omega"].values:
             cell = part.sel(p=x, omega=y)

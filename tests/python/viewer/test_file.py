@@ -10,7 +10,7 @@ import xarray as xr
 
 import synthetic
 from pendmap import InputError, viewer
-from pendmap.viewer import basins
+from pendmap.viewer import chart
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def test_a_recording_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.M
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setitem(viewer._KINDS, "basins", (basins.blueprint, interrupted))  # noqa: SLF001
+    monkeypatch.setattr(chart, "log", interrupted)
     with pytest.raises(KeyboardInterrupt):
         viewer.record(synthetic.painted(), file)
     assert file.read_bytes() == b"old"
@@ -47,8 +47,8 @@ def test_errors_are_raised_although_the_library_would_only_warn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rr.set_strict_mode(False)
-    monkeypatch.setattr(basins, "_COLOUR_MAPS", {"settle": "no such map"})
-    with pytest.raises(ValueError, match="no such map"):
+    monkeypatch.setattr(rr, "SegmentationImage", lambda *_, **__: rr.Points2D("none"))
+    with pytest.raises(ValueError, match="none"):
         viewer.record(synthetic.painted(), tmp_path / "a.rrd")
     assert not rr.strict_mode()
     assert not list(tmp_path.iterdir())

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import motions
 import synthetic
-from pendmap.charts import palette
-from pendmap.viewer import basins
-from recordings import recorded
+from pendmap.charts import basins, palette
+from pendmap.viewer import chart
+from pendmap.viewer.chart import drawings
+from recordings import ReadBack, recorded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,12 +23,29 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 
+def values(back: ReadBack, entity: str) -> np.ndarray:
+    """Return an image of numbers, read from the names of its classes; NaN without a value."""
+    names = back.names(entity)
+    table = np.full(256, np.nan)
+    for number, name in names.items():
+        if number and name:
+            table[number] = float(name.replace("\N{MINUS SIGN}", "-"))
+    return table[back.image(entity, "SegmentationImage", np.uint8)]
+
+
+def colours(back: ReadBack, entity: str) -> dict[int, str]:
+    """Return the colours of an entity's classes."""
+    context = back.columns[entity]["AnnotationContext:context"][0][0]
+    infos = (each["class_description"]["info"] for each in context)
+    return {info["id"]: f"#{info['color'] >> 8:06x}" for info in infos}
+
+
 def test_a_map_is_read_back(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4], (13, 9), undecided=3, failed=2)
     back = recorded(dataset, tmp_path)
     wanted = {
         "/basin/data/labels",
-        "/basin/data/attractors",
+        "/basin/data/attractors/1",
         "/settle/data/steps",
         "/turns/data/turns",
         "/legend",
@@ -37,52 +55,49 @@ def test_a_map_is_read_back(tmp_path: Path) -> None:
     }
     assert wanted <= set(back.columns)
     assert wanted <= back.static
+    label = dataset["label"].values
     labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
-    assert (labels == dataset["label"].values + 1).all()
-    settle = back.image("/settle/data/steps", "DepthImage", np.uint16)
-    assert (settle == np.maximum(dataset["settle_periods"].values, 0)).all()
-    without = back.image("/settle/data/without", "SegmentationImage", np.uint16)
-    assert ((without > 0) == (dataset["settle_periods"].values < 0)).all()
-    classes = back.image("/turns/data/turns", "SegmentationImage", np.uint16).astype(int)
-    kept = dataset["label"].values >= 0
-    none = int(back.one("/turns/data/turns", "class_of_no_turn"))
-    assert (classes - none == dataset["net_turns"].values)[kept].all()
-    assert (classes[~kept] == 0).all()
+    assert (labels == label + 1).all()
+    # Cells without a value show the labels below.
+    without = back.image("/settle/data/without", "SegmentationImage", np.uint8)
+    assert (without == label + 1).all()
+    settle, periods = values(back, "/settle/data/steps"), dataset["settle_periods"].values
+    assert (np.isnan(settle) == ((periods < 0) | (label < 0))).all()
+    settled = ~np.isnan(settle)
+    np.testing.assert_allclose(settle[settled], np.maximum(periods[settled], 1), rtol=0.02)
+    turns = dataset["net_turns"].values.astype(float)
+    within = (label >= 0) & (np.abs(turns) < np.quantile(np.abs(turns[label >= 0]), 0.98))
+    assert (values(back, "/turns/data/turns") == turns)[within].all()
 
 
 def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4], undecided=3)
     back = recorded(dataset, tmp_path)
-    assert back.names("/basin") == {
-        0: "failed",
-        1: "undecided",
-        2: "rest",
-        3: "rotation 1:+1",
-        4: "rotation 1:\N{MINUS SIGN}1",
-        5: "oscillation 2:0",
-    }
-    colours = {
-        e["class_id"]: e["class_description"]["info"]["color"]
-        for e in back.columns["/basin"]["AnnotationContext:context"][0][0]
-    }
-    red, green, blue = palette.rgb("rotation 1:+1")
-    assert colours[3] == (red << 24) + (green << 16) + (blue << 8) + 255
-    turns = back.names("/turns")
-    none = int(back.one("/turns/data/turns", "class_of_no_turn"))
-    assert turns[none + 3] == "+3 turns"
-    assert turns[none - 3] == "\N{MINUS SIGN}3 turns"
-    for label in np.unique(back.image("/turns/data/turns", "SegmentationImage", np.uint16)):
-        assert int(label) in turns
+    names, shades = (each(back, "/basin/data/labels") for each in (ReadBack.names, colours))
+    minus = "\N{MINUS SIGN}"
+    wanted = ["undecided", "rest", "rotation 1:+1", f"rotation 1:{minus}1", "oscillation 2:0"]
+    for number, name in enumerate(wanted, 1):
+        assert names[number].startswith(f"{name}, ")
+        assert shades[number] == palette.colour(name)
+    for number, name in enumerate(wanted[1:], 1):
+        path = f"/basin/data/attractors/{number}"
+        (((shade,),),) = [back.columns[path]["Points2D:colors"]]
+        assert f"#{shade >> 8:06x}" == palette.colour(name)
+    turns = back.image("/turns/data/turns", "SegmentationImage", np.uint8)
+    assert set(np.unique(turns).tolist()) <= set(back.names("/turns/data/turns"))
 
 
 def test_attractors_are_drawn_at_their_points_and_named(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4])
     back = recorded(dataset, tmp_path)
-    at = np.array(back.one("/basin/data/attractors", "Points2D:positions"))
-    expected = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
-    assert np.allclose(at, expected, atol=1e-6)
-    labels = back.one("/basin/data/attractors/names", "Points2D:labels")
-    assert labels == ["rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1", "oscillation 2:0"]
+    owner = dataset["point_attractor"].values
+    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
+    for number in dataset["id"].values:
+        at = np.array(back.columns[f"/basin/data/attractors/{number}"]["Points2D:positions"][0])
+        assert np.allclose(at, points[owner == number], atol=1e-6)
+    labels = [rows.get("Points2D:labels", [[]])[0] for rows in back.columns.values()]
+    for name in ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1", "oscillation 2:0"):
+        assert [name] in labels
 
 
 def test_transforms_bring_the_corners_of_the_map_to_the_frame(tmp_path: Path) -> None:
@@ -107,9 +122,10 @@ def test_legend_and_summary(tmp_path: Path) -> None:
     back = recorded(dataset, tmp_path)
     text = back.one("/legend", "TextDocument:text")
     share = 100 * float(dataset["fraction"].values[1])
-    assert f"| rotation 1:+1 | {share:.1f} \N{PLUS-MINUS SIGN} " in text
-    assert "| vermillion | rotation 1:\N{MINUS SIGN}1 |" in text
-    assert "| undecided | 1 % | light grey |" in text
+    line = next(line for line in text.splitlines() if line.startswith("- rotation 1:+1"))
+    assert line.startswith(f"- rotation 1:+1, {share:.1f} \N{PLUS-MINUS SIGN} ")
+    assert line.endswith("twin of rotation 1:\N{MINUS SIGN}1: vermillion")
+    assert "- undecided, 1 %: light grey" in text
     assert "labels unreliable: 20.7 % change under half the step or mirroring" in text
     summary = back.one("/summary", "TextDocument:text")
     assert summary.split("\n\n") == dataset.attrs["summary"].splitlines()
@@ -125,21 +141,20 @@ def test_parameters_are_properties(tmp_path: Path) -> None:
 def test_every_view_has_an_origin_and_a_name(tmp_path: Path) -> None:
     assert recorded(synthetic.painted(), tmp_path).views == {
         "/basin": "Basins of attraction",
-        "/settle": "Settle time (periods)",
+        "/settle": "Settle time",
         "/turns": "Net turns until settled",
         "/legend": "Legend",
         "/summary": "Summary",
     }
     unreliable = synthetic.painted(**synthetic.UNRELIABLE)
     assert recorded(unreliable, tmp_path).views["/basin"] == "Labels (unreliable)"
-    contents = [str(part.origin) for part in tabs_of(unreliable)]
-    assert contents == ["/settle", "/turns", "/basin"]
+    assert tabs_of(unreliable) == ["settle", "turns", "basin"]
 
 
-def tabs_of(dataset: xr.Dataset) -> list[Any]:
-    """Return the tabs of the layout, the active one first."""
-    screen: Any = basins.blueprint(dataset)
-    return list(screen.root_container.contents[0].contents)
+def tabs_of(dataset: xr.Dataset) -> list[str]:
+    """Return the paths of the tabs of the layout, the active one first."""
+    (drawing,) = drawings(basins.chart(dataset))
+    return [place.root for place in drawing.places]
 
 
 def test_a_single_chaotic_attractor_is_recorded(tmp_path: Path) -> None:
@@ -147,19 +162,19 @@ def test_a_single_chaotic_attractor_is_recorded(tmp_path: Path) -> None:
     back = recorded(dataset, tmp_path)
     assert "/basin/data/labels" not in back.columns
     assert "/settle/data/steps" not in back.columns
-    exponent = back.image("/exponent/data/exponent", "DepthImage", np.float32)
-    assert (exponent == dataset["finite_time_exponent"].values).all()
-    classes = back.image("/turns/data/turns", "SegmentationImage", np.uint16).astype(int)
-    none = int(back.one("/turns/data/turns", "class_of_no_turn"))
-    assert (classes - none == dataset["net_turns"].values).all()
-    assert len(back.one("/basin/data/attractors", "Points2D:positions")) == dataset.sizes["point"]
-    assert [str(part.origin) for part in tabs_of(dataset)] == ["/turns", "/exponent", "/basin"]
+    shown = values(back, "/exponent/data/exponent")
+    exponent = dataset["finite_time_exponent"].values
+    assert np.abs(shown - exponent).max() < 0.05 * np.ptp(exponent)
+    assert (values(back, "/turns/data/turns") == dataset["net_turns"].values).all()
+    at = back.columns["/basin/data/attractors/1"]["Points2D:positions"][0]
+    assert len(at) == dataset.sizes["point"]
+    assert tabs_of(dataset) == ["turns", "exponent", "basin"]
 
 
 def test_a_map_without_damping_is_recorded(tmp_path: Path) -> None:
     dataset = motions.chaotic(gamma=0.0, p=0.6, omega=2.0, cells=20, periods=4)
     back = recorded(dataset, tmp_path)
-    assert "No attractors." in back.one("/legend", "TextDocument:text")
+    assert "No attractors" in back.one("/legend", "TextDocument:text")
     assert not [entity for entity in back.columns if "attractors" in entity]
 
 
@@ -185,15 +200,16 @@ def test_a_failed_exponent_is_covered(tmp_path: Path) -> None:
     dataset["finite_time_exponent"][3, 4] = np.nan
     dataset["label"][3, 4] = -1
     back = recorded(dataset, tmp_path)
-    cover = back.image("/exponent/data/without", "SegmentationImage", np.uint16)
-    assert cover[3, 4] == 1
-    assert np.count_nonzero(cover) == 1
+    cover = back.image("/exponent/data/without", "SegmentationImage", np.uint8)
+    assert cover[3, 4] == 0
+    assert colours(back, "/exponent/data/without")[0] == palette.FAILED
+    assert np.argwhere(np.isnan(values(back, "/exponent/data/exponent"))).tolist() == [[3, 4]]
 
 
 def test_a_map_beyond_the_largest_image_is_thinned(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(basins, "CELLS", 16)
+    monkeypatch.setattr(chart, "CELLS", 16)
     dataset = synthetic.painted(synthetic.USUAL[:3], (32, 40), undecided=5)
     back = recorded(dataset, tmp_path)
     labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)

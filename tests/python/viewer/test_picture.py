@@ -20,9 +20,9 @@ import motions
 import pendmap
 import synthetic
 from pendmap import viewer
-from pendmap.charts import palette
+from pendmap.charts import methods, palette
 from pendmap.identification import identify
-from pendmap.viewer import identification, window
+from pendmap.viewer import runs, window
 from recordings import ReadBack
 
 if TYPE_CHECKING:
@@ -94,15 +94,10 @@ def test_the_viewers_own_picture_of_an_identification(tmp_path: Path) -> None:
     record = tmp_path / "a.csv"
     record.write_text(content + "\n")
     report = identify(pendmap.read_experiment(record))
-    file = viewer.record_identification(report, tmp_path / "a.rrd")
+    file = viewer.record(report, tmp_path / "a.rrd")
     shares = shares_of_colours(file, tmp_path, 5.0)
-    for series in (
-        identification.RECORD,
-        identification.MODEL,
-        identification.PEAKS,
-        identification.RESIDUAL,
-    ):
-        assert shares.get(series.colour, 0.0) > 2e-4, series.name
+    for shade in (runs.RECORD.colour, palette.parts(methods.look("model").colour)):
+        assert shares.get(shade, 0.0) > 2e-4
 
 
 @pytest.mark.viewer
