@@ -6,7 +6,7 @@
 //! - `gauge`: what shrinks within a trap
 //! - [`rest`]: equilibria, and sets of equilibria under friction
 //! - `uncaptured`: whether uncaptured trajectories are chaotic or unsettled; `membership`: the attractor of each
-//! - [`chaos`]: chaotic attractors, from long runs cut into windows ([`long_runs`]), which `groups` sorts; [`region`]:
+//! - [`chaos`]: chaotic attractors, from long runs divided into windows ([`long_runs`]), which `groups` sorts; [`region`]:
 //!   the part of the plane that one visits
 //! - [`attracting`]: attracting orbits from those of similar pendulums; `near_returns`, `short_cycles`: candidates for periodic orbits
 
