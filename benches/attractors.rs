@@ -30,8 +30,10 @@ fn search(criterion: &mut Criterion) {
         let (strobe, _) = choose(&pendulum, &starts, 1e-6, simd).expect("steps");
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
-                catalogue.search(&strobe, black_box(&starts), 1000, &AtomicBool::new(false));
+                let never = AtomicBool::new(false);
+                let mut catalogue =
+                    Catalogue::new(&strobe, Effort::THOROUGH, &never).expect("rests");
+                catalogue.search(&strobe, black_box(&starts), 1000, &never).expect("attractors");
                 assert_eq!(catalogue.attractors.len(), count, "attractors at {name}");
             });
         });

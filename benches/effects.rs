@@ -12,7 +12,7 @@
 use std::time::Instant;
 
 use pendmap::integrate::accuracy::choose;
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{State, States, Strobe};
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::effects::{Group, Mappable, Parameter};
@@ -32,18 +32,17 @@ const ROUNDS: usize = 20;
 /// The error for which steps are chosen.
 const TOL: f64 = 1e-6;
 
-fn columns() -> (Vec<f64>, Vec<f64>) {
+fn sampled() -> Vec<State> {
     let axis = |name, half: f64| Axis::new(name, -half, half, 100).expect("an axis");
     let plane = Starts::Grid { theta: axis("theta", 3.1), velocity: axis("velocity", 3.0) };
-    plane.sampled_states(COUNT, 1).into_iter().map(|s| (s[0], s[1])).unzip()
+    plane.sampled_states(COUNT, 1)
 }
 
 /// Nanoseconds of one period of one trajectory.
 fn time(strobe: &Strobe) -> f64 {
-    let (mut theta, mut velocity) = columns();
-    let mut turns = vec![0.0; COUNT];
+    let mut states = States::from(sampled().as_slice());
     let begin = Instant::now();
-    strobe.advance(&mut theta, &mut velocity, &mut turns, PERIODS).expect("equal lengths");
+    strobe.advance(&mut states, PERIODS);
     begin.elapsed().as_secs_f64() * 1e9 / (COUNT * PERIODS) as f64
 }
 
@@ -58,8 +57,7 @@ fn times(one: &Strobe, other: &Strobe) -> [f64; 2] {
 
 /// The map with the steps that it needs.
 fn chosen(pendulum: &Pendulum, simd: InstructionSet) -> Strobe {
-    let (theta, velocity) = columns();
-    let starts: Vec<State> = theta.into_iter().zip(velocity).map(|s| [s.0, s.1]).collect();
+    let starts = sampled();
     choose(pendulum, &starts[..400], TOL, simd).expect("steps").0
 }
 

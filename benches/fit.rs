@@ -66,14 +66,15 @@ fn windows(criterion: &mut Criterion) {
     let times: Vec<f64> = (0..SAMPLES).map(|k| k as f64 * INTERVAL).collect();
     for Case { name, pendulum, free } in cases() {
         let mut group = criterion.benchmark_group(name);
-        let ode = OdeProblem::new(&pendulum, true, TOLERANCE, |_, value| value).watched();
+        let ode = OdeProblem::new(&pendulum, true, TOLERANCE, |_, value| value).finding_turns();
         let motion = || sample(&ode, 0.0, black_box(START), &times, |_, _| true).states;
         let readings = motion().iter().map(|[theta, _]| *theta).collect();
         group.bench_function("motion alone", |bencher| bencher.iter(motion));
 
         let parameters = pendulum.parameters();
         let place = |slot, start| Free { places: vec![(0, slot)], start };
-        let own = free.iter().map(|k| place(Slot::Parameter(*k), parameters[*k].1));
+        let own = free.iter().map(|k| parameters[*k]);
+        let own = own.map(|one| place(Slot::Parameter(one), pendulum.value(one)));
         let free = std::iter::once(place(Slot::Gravity, 1.0)).chain(own).collect();
         let record = Record {
             pendulum,

@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::choose;
+use pendmap::integrate::{State, States, Strobe, TangentStates};
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::starts::{Axis, Starts};
 use pendmap::model::Pendulum;
@@ -30,8 +30,8 @@ fn strobe(pendulum: &Pendulum, tol: f64, simd: InstructionSet) -> Strobe {
     choose(pendulum, &plane().sampled_states(200, 0), tol, simd).expect("steps").0
 }
 
-fn columns() -> (Vec<f64>, Vec<f64>) {
-    plane().sampled_states(COUNT, 1).into_iter().map(|s| (s[0], s[1])).unzip()
+fn sampled() -> Vec<State> {
+    plane().sampled_states(COUNT, 1)
 }
 
 fn sets() -> impl Iterator<Item = InstructionSet> {
@@ -49,18 +49,8 @@ fn map(criterion: &mut Criterion) {
                 let id =
                     BenchmarkId::new(simd.name(), format!("{tol:e}, {} steps", strobe.steps()));
                 group.bench_function(id, |bencher| {
-                    let (mut theta, mut velocity) = columns();
-                    let mut turns = vec![0.0; COUNT];
-                    bencher.iter(|| {
-                        strobe
-                            .advance(
-                                black_box(&mut theta),
-                                black_box(&mut velocity),
-                                &mut turns,
-                                PERIODS,
-                            )
-                            .expect("equal lengths");
-                    });
+                    let mut states = States::from(sampled().as_slice());
+                    bencher.iter(|| strobe.advance(black_box(&mut states), PERIODS));
                 });
             }
         }
@@ -75,21 +65,8 @@ fn stretch(criterion: &mut Criterion) {
     for simd in sets() {
         let strobe = strobe(&pendulum, 1e-6, simd);
         group.bench_function(simd.name(), |bencher| {
-            let (mut theta, mut velocity) = columns();
-            let mut turns = vec![0.0; COUNT];
-            let mut tangents = (vec![FRAC_1_SQRT_2; COUNT], vec![FRAC_1_SQRT_2; COUNT]);
-            let mut growth = vec![0.0; COUNT];
-            bencher.iter(|| {
-                strobe
-                    .stretch(
-                        (black_box(&mut theta), black_box(&mut velocity)),
-                        &mut turns,
-                        (&mut tangents.0, &mut tangents.1),
-                        &mut growth,
-                        PERIODS,
-                    )
-                    .expect("equal lengths");
-            });
+            let mut all = TangentStates::along(&sampled(), [FRAC_1_SQRT_2; 2]);
+            bencher.iter(|| strobe.stretch(black_box(&mut all), PERIODS));
         });
     }
     group.finish();

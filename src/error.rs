@@ -1,11 +1,12 @@
 //! Errors of a request, with the values that were given.
 
-use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// An error: the value that was given, and the values that are allowed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A quantity is not finite, or outside its range.
+    #[error("{name} must be {allowed}, got {}", short(*value))]
     Range {
         /// The name of the quantity.
         name: &'static str,
@@ -15,6 +16,10 @@ pub enum Error {
         allowed: &'static str,
     },
     /// A parameter of an effect is not finite, or outside its range.
+    #[error(
+        "{effect}: {parameter} must be a finite number from {} to {}, got {}",
+        allowed[0], allowed[1], short(*value)
+    )]
     Parameter {
         /// The effect.
         effect: String,
@@ -26,16 +31,19 @@ pub enum Error {
         allowed: [f64; 2],
     },
     /// No effect of that name.
+    #[error("effect must be one of the library, got '{name}'")]
     Effect {
         /// The name given.
         name: String,
     },
     /// No parameter of that name.
+    #[error("parameter must be one of the model, got '{name}'")]
     NoParameter {
         /// The name given.
         name: String,
     },
     /// A formula that cannot be an effect.
+    #[error("formula '{name}': {why}")]
     Formula {
         /// Its name.
         name: String,
@@ -43,6 +51,7 @@ pub enum Error {
         why: String,
     },
     /// One effect given twice.
+    #[error("{name} and {other} are the same effect: one of them must be left out")]
     Twice {
         /// The name given.
         name: String,
@@ -50,6 +59,7 @@ pub enum Error {
         other: String,
     },
     /// A map cannot have the effect.
+    #[error("{effect} can be in one trajectory, not in maps: {why}")]
     NotMappable {
         /// The effect.
         effect: String,
@@ -57,11 +67,16 @@ pub enum Error {
         why: &'static str,
     },
     /// Hanging at rest is no solution whose stability the linear equation tells.
+    #[error("hanging at rest has no critical curves here: {why}")]
     NoRest {
         /// Why not.
         why: &'static str,
     },
     /// Arrays that belong together have different lengths.
+    #[error(
+        "{} and {} must be as many values, got {} and {}",
+        names.0, names.1, given.0, given.1
+    )]
     Lengths {
         /// The lengths given.
         given: (usize, usize),
@@ -69,6 +84,7 @@ pub enum Error {
         names: (&'static str, &'static str),
     },
     /// The wrong number of values for the parameters of an effect.
+    #[error("{effect} must have as many values as parameters, {}, got {}", given[0], given[1])]
     Values {
         /// The effect.
         effect: String,
@@ -76,11 +92,18 @@ pub enum Error {
         given: [usize; 2],
     },
     /// `PENDMAP_SIMD` names no instruction set of this processor.
+    #[error(
+        "PENDMAP_SIMD must be avx512, avx2, sse, neon or portable, as far as this processor has them, \
+         got '{name}'"
+    )]
     Simd {
         /// The name given.
         name: String,
     },
     /// No number of steps reaches the tolerance.
+    #[error(
+        "tol must be {reached:.1e} or more here, the smallest error that steps can reach, got {tol:e}"
+    )]
     Tolerance {
         /// The tolerance requested.
         tol: f64,
@@ -88,6 +111,7 @@ pub enum Error {
         reached: f64,
     },
     /// More memory than is free.
+    #[error("{}", of_memory(what, *count, *needed, *free))]
     Memory {
         /// The items of which there are too many.
         what: String,
@@ -99,16 +123,31 @@ pub enum Error {
         free: Option<f64>,
     },
     /// Bytes from a store that are damaged, or from another version.
+    #[error("{what} must be what this version has stored, got other bytes")]
     Stored {
         /// What they should be.
         what: &'static str,
     },
     /// Motions leave the range of numbers.
+    #[error(
+        "the motion leaves the range of numbers: it begins too fast, or a torque or effect of this model \
+         feeds it energy"
+    )]
     Diverges,
     /// The caller asked to stop.
+    #[error("interrupted")]
     Interrupted,
     /// A thread could not be made.
+    #[error("threads: {0}")]
     Threads(String),
+}
+
+/// Ends a computation that its caller has cancelled.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
+pub fn unless_cancelled(cancel: &AtomicBool) -> Result<(), Error> {
+    if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// A number without the zeros of its power of ten.
@@ -117,66 +156,10 @@ fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Range { name, value, allowed } => {
-                let value = short(*value);
-                write!(f, "{name} must be {allowed}, got {value}")
-            }
-            Self::Parameter { effect, parameter, value, allowed: [low, high] } => {
-                let value = short(*value);
-                let range = format!("a finite number from {low} to {high}");
-                write!(f, "{effect}: {parameter} must be {range}, got {value}")
-            }
-            Self::Effect { name } => {
-                write!(f, "effect must be one that pendmap effects lists, got '{name}'")
-            }
-            Self::NoParameter { name } => write!(f, "parameter must be one of the model, got '{name}'"),
-            Self::Formula { name, why } => write!(f, "formula '{name}': {why}"),
-            Self::Twice { name, other } => {
-                write!(f, "{name} and {other} are the same effect: one of them must be left out")
-            }
-            Self::NotMappable { effect, why } => {
-                write!(f, "{effect} can be in one trajectory, not in maps: {why}")
-            }
-            Self::NoRest { why } => write!(f, "hanging at rest has no critical curves here: {why}"),
-            Self::Lengths { given, names } => write!(
-                f,
-                "{} and {} must be as many values, got {} and {}",
-                names.0, names.1, given.0, given.1
-            ),
-            Self::Values { effect, given: [own, given] } => write!(
-                f,
-                "{effect} must have as many values as parameters, {own}, got {given}"
-            ),
-            Self::Simd { name } => write!(
-                f,
-                "PENDMAP_SIMD must be avx512, avx2, sse, neon or portable, as far as this processor \
-                 has them, got '{name}'"
-            ),
-            Self::Tolerance { tol, reached } => write!(
-                f,
-                "tol must be {reached:.1e} or more here, the smallest error that steps can reach, got {tol:e}"
-            ),
-            Self::Memory { what, count, needed, free } => {
-                write!(f, "{count} {what} need about {:.3} GB, ", needed / 1e9)?;
-                match free {
-                    Some(free) => write!(f, "{:.3} GB are free: they must be fewer", free / 1e9),
-                    None => f.write_str("more than is free: they must be fewer"),
-                }
-            }
-            Self::Stored { what } => {
-                write!(f, "{what} must be what this version has stored, got other bytes")
-            }
-            Self::Diverges => f.write_str(
-                "the motion leaves the range of numbers: it begins too fast, or a torque or effect of \
-                 this model feeds it energy",
-            ),
-            Self::Interrupted => f.write_str("interrupted"),
-            Self::Threads(why) => write!(f, "threads: {why}"),
-        }
-    }
+fn of_memory(what: &str, count: usize, needed: f64, free: Option<f64>) -> String {
+    let free = free.map_or_else(
+        || "more than is free".to_owned(),
+        |free| format!("{:.3} GB are free", free / 1e9),
+    );
+    format!("{count} {what} need about {:.3} GB, {free}: they must be fewer", needed / 1e9)
 }
-
-impl std::error::Error for Error {}

@@ -39,7 +39,7 @@ pub fn room<T>(what: &str, list: &mut Vec<T>, more: usize) -> Result<(), Error> 
 }
 
 /// Bytes that this process may still allocate, if Linux reports it: limited by the machine, its
-/// container, and the process (`ulimit -v`).
+/// container, and the process (`ulimit -v`). Where a file cannot be read there is no such limit.
 fn free() -> Option<f64> {
     let machine = field("/proc/meminfo", "MemAvailable:").map(|kilobytes| 1024.0 * kilobytes);
     let container = number("/sys/fs/cgroup/memory.max");

@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::find::{Catalogue, REACH, SAME};
+use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
@@ -43,25 +44,28 @@ fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
 impl Catalogue {
     /// The attracting orbits that [`attracting`] finds; returns the first point of those from which it finds
     /// none.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn take_over(
         &mut self,
         strobe: &Strobe,
         orbits: &[Alike],
         cancel: &AtomicBool,
-    ) -> Vec<State> {
+    ) -> Result<Vec<State>, Error> {
         let map = self.effort.map(strobe);
         let mut left = Vec::new();
         for ((points, _), orbit) in orbits.iter().zip(attracting(strobe, &map, orbits)) {
             match orbit {
                 Some(orbit) if self.knows(&orbit) => {}
                 Some(orbit) => {
-                    self.admit(strobe, &map, orbit, cancel);
+                    self.admit(strobe, &map, orbit, cancel)?;
                 }
                 None => left.push(points[0]),
             }
         }
         self.rebuild(&strobe.pendulum);
-        left
+        Ok(left)
     }
 
     /// The orbit of `map` that an orbit of the integration steps is near, if both attract and it is not yet

@@ -2,10 +2,12 @@
 //! start at a period's end.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::f64::consts::{FRAC_1_PI, TAU};
+use std::sync::atomic::AtomicBool;
 
+use super::capture_test::{CaptureHistory, CaptureTest, fate_at_bound};
 use super::trap::{Band, Ellipse};
+use crate::error::{Error, unless_cancelled};
 use crate::integrate::kernel::block::Block;
 use crate::integrate::{State, Strobe};
 use crate::lanes::{Isa, Job, Lane, dispatch};
@@ -38,15 +40,6 @@ impl Rests {
         self.sets.get(&self.angle.half_turn(theta)).copied()
     }
 }
-
-/// At the edge of a set at rest a pendulum creeps into it, ever more slowly, and never arrives: if
-/// it is held in two successive periods, nearer in the second, and within this part of the friction
-/// of permanent sticking, it is at rest. Held states form a line, on which their map is monotone.
-const CREEPING: f64 = 0.05;
-/// A heavily damped pendulum without drive approaches the edge of a set at rest for ever: slower than this, and this
-/// near to angles that friction holds, it is at rest.
-const SLOW: f64 = 1e-7;
-const AHEAD: f64 = 1e-4;
 
 /// How a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,26 +85,31 @@ pub trait Source {
     fn done(&mut self, index: usize, outcome: Outcome);
 }
 
-/// Runs all starts of `source` for at most `bound` periods; `cancel` ends it early.
+/// Runs all starts of `source` for at most `bound` periods.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn run(
     strobe: &Strobe,
     traps: &Traps,
     bound: u32,
     cancel: &AtomicBool,
     source: &mut dyn Source,
-) {
-    Watch::new(Capture { strobe, traps, bound, cancel, source }).run();
+) -> Result<(), Error> {
+    CaptureRun::new(CaptureJob { strobe, traps, bound, cancel, source }).run()
 }
 
-/// All outcomes of `starts`, in their order; `None` if `cancel` was set.
-#[must_use]
+/// All outcomes of `starts`, in their order.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn outcomes(
     strobe: &Strobe,
     traps: &Traps,
     bound: u32,
     starts: &[State],
     cancel: &AtomicBool,
-) -> Option<Vec<Outcome>> {
+) -> Result<Vec<Outcome>, Error> {
     struct Slice<'a>(std::iter::Enumerate<std::slice::Iter<'a, State>>, Vec<Option<Outcome>>);
     impl Source for Slice<'_> {
         fn count(&self) -> usize {
@@ -125,11 +123,11 @@ pub fn outcomes(
         }
     }
     let mut slice = Slice(starts.iter().enumerate(), vec![None; starts.len()]);
-    run(strobe, traps, bound, cancel, &mut slice);
-    slice.1.into_iter().collect()
+    run(strobe, traps, bound, cancel, &mut slice)?;
+    Ok(slice.1.into_iter().flatten().collect())
 }
 
-struct Capture<'a> {
+struct CaptureJob<'a> {
     strobe: &'a Strobe,
     traps: &'a Traps,
     bound: u32,
@@ -137,160 +135,42 @@ struct Capture<'a> {
     source: &'a mut dyn Source,
 }
 
-/// A hit: which attractor and point, when, and where the trajectory was.
-#[derive(Clone, Copy)]
-pub(super) struct Hit {
-    pub(super) attractor: usize,
-    point: usize,
-    pub(super) clock: u64,
-    turns: f64,
-    theta: f64,
-    velocity: f64,
-}
-
-/// What the traps have seen of the trajectory in a lane.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Sight {
-    hit: Option<Hit>,
-    /// When friction last held it, and by how much the maximum load exceeds the friction.
-    held: Option<(u64, f64)>,
-}
-
-/// The traps that watch the lanes of a block, period by period.
-pub(super) struct Guard<'a> {
-    strobe: &'a Strobe,
-    traps: &'a Traps,
-    /// Ellipses in the coordinates of a lane: half turns and kick.
-    scaled: Vec<Ellipse>,
-}
-
-impl<'a> Guard<'a> {
-    pub(super) fn new(strobe: &'a Strobe, traps: &'a Traps) -> Self {
-        let scale = strobe.schedule.kick;
-        let scaled = traps
-            .ellipses
-            .iter()
-            .map(|e| Ellipse {
-                centre: [e.centre[0] * FRAC_1_PI, e.centre[1] * scale],
-                shape: [e.shape[0] * PI, e.shape[1] / scale, e.shape[2] / scale],
-                ..*e
-            })
-            .collect();
-        Self { strobe, traps, scaled }
-    }
-
-    /// The trap that holds `lane`, as attractor, point and length of its cycle.
-    fn trap(&self, block: &Block, lane: usize) -> Option<(usize, usize, usize)> {
-        let state = [block.half_turns[lane], block.kick[lane]];
-        if let Some(e) = self.scaled.iter().find(|e| e.height(state) < 1.0) {
-            return Some((e.attractor, e.point, e.cycle));
-        }
-        let state = self.state(block, lane);
-        self.traps.bands.iter().find(|b| b.contains(state)).map(|b| (b.attractor, 0, 1))
-    }
-
-    /// The first of two hits of `lane` on the same attractor, one point on, in successive periods, of
-    /// which the second ends at `clock`.
-    pub(super) fn captured(
-        &self,
-        block: &Block,
-        lane: usize,
-        clock: u64,
-        sight: &mut Sight,
-    ) -> Option<Hit> {
-        let (attractor, point, cycle) = self.trap(block, lane)?;
-        let next = |hit: &Hit| {
-            let consecutive = hit.clock + 1 == clock && hit.attractor == attractor;
-            consecutive && point == (hit.point + 1) % cycle
-        };
-        if let Some(hit) = sight.hit.filter(next) {
-            return Some(hit);
-        }
-        let [theta, velocity] = self.state(block, lane);
-        let turns = block.turns[lane];
-        sight.hit = Some(Hit { attractor, point, clock, turns, theta, velocity });
-        None
-    }
-
-    /// The set at rest in which friction holds `lane` for ever, or into which it creeps.
-    pub(super) fn at_rest(
-        &self,
-        block: &Block,
-        lane: usize,
-        clock: u64,
-        sight: &mut Sight,
-    ) -> Option<usize> {
-        let theta = block.held_at[lane] * PI;
-        let rest = self.traps.rests.of(theta)?;
-        let equation = &self.strobe.equation;
-        let excess = equation.excess(theta);
-        let limit = equation.hold(theta);
-        let creeps = sight.held.is_some_and(|(before, more)| {
-            before + 1 == clock && excess < more && excess < CREEPING * limit
-        });
-        sight.held = Some((clock, excess));
-        (equation.holds_for_ever(theta) || creeps).then_some(rest)
-    }
-
-    /// The set at rest whose edge a pendulum without drive approaches. It cannot pass through the set: the friction
-    /// would stop it within a hundredth of the angles that are looked at.
-    fn approached(&self, [theta, velocity]: State) -> Option<usize> {
-        let equation = &self.strobe.equation;
-        if !self.strobe.friction || !equation.is_autonomous() || velocity.abs() > SLOW {
-            return None;
-        }
-        let ahead = |distance: f64| theta + distance.copysign(velocity);
-        let held = [AHEAD, 3.0 * AHEAD].iter().all(|d| equation.holds_for_ever(ahead(*d)));
-        if held { self.traps.rests.of(ahead(AHEAD)) } else { None }
-    }
-
-    pub(super) fn state(&self, block: &Block, lane: usize) -> State {
-        [block.half_turns[lane] * PI, block.kick[lane] / self.strobe.schedule.kick]
-    }
-}
-
-/// [`Fate::Open`], or [`Fate::Failed`] of a state outside the range of numbers.
-pub(super) fn fate_at_bound([theta, velocity]: State) -> Fate {
-    let finite = theta.is_finite() && velocity.is_finite() && velocity.abs() < 1e6;
-    if finite { Fate::Open } else { Fate::Failed }
-}
-
 /// The trajectory in one lane.
 #[derive(Clone, Copy)]
-struct Tenant {
+struct LaneTrajectory {
     index: usize,
     first_theta: f64,
-    born: u64,
-    sight: Sight,
+    begin: u64,
+    history: CaptureHistory,
 }
 
 /// A block whose lanes take a new start when one has ended.
-struct Watch<'a> {
-    job: Capture<'a>,
-    guard: Guard<'a>,
+struct CaptureRun<'a> {
+    job: CaptureJob<'a>,
+    test: CaptureTest<'a>,
     block: Block,
     height: Vec<f64>,
-    tenants: Vec<Option<Tenant>>,
+    trajectories: Vec<Option<LaneTrajectory>>,
     clock: u64,
     next_expiry: u64,
 }
 
-impl<'a> Watch<'a> {
-    fn new(job: Capture<'a>) -> Self {
+impl<'a> CaptureRun<'a> {
+    fn new(job: CaptureJob<'a>) -> Self {
         let width = job.strobe.block_width(job.source.count());
         Self {
-            guard: Guard::new(job.strobe, job.traps),
+            test: CaptureTest::new(job.strobe, job.traps),
             job,
             block: Block::new(width),
             height: vec![f64::INFINITY; width],
-            tenants: vec![None; width],
+            trajectories: vec![None; width],
             clock: 0,
             next_expiry: u64::MAX,
         }
     }
 
-    fn run(mut self) {
-        let width = self.tenants.len();
+    fn run(mut self) -> Result<(), Error> {
+        let width = self.trajectories.len();
         let mut occupied = 0;
         for lane in 0..width {
             occupied += usize::from(self.refill(lane));
@@ -300,7 +180,7 @@ impl<'a> Watch<'a> {
             let heights = Heights {
                 angle: self.job.strobe.angle,
                 block: &mut self.block,
-                ellipses: &self.guard.scaled,
+                ellipses: &self.test.scaled,
                 height: &mut self.height,
             };
             let low = dispatch::run(self.job.strobe.simd, heights);
@@ -323,17 +203,16 @@ impl<'a> Watch<'a> {
             if self.clock >= self.next_expiry {
                 occupied -= self.expire(width);
             }
-            if self.job.cancel.load(Ordering::Relaxed) {
-                return;
-            }
+            unless_cancelled(self.job.cancel)?;
         }
+        Ok(())
     }
 
     /// Puts the next start into `lane`; false if there is none.
     #[inline(never)]
     fn refill(&mut self, lane: usize) -> bool {
         let Some((index, [theta, velocity])) = self.job.source.next() else {
-            self.tenants[lane] = None;
+            self.trajectories[lane] = None;
             self.block.idle[lane] = true;
             (self.block.half_turns[lane], self.block.kick[lane]) = (0.0, 0.0);
             return false;
@@ -341,8 +220,12 @@ impl<'a> Watch<'a> {
         self.block.half_turns[lane] = theta * FRAC_1_PI;
         self.block.kick[lane] = velocity * self.job.strobe.schedule.kick;
         self.block.turns[lane] = 0.0;
-        self.tenants[lane] =
-            Some(Tenant { index, first_theta: theta, born: self.clock, sight: Sight::default() });
+        self.trajectories[lane] = Some(LaneTrajectory {
+            index,
+            first_theta: theta,
+            begin: self.clock,
+            history: CaptureHistory::default(),
+        });
         self.next_expiry = self.next_expiry.min(self.clock + u64::from(self.job.bound));
         true
     }
@@ -350,11 +233,11 @@ impl<'a> Watch<'a> {
     /// Whether a trap has captured `lane`; if so its outcome has been delivered.
     #[inline(never)]
     fn captured(&mut self, lane: usize) -> bool {
-        let Some(tenant) = &mut self.tenants[lane] else { return false };
-        let hit = self.guard.captured(&self.block, lane, self.clock, &mut tenant.sight);
-        let (Some(hit), tenant) = (hit, *tenant) else { return false };
+        let Some(trajectory) = &mut self.trajectories[lane] else { return false };
+        let hit = self.test.captured(&self.block, lane, self.clock, &mut trajectory.history);
+        let (Some(hit), trajectory) = (hit, *trajectory) else { return false };
         let end = ([hit.theta, hit.velocity], hit.turns, hit.clock);
-        self.hand_over(tenant, Fate::Captured(hit.attractor), end);
+        self.deliver(trajectory, Fate::Captured(hit.attractor), end);
         true
     }
 
@@ -362,29 +245,29 @@ impl<'a> Watch<'a> {
     /// been delivered.
     #[inline(never)]
     fn at_rest(&mut self, lane: usize) -> bool {
-        let Some(tenant) = &mut self.tenants[lane] else { return false };
-        let rest = self.guard.at_rest(&self.block, lane, self.clock, &mut tenant.sight);
-        let (Some(rest), tenant) = (rest, *tenant) else { return false };
-        self.hand_over(tenant, Fate::Captured(rest), self.end(lane));
+        let Some(trajectory) = &mut self.trajectories[lane] else { return false };
+        let rest = self.test.at_rest(&self.block, lane, self.clock, &mut trajectory.history);
+        let (Some(rest), trajectory) = (rest, *trajectory) else { return false };
+        self.deliver(trajectory, Fate::Captured(rest), self.end(lane));
         true
     }
 
     /// State, turns and time of `lane` now.
     fn end(&self, lane: usize) -> (State, f64, u64) {
-        (self.guard.state(&self.block, lane), self.block.turns[lane], self.clock)
+        (self.test.state(&self.block, lane), self.block.turns[lane], self.clock)
     }
 
-    fn hand_over(&mut self, tenant: Tenant, fate: Fate, end: (State, f64, u64)) {
+    fn deliver(&mut self, trajectory: LaneTrajectory, fate: Fate, end: (State, f64, u64)) {
         let ([theta, velocity], turns, clock) = end;
-        let whole = turns + (theta - tenant.first_theta) / TAU;
+        let whole = turns + (theta - trajectory.first_theta) / TAU;
         let outcome = Outcome {
             fate,
-            periods: (clock - tenant.born) as u32,
+            periods: (clock - trajectory.begin) as u32,
             turns: whole.round() as i64,
             state: [theta, velocity],
-            work: (self.clock - tenant.born) as u32,
+            work: (self.clock - trajectory.begin) as u32,
         };
-        self.job.source.done(tenant.index, outcome);
+        self.job.source.done(trajectory.index, outcome);
     }
 
     /// Ends the lanes that have reached their bound; returns the number of lanes that stay empty.
@@ -394,15 +277,15 @@ impl<'a> Watch<'a> {
         self.next_expiry = u64::MAX;
         let mut emptied = 0;
         for lane in 0..width {
-            let Some(tenant) = self.tenants[lane] else { continue };
-            let expiry = tenant.born + bound;
+            let Some(trajectory) = self.trajectories[lane] else { continue };
+            let expiry = trajectory.begin + bound;
             if expiry > self.clock {
                 self.next_expiry = self.next_expiry.min(expiry);
                 continue;
             }
             let end = self.end(lane);
-            let rest = self.guard.approached(end.0).map(Fate::Captured);
-            self.hand_over(tenant, rest.unwrap_or_else(|| fate_at_bound(end.0)), end);
+            let rest = self.test.approached(end.0).map(Fate::Captured);
+            self.deliver(trajectory, rest.unwrap_or_else(|| fate_at_bound(end.0)), end);
             emptied += usize::from(!self.refill(lane));
         }
         emptied

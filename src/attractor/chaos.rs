@@ -1,10 +1,10 @@
 //! Invariant sets that are not periodic: chaotic attractors and quasi-periodic rotation,
 //! distinguished from transients that have not ended yet.
 //!
-//! Each long run is cut into windows, and these form groups; see `groups.rs`. Groups between which
+//! Each long run is divided into windows, and these form groups; see `groups.rs`. Groups between which
 //! trajectories move, without leaving them, are one set.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
@@ -12,12 +12,12 @@ use super::capture::{Fate, Traps};
 use super::effort::Effort;
 use super::groups::Groups;
 use super::kind::Kind;
-use super::long_runs::{Cut, Run, Senses, Window, long_runs};
+use super::long_runs::{Run, Senses, Window, WindowPlan, long_runs};
 use super::region::Region;
 use super::rest::standing;
 use super::trap::Band;
-use crate::integrate::Strobe;
-use crate::integrate::kernel::stroboscopic::State;
+use crate::error::{Error, unless_cancelled};
+use crate::integrate::{State, Strobe, TangentStates};
 use crate::model::Angle;
 use crate::orbit::PoincareMap;
 
@@ -86,8 +86,10 @@ impl ChaoticSet {
     }
 }
 
-/// Observes trajectories from `states` for `periods`, as [`sets`] needs it; `None` if `cancel` was set.
-#[must_use]
+/// Observes trajectories from `states` for `periods`, as [`sets`] needs it.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn observed(
     strobe: &Strobe,
     traps: &Traps,
@@ -95,19 +97,21 @@ pub fn observed(
     periods: u32,
     effort: &Effort,
     cancel: &AtomicBool,
-) -> Option<Vec<Run>> {
-    long_runs(strobe, traps, states, cut(periods, effort), cancel)
+) -> Result<Vec<Run>, Error> {
+    long_runs(strobe, traps, states, window_plan(periods, effort), cancel)
 }
 
-fn cut(periods: u32, effort: &Effort) -> Cut {
+fn window_plan(periods: u32, effort: &Effort) -> WindowPlan {
     let length = (periods as usize / WINDOWS).max(1);
-    Cut { windows: WINDOWS, length, side: effort.cells }
+    WindowPlan { windows: WINDOWS, length, side: effort.cells }
 }
 
 /// Sorts trajectories that have been [`observed`] for `periods` into the sets that none of them leaves.
 ///
-/// Chaos of the kind and sense of one `known` has its exponent. Returns no set if `cancel` was set.
-#[must_use]
+/// Chaos of the kind and sense of one `known` has its exponent.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn sets(
     strobe: &Strobe,
     traps: &Traps,
@@ -116,19 +120,19 @@ pub fn sets(
     periods: u32,
     effort: &Effort,
     cancel: &AtomicBool,
-) -> Vec<ChaoticSet> {
-    let cut = cut(periods, effort);
+) -> Result<Vec<ChaoticSet>, Error> {
+    let plan = window_plan(periods, effort);
     let mut runs = Runs {
         strobe,
         traps,
         known,
-        cut,
+        plan,
         effort,
         cancel,
         windows: Vec::new(),
         captured: Vec::new(),
     };
-    runs.sets(observed).unwrap_or_default()
+    runs.sets(observed)
 }
 
 /// Trajectories observed window by window.
@@ -136,7 +140,7 @@ struct Runs<'a> {
     strobe: &'a Strobe,
     traps: &'a Traps,
     known: &'a [KnownChaos],
-    cut: Cut,
+    plan: WindowPlan,
     effort: &'a Effort,
     cancel: &'a AtomicBool,
     /// The windows of each before its capture.
@@ -150,8 +154,8 @@ impl Runs<'_> {
     ///
     /// A run whose last group no window follows goes on for a window. A set of fewer than
     /// [`Effort::proved`] runs gets that many more from its own points. Sets that this does not settle within
-    /// [`ROUNDS`] are left out. `None` if the search was cancelled.
-    fn sets(&mut self, observed: Vec<Run>) -> Option<Vec<ChaoticSet>> {
+    /// [`ROUNDS`] are left out.
+    fn sets(&mut self, observed: Vec<Run>) -> Result<Vec<ChaoticSet>, Error> {
         self.add(observed);
         let mut groups = Groups::new(&self.windows, &self.captured);
         for _ in 0..ROUNDS {
@@ -164,18 +168,18 @@ impl Runs<'_> {
                 break;
             }
             self.go_on(&unknown)?;
-            let further = long_runs(self.strobe, self.traps, &few, self.cut, self.cancel)?;
+            let further = long_runs(self.strobe, self.traps, &few, self.plan, self.cancel)?;
             self.add(further);
             groups = Groups::new(&self.windows, &self.captured);
         }
         let mut found = Vec::new();
         for class in groups.classes() {
             let windows = groups.windows(&self.windows, &class);
-            let set = self.describe(&windows);
+            let set = self.describe(&windows)?;
             let proved = groups.members(&class) >= self.effort.proved;
             found.extend(set.filter(|set| proved || set.band.is_some()));
         }
-        (!self.cancel.load(Ordering::Relaxed)).then_some(found)
+        Ok(found)
     }
 
     /// Adds runs; one that repeats itself, as from a start exactly on an orbit that does not attract, shows no
@@ -191,18 +195,18 @@ impl Runs<'_> {
     }
 
     /// Observes these runs for another window.
-    fn go_on(&mut self, runs: &[usize]) -> Option<()> {
+    fn go_on(&mut self, runs: &[usize]) -> Result<(), Error> {
         let last = |run: &usize| self.windows[*run].last()?.points.last().copied();
         let ends: Vec<State> = runs.iter().filter_map(last).collect();
-        let cut = Cut { windows: 1, ..self.cut };
-        let further = long_runs(self.strobe, self.traps, &ends, cut, self.cancel)?;
+        let plan = WindowPlan { windows: 1, ..self.plan };
+        let further = long_runs(self.strobe, self.traps, &ends, plan, self.cancel)?;
         for (run, Run { windows, fate, .. }) in runs.iter().zip(further) {
             self.captured[*run] = fate != Fate::Open;
             if fate == Fate::Open {
                 self.windows[*run].extend(windows);
             }
         }
-        Some(())
+        Ok(())
     }
 
     fn points_of_small_classes(&self, groups: &Groups) -> Vec<State> {
@@ -230,11 +234,11 @@ fn closes(angle: Angle, windows: &[Window], longest: usize) -> bool {
 
 impl Runs<'_> {
     /// The attractor of a set of windows; `None` if it is neither chaotic nor quasi-periodic.
-    fn describe(&self, windows: &[&Window]) -> Option<ChaoticSet> {
+    fn describe(&self, windows: &[&Window]) -> Result<Option<ChaoticSet>, Error> {
         let Self { strobe, effort, .. } = self;
         if strobe.pendulum.is_autonomous() {
             // A flow in the plane has no chaos: the remaining trajectories have not settled yet.
-            return None;
+            return Ok(None);
         }
         let mut region = Region::new(effort.cells, &strobe.pendulum);
         for window in windows {
@@ -249,12 +253,12 @@ impl Runs<'_> {
             windows.iter().fold(Senses::default(), |all, window| all.with(window.senses)).kind();
         let known = self.known.iter().find(|known| (known.kind, known.sense) == (kind, sense));
         if let Some(known) = known {
-            return found(kind, sense, known.exponent, None);
+            return Ok(found(kind, sense, known.exponent, None));
         }
-        let length = self.cut.length;
+        let length = self.plan.length;
         let measured = |count: usize| {
             let all = exponents(strobe, &spread(&every, count), length, self.cancel)?;
-            Some(mean_and_error(&all))
+            Ok::<_, Error>(mean_and_error(&all))
         };
         let (mut mean, mut stderr) = measured(effort.exponents)?;
         if mean > LEAST_EXPONENT && mean < SIGNIFICANCE * stderr {
@@ -267,15 +271,16 @@ impl Runs<'_> {
                 windows.iter().take(CURVES).flat_map(|m| m.points.iter().copied()).collect();
             let mut apart = standing(strobe, &PoincareMap::of_steps(strobe));
             apart.extend(self.traps.ellipses.iter().map(|trap| trap.centre));
-            let band = Band::around(strobe, &curve, 0, &apart)?;
+            let Some(band) = Band::around(strobe, &curve, 0, &apart) else { return Ok(None) };
             let sense = windows[0].turns.signum() as i64;
             let stderr = stderr / strobe.pendulum.period();
-            return found(Kind::QuasiperiodicRotation, sense, [0.0, stderr], Some(band));
+            return Ok(found(Kind::QuasiperiodicRotation, sense, [0.0, stderr], Some(band)));
         }
         if mean < LEAST_EXPONENT.max(SIGNIFICANCE * stderr) {
-            return None;
+            return Ok(None);
         }
-        found(kind, sense, [mean, stderr].map(|x| x / strobe.pendulum.period()), None)
+        let per_time = [mean, stderr].map(|x| x / strobe.pendulum.period());
+        Ok(found(kind, sense, per_time, None))
     }
 }
 
@@ -288,36 +293,21 @@ pub(crate) fn spread(points: &[State], most: usize) -> Vec<State> {
 /// The growth of a tangent along each trajectory, per period, over `periods` after as many others: by then it
 /// has turned into the direction of growth, and the shear of regular motion, which grows it in
 /// proportion to time, adds no more than ln 2.
-///
-/// `None` if `cancel` was set.
 fn exponents(
     strobe: &Strobe,
     states: &[State],
     periods: usize,
     cancel: &AtomicBool,
-) -> Option<Vec<f64>> {
-    let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
-    let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();
-    let count = states.len();
-    let (mut turns, mut growth) = (vec![0.0; count], vec![0.0; count]);
-    let mut tangents = (vec![1.0; count], vec![0.0; count]);
+) -> Result<Vec<f64>, Error> {
+    let mut all = TangentStates::along(states, [1.0, 0.0]);
     for period in 0..2 * periods {
-        if cancel.load(Ordering::Relaxed) {
-            return None;
-        }
+        unless_cancelled(cancel)?;
         if period == periods {
-            growth.fill(0.0);
+            all.reset_growth();
         }
-        // Lengths agree, so this cannot fail.
-        let _ = strobe.stretch(
-            (&mut theta, &mut velocity),
-            &mut turns,
-            (&mut tangents.0, &mut tangents.1),
-            &mut growth,
-            1,
-        );
+        strobe.stretch(&mut all, 1);
     }
-    Some(growth.iter().map(|g| g / periods.max(1) as f64).collect())
+    Ok(all.growth().iter().map(|g| g / periods.max(1) as f64).collect())
 }
 
 /// Mean and standard error of independent values.

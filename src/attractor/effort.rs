@@ -19,11 +19,11 @@ pub struct Effort {
     /// Failures of Newton's method after which a round ends.
     pub tries: usize,
     /// Number of uncaptured trajectories that are observed.
-    pub watched: usize,
+    pub observed: usize,
     /// Number of uncaptured trajectories that are observed while no attractor is known.
-    pub watched_alone: usize,
+    pub observed_alone: usize,
     /// Uncaptured trajectories are observed for this multiple of the first bound.
-    pub watch: u32,
+    pub observation: u32,
     /// Runs that a chaotic set requires; if fewer have reached it, more runs from its points must
     /// stay.
     pub proved: usize,
@@ -70,9 +70,9 @@ impl Effort {
         longest_cycle: 32,
         first_round: 32,
         tries: 24,
-        watched: 256,
-        watched_alone: 256,
-        watch: 4,
+        observed: 256,
+        observed_alone: 256,
+        observation: 4,
         proved: 16,
         exponents: 256,
         cells: 96,
@@ -83,7 +83,7 @@ impl Effort {
     /// and chaos that nothing could end is confirmed by fewer runs.
     pub const CONTINUED: Self = Self {
         first_round: 1024,
-        watched_alone: 16,
+        observed_alone: 16,
         exponents: 16,
         trap: Sampling { levels: 14, rounds: 4, ..Self::THOROUGH.trap },
         ..Self::THOROUGH
@@ -94,9 +94,9 @@ impl Effort {
         longest_cycle: 32,
         first_round: 24,
         tries: 6,
-        watched: 24,
-        watched_alone: 24,
-        watch: 4,
+        observed: 24,
+        observed_alone: 24,
+        observation: 4,
         proved: 16,
         exponents: 16,
         cells: 24,

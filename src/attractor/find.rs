@@ -1,7 +1,7 @@
 //! The search for attractors: from a set of starts to a catalogue with traps.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +13,7 @@ use super::effort::Effort;
 use super::near_returns::{escape_speed, near_returns};
 use super::rest;
 use super::trap::{self, Band, Ellipse, ellipses};
+use crate::error::{Error, unless_cancelled};
 use crate::integrate::{State, Strobe};
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
@@ -75,8 +76,10 @@ pub struct Catalogue {
 impl Catalogue {
     /// The attractors known without a search: rests, or the oscillations that a drive makes of them, and the
     /// running states of an undriven pendulum.
-    #[must_use]
-    pub fn new(strobe: &Strobe, effort: Effort) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn new(strobe: &Strobe, effort: Effort, cancel: &AtomicBool) -> Result<Self, Error> {
         let map = effort.map(strobe);
         let standing = rest::standing(strobe, &map);
         let band = |r: Rotation| {
@@ -102,9 +105,9 @@ impl Catalogue {
         empty.rebuild(&strobe.pendulum);
         if strobe.pendulum.is_dissipative() {
             let rests = rest::balances(&strobe.pendulum).map(|theta| (vec![[theta, 0.0]], 1));
-            empty.take_over(strobe, &rests, &AtomicBool::new(false));
+            empty.take_over(strobe, &rests, cancel)?;
         }
-        empty
+        Ok(empty)
     }
 
     /// Takes over what an earlier search of the same pendulum has shown of its chaos: exponents, and that there
@@ -130,72 +133,88 @@ impl Catalogue {
 
     /// The catalogue of a similar pendulum: the orbits that Newton's method from those of this one finds and
     /// that attract, and its quasi-periodic rotations, followed for three times `bound`; without its chaos.
-    #[must_use]
-    pub fn continued(&self, strobe: &Strobe, bound: u32, cancel: &AtomicBool) -> Self {
-        let mut next = Self::new(strobe, Effort::CONTINUED);
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn continued(
+        &self,
+        strobe: &Strobe,
+        bound: u32,
+        cancel: &AtomicBool,
+    ) -> Result<Self, Error> {
+        let mut next = Self::new(strobe, Effort::CONTINUED, cancel)?;
         let orbits: Vec<Alike> =
             self.orbits.iter().map(|(orbit, _)| (vec![orbit.points[0]], orbit.n)).collect();
-        next.take_over(strobe, &orbits, cancel);
-        next.take_over_curves(strobe, &self.sets, bound, cancel);
+        next.take_over(strobe, &orbits, cancel)?;
+        next.take_over_curves(strobe, &self.sets, bound, cancel)?;
         if next.attractors.is_empty() {
             // Beside chaos with small basins Newton's method finds more orbits than the starts reach.
             next.effort.first_round = Effort::THOROUGH.first_round;
         }
-        next
+        Ok(next)
     }
 
     /// Searches from `starts`; see [`Catalogue::endings`]. Returns whether anything new was found.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn search(
         &mut self,
         strobe: &Strobe,
         starts: &[State],
         bound: u32,
         cancel: &AtomicBool,
-    ) -> bool {
+    ) -> Result<bool, Error> {
         let known = self.attractors.len();
-        self.endings(strobe, starts, bound, cancel);
-        self.attractors.len() > known
+        self.endings(strobe, starts, bound, cancel)?;
+        Ok(self.attractors.len() > known)
     }
 
     /// Searches from `starts`: every trajectory runs until a known attractor captures it, it is
     /// found to close on a new one, or `bound` periods are over.
     ///
-    /// The remaining trajectories are observed for a multiple of `bound` ([`Effort::watch`]). If
+    /// The remaining trajectories are observed for a multiple of `bound` ([`Effort::observation`]). If
     /// none of a set of them has been captured by then and their exponent is positive, the set is a
     /// chaotic attractor; else they stay undecided. Returns how each start ended.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn endings(
         &mut self,
         strobe: &Strobe,
         starts: &[State],
         bound: u32,
         cancel: &AtomicBool,
-    ) -> Vec<Ending> {
+    ) -> Result<Vec<Ending>, Error> {
         let mut endings: Vec<Ending> = starts.iter().map(|s| Ending::Open(*s)).collect();
-        self.settle(strobe, &mut endings, bound, cancel);
-        self.watch(strobe, &mut endings, bound, cancel);
-        endings
+        self.settle(strobe, &mut endings, bound, cancel)?;
+        self.observe(strobe, &mut endings, bound, cancel)?;
+        Ok(endings)
     }
 
-    /// The first part of [`Catalogue::endings`]: the open ones run for `bound` periods; [`Catalogue::watch`] is
+    /// The first part of [`Catalogue::endings`]: the open ones run for `bound` periods; [`Catalogue::observe`] is
     /// the second.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn settle(
         &mut self,
         strobe: &Strobe,
         endings: &mut [Ending],
         bound: u32,
         cancel: &AtomicBool,
-    ) {
+    ) -> Result<(), Error> {
         let is_open = |e: &Ending| matches!(e, Ending::Open(_));
         let mut alive = endings.iter().any(is_open);
         if !strobe.pendulum.is_dissipative() {
-            return;
+            return Ok(());
         }
         let map = self.effort.map(strobe);
         let fastest = escape_speed(&strobe.pendulum);
         let (mut elapsed, mut round) = (0, self.effort.first_round);
-        while elapsed < bound && alive && !cancel.load(Ordering::Relaxed) {
+        while elapsed < bound && alive {
             let length = round.min(bound - elapsed);
-            self.run(strobe, endings, length, elapsed, bound, cancel);
+            self.run(strobe, endings, length, elapsed, bound, cancel)?;
             for ending in endings.iter_mut() {
                 if matches!(ending, Ending::Open(state) if state[1].abs() > fastest) {
                     *ending = Ending::Failed;
@@ -204,12 +223,13 @@ impl Catalogue {
             elapsed += length;
             round *= 2;
             let free = open(endings);
-            if self.find_cycles(strobe, &map, &free, cancel) {
+            if self.find_cycles(strobe, &map, &free, cancel)? {
                 // Trajectories within the new traps are captured at once.
-                self.run(strobe, endings, self.effort.first_round, elapsed, bound, cancel);
+                self.run(strobe, endings, self.effort.first_round, elapsed, bound, cancel)?;
             }
             alive = endings.iter().any(is_open);
         }
+        Ok(())
     }
 
     /// Advances the open ones of `endings` by `length` periods, after `elapsed` of `bound`.
@@ -221,11 +241,10 @@ impl Catalogue {
         elapsed: u32,
         bound: u32,
         cancel: &AtomicBool,
-    ) {
+    ) -> Result<(), Error> {
         for begin in (0..length).step_by(STRETCH as usize) {
             let (alive, part) = (open(endings), STRETCH.min(length - begin));
-            let outcomes =
-                capture::outcomes(strobe, &self.traps, part, &alive, cancel).unwrap_or_default();
+            let outcomes = capture::outcomes(strobe, &self.traps, part, &alive, cancel)?;
             let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
             for (ending, outcome) in free.zip(outcomes) {
                 if matches!(outcome.fate, Fate::Captured(_)) {
@@ -236,6 +255,7 @@ impl Catalogue {
             }
             self.report(endings, elapsed + begin + part, bound);
         }
+        Ok(())
     }
 
     /// Reports a search `elapsed` periods after its beginning. Most starts settle within a part of `bound`: the time
@@ -266,18 +286,19 @@ impl Catalogue {
         map: &PoincareMap,
         alive: &[State],
         cancel: &AtomicBool,
-    ) -> bool {
+    ) -> Result<bool, Error> {
         let mut returns = near_returns(strobe, alive, self.effort.longest_cycle);
         let steps = PoincareMap::of_steps(strobe);
         let known = self.orbits.len();
         let mut found: Vec<Ellipse> = Vec::new();
-        while !returns.is_empty() && !cancel.load(Ordering::Relaxed) {
+        while !returns.is_empty() {
+            unless_cancelled(cancel)?;
             let rest = returns.split_off(returns.len().min(self.effort.tries));
             let tried: Vec<_> = returns.iter().map(|(_, start, n)| (*start, *n)).collect();
             let mut traps = Vec::new();
             for orbit in newton::find_others(&steps, &tried, REACH, &[]) {
                 if let Some(orbit) = self.refined(strobe, map, orbit) {
-                    traps.extend(self.admit(strobe, map, orbit, cancel));
+                    traps.extend(self.admit(strobe, map, orbit, cancel)?);
                 }
             }
             if traps.is_empty() {
@@ -293,7 +314,7 @@ impl Catalogue {
         if self.orbits.len() > known {
             self.rebuild(&strobe.pendulum);
         }
-        !found.is_empty()
+        Ok(!found.is_empty())
     }
 
     /// Accepts an orbit and its mirror image if they can be trapped, and returns their traps.
@@ -303,26 +324,26 @@ impl Catalogue {
         map: &PoincareMap,
         orbit: PeriodicOrbit,
         cancel: &AtomicBool,
-    ) -> Vec<Ellipse> {
-        let own = ellipses(strobe, &orbit, &self.effort.trap, cancel);
+    ) -> Result<Vec<Ellipse>, Error> {
+        let own = ellipses(strobe, &orbit, &self.effort.trap, cancel)?;
         // An orbit without a trap exists all the same: a brisk search lists it, and assigns
         // trajectories near it by Newton's method.
         if own.is_empty() && self.effort.precise {
             self.untrapped.push(orbit);
-            return own;
+            return Ok(own);
         }
         let mut traps = own.clone();
         let image = Mirror::of(&strobe.pendulum).and_then(|mirror| mirror.orbit(map, &orbit));
         if let Some((image, moved)) = image.filter(|(i, _)| !orbit.contains(i.points[0], SAME)) {
             let twins = match moved {
                 Some(moved) => trap::mirrored(&own, moved),
-                None => ellipses(strobe, &image, &self.effort.trap, cancel),
+                None => ellipses(strobe, &image, &self.effort.trap, cancel)?,
             };
             traps.extend(&twins);
             self.orbits.push((image, twins));
         }
         self.orbits.push((orbit, own));
-        traps
+        Ok(traps)
     }
 
     /// Rebuilds attractors and traps from orbits, rotations and sets.

@@ -1,12 +1,14 @@
 //! Long runs of uncaptured trajectories, window by window: visited regions and senses of turns.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
-use super::capture::{Fate, Guard, Sight, Traps, fate_at_bound};
+use super::capture::{Fate, Traps};
+use super::capture_test::{CaptureHistory, CaptureTest, fate_at_bound};
 use super::kind::Kind;
 use super::region::Region;
+use crate::error::{Error, unless_cancelled};
 use crate::integrate::kernel::block::Block;
-use crate::integrate::{State, Strobe};
+use crate::integrate::{State, States, Strobe};
 
 /// Passages over the top, detected at every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,7 +60,7 @@ pub struct Window {
 
 /// Division of a run into windows.
 #[derive(Clone, Copy, Debug)]
-pub struct Cut {
+pub struct WindowPlan {
     /// Windows per trajectory.
     pub windows: usize,
     /// Periods per window.
@@ -80,38 +82,38 @@ pub struct Run {
     pub state: State,
 }
 
-/// The runs from `states`, until one of the `traps` captures them; `None` if `cancel` was set.
-#[must_use]
+/// The runs from `states`, until one of the `traps` captures them.
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn long_runs(
     strobe: &Strobe,
     traps: &Traps,
     states: &[State],
-    cut: Cut,
+    plan: WindowPlan,
     cancel: &AtomicBool,
-) -> Option<Vec<Run>> {
+) -> Result<Vec<Run>, Error> {
     let width = strobe.block_width(states.len());
     let mut all = Vec::with_capacity(states.len());
     for chunk in states.chunks(width) {
-        let mut walk = Walk::new(strobe, traps, chunk, width, cut);
-        for _ in 0..cut.windows * cut.length {
-            if cancel.load(Ordering::Relaxed) {
-                return None;
-            }
-            walk.period();
-            if walk.runs.iter().all(|run| run.fate != Fate::Open) {
+        let mut block = RunBlock::new(strobe, traps, chunk, width, plan);
+        for _ in 0..plan.windows * plan.length {
+            unless_cancelled(cancel)?;
+            block.period();
+            if block.runs.iter().all(|run| run.fate != Fate::Open) {
                 break;
             }
         }
-        all.extend(walk.ended());
+        all.extend(block.ended());
     }
-    Some(all)
+    Ok(all)
 }
 
 /// The runs in a block.
-struct Walk<'a> {
+struct RunBlock<'a> {
     strobe: &'a Strobe,
-    guard: Guard<'a>,
-    cut: Cut,
+    test: CaptureTest<'a>,
+    plan: WindowPlan,
     block: Block,
     clock: u64,
     runs: Vec<Run>,
@@ -124,29 +126,35 @@ struct Walk<'a> {
 /// What is known of the run in a lane.
 #[derive(Clone, Copy, Default)]
 struct Lane {
-    sight: Sight,
+    history: CaptureHistory,
     /// Sense of the last passage.
     before: i64,
     /// Turns at the beginning of the window.
     from: f64,
 }
 
-impl<'a> Walk<'a> {
-    fn new(strobe: &'a Strobe, traps: &'a Traps, states: &[State], width: usize, cut: Cut) -> Self {
-        let (theta, velocity): (Vec<f64>, Vec<f64>) = states.iter().map(|s| (s[0], s[1])).unzip();
+impl<'a> RunBlock<'a> {
+    fn new(
+        strobe: &'a Strobe,
+        traps: &'a Traps,
+        states: &[State],
+        width: usize,
+        plan: WindowPlan,
+    ) -> Self {
+        let columns = States::from(states);
         let mut block = Block::new(width);
-        block.fill(&theta, &velocity, strobe.schedule.kick);
+        block.fill(columns.theta(), columns.velocity(), strobe.schedule.kick);
         block.wrap(strobe.angle);
         let run = |state: &State| Run {
-            windows: Vec::with_capacity(cut.windows),
+            windows: Vec::with_capacity(plan.windows),
             fate: Fate::Open,
             periods: 0,
             state: *state,
         };
         Self {
             strobe,
-            guard: Guard::new(strobe, traps),
-            cut,
+            test: CaptureTest::new(strobe, traps),
+            plan,
             block,
             clock: 0,
             runs: states.iter().map(run).collect(),
@@ -158,9 +166,9 @@ impl<'a> Walk<'a> {
     /// Begins a window of every run.
     fn open(&mut self) {
         let empty = Window {
-            region: Region::new(self.cut.side, &self.strobe.pendulum),
+            region: Region::new(self.plan.side, &self.strobe.pendulum),
             senses: Senses::default(),
-            points: Vec::with_capacity(self.cut.length),
+            points: Vec::with_capacity(self.plan.length),
             turns: 0.0,
         };
         for (i, (run, lane)) in self.runs.iter_mut().zip(&mut self.lanes).enumerate() {
@@ -173,7 +181,7 @@ impl<'a> Walk<'a> {
 
     /// Advances all runs by a period.
     fn period(&mut self) {
-        if self.clock.is_multiple_of(self.cut.length as u64) {
+        if self.clock.is_multiple_of(self.plan.length as u64) {
             self.open();
         }
         // Wrapping at the end of a period moves the well with the angle.
@@ -199,18 +207,18 @@ impl<'a> Walk<'a> {
     /// Adds the state of a run to its window, or ends it.
     fn record(&mut self, i: usize) {
         let (run, lane) = (&mut self.runs[i], &mut self.lanes[i]);
-        let hit = self.guard.captured(&self.block, i, self.clock, &mut lane.sight);
+        let hit = self.test.captured(&self.block, i, self.clock, &mut lane.history);
         let mut end = hit.map(|hit| (hit.attractor, hit.clock));
         if end.is_none() && self.strobe.friction && !self.block.held_at[i].is_nan() {
-            let rest = self.guard.at_rest(&self.block, i, self.clock, &mut lane.sight);
+            let rest = self.test.at_rest(&self.block, i, self.clock, &mut lane.history);
             end = rest.map(|rest| (rest, self.clock));
         }
-        run.state = self.guard.state(&self.block, i);
+        run.state = self.test.state(&self.block, i);
         run.periods = self.clock as u32;
         if let Some((attractor, at)) = end {
             run.fate = Fate::Captured(attractor);
             run.periods = at as u32;
-            run.windows.truncate(at as usize / self.cut.length);
+            run.windows.truncate(at as usize / self.plan.length);
         } else if let Some(window) = run.windows.last_mut() {
             window.points.push(run.state);
             window.turns = self.block.turns[i] - lane.from;

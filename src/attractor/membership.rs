@@ -5,8 +5,9 @@ use std::sync::atomic::AtomicBool;
 use super::capture::Traps;
 use super::catalogue::Attractor;
 use super::find::{Catalogue, Ending, REACH, SAME, open};
-use super::long_runs::{Cut, Window, long_runs};
+use super::long_runs::{Window, WindowPlan, long_runs};
 use super::near_returns::{nearest_return, tracks};
+use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::newton::{self, PeriodicOrbit};
 
@@ -42,8 +43,15 @@ impl Catalogue {
 
     /// The attractors of open trajectories, if Newton's method from a near return leads to a known
     /// orbit, or the region of a known set contains the last points.
-    #[must_use]
-    pub fn place(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn place(
+        &self,
+        strobe: &Strobe,
+        states: &[State],
+        cancel: &AtomicBool,
+    ) -> Result<Vec<Option<usize>>, Error> {
         let map = self.effort.map(strobe);
         let longest = self.effort.longest_cycle;
         let own = |orbit: PeriodicOrbit| {
@@ -52,7 +60,7 @@ impl Catalogue {
             self.attractors.iter().position(passes)
         };
         let tracks = tracks(strobe, states, longest);
-        let mut places = self.homes(strobe, states);
+        let mut places = self.chaos_of(strobe, states, cancel)?;
         let nearest = |track: &Vec<State>| nearest_return(strobe.angle, track, longest);
         let (which, returns): (Vec<usize>, Vec<(State, usize)>) = tracks
             .iter()
@@ -62,29 +70,43 @@ impl Catalogue {
         for (k, orbit) in which.into_iter().zip(newton::find_each(&map, &returns, REACH)) {
             places[k] = orbit.and_then(own).or(places[k]);
         }
-        places
+        Ok(places)
     }
 
     /// Whether all starts are open and stay on chaotic attractors.
-    #[must_use]
-    pub fn holds_all(&self, strobe: &Strobe, endings: &[Ending]) -> bool {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn holds_all(
+        &self,
+        strobe: &Strobe,
+        endings: &[Ending],
+        cancel: &AtomicBool,
+    ) -> Result<bool, Error> {
         let open = open(endings);
-        open.len() == endings.len() && self.homes(strobe, &open).iter().all(Option::is_some)
+        let all_open = open.len() == endings.len();
+        Ok(all_open && self.chaos_of(strobe, &open, cancel)?.iter().all(Option::is_some))
     }
 
     /// The chaotic attractors of open trajectories, by their next stroboscopic points and the sense
     /// of their turns.
-    #[must_use]
-    pub fn homes(&self, strobe: &Strobe, states: &[State]) -> Vec<Option<usize>> {
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn chaos_of(
+        &self,
+        strobe: &Strobe,
+        states: &[State],
+        cancel: &AtomicBool,
+    ) -> Result<Vec<Option<usize>>, Error> {
         if !self.has_chaos() {
-            return vec![None; states.len()];
+            return Ok(vec![None; states.len()]);
         }
-        let cut = Cut { windows: 1, length: LAST_POINTS, side: self.effort.cells };
-        let (traps, never) = (Traps::default(), AtomicBool::new(false));
-        let runs = long_runs(strobe, &traps, states, cut, &never).unwrap_or_default();
-        let home = |window: &Window| {
+        let plan = WindowPlan { windows: 1, length: LAST_POINTS, side: self.effort.cells };
+        let runs = long_runs(strobe, &Traps::default(), states, plan, cancel)?;
+        let set = |window: &Window| {
             self.attractors.iter().position(|a| a.keeps(&window.points, window.senses))
         };
-        runs.iter().map(|run| run.windows.last().and_then(home)).collect()
+        Ok(runs.iter().map(|run| run.windows.last().and_then(set)).collect())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use crate::integrate::{State, Strobe};
+use crate::integrate::{State, States, Strobe};
 use crate::model::effects::Action;
 use crate::model::{Angle, Effect, Pendulum};
 
@@ -67,15 +67,12 @@ pub(super) fn escape_speed(pendulum: &Pendulum) -> f64 {
 
 /// The next stroboscopic points of each trajectory, starting with its own.
 pub(super) fn tracks(strobe: &Strobe, states: &[State], periods: usize) -> Vec<Vec<State>> {
-    let mut theta: Vec<f64> = states.iter().map(|s| s[0]).collect();
-    let mut velocity: Vec<f64> = states.iter().map(|s| s[1]).collect();
-    let mut turns = vec![0.0; states.len()];
     let mut tracks: Vec<Vec<State>> = states.iter().map(|s| vec![*s]).collect();
+    let mut states = States::from(states);
     for _ in 0..periods {
-        // Lengths agree, so this cannot fail.
-        let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
-        for (track, (a, b)) in tracks.iter_mut().zip(theta.iter().zip(&velocity)) {
-            track.push([*a, *b]);
+        strobe.advance(&mut states, 1);
+        for (track, state) in tracks.iter_mut().zip(states.iter()) {
+            track.push(state);
         }
     }
     tracks

@@ -2,10 +2,11 @@
 //! a few starts to hit.
 
 use std::f64::consts::PI;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use super::find::{Catalogue, REACH};
-use crate::integrate::{State, Strobe};
+use crate::error::{Error, unless_cancelled};
+use crate::integrate::{State, States, Strobe};
 use crate::model::Angle;
 use crate::orbit::{PoincareMap, newton};
 
@@ -30,11 +31,11 @@ impl Catalogue {
         strobe: &Strobe,
         points: &[State],
         cancel: &AtomicBool,
-    ) -> bool {
+    ) -> Result<bool, Error> {
         let reach = |part: usize| points.iter().fold(0.0_f64, |most, s| most.max(s[part].abs()));
         let extents = [if strobe.angle == Angle::Circle { PI } else { reach(0) }, reach(1)];
         if extents.iter().zip(&self.sought).all(|(wanted, sought)| wanted <= sought) {
-            return false;
+            return Ok(false);
         }
         let widest = if strobe.angle == Angle::Circle { PI } else { MARGIN * extents[0] };
         let fastest = MARGIN * extents[1];
@@ -46,14 +47,15 @@ impl Catalogue {
         for (starts, n) in least_gaps(strobe, [widest, fastest]).iter().zip(1..) {
             let starts: Vec<_> = starts.iter().take(TRIED).map(|start| (*start, n)).collect();
             for _ in 0..BESIDE {
+                unless_cancelled(cancel)?;
                 let found = newton::find_others(&steps, &starts, REACH, &met);
-                if found.is_empty() || cancel.load(Ordering::Relaxed) {
+                if found.is_empty() {
                     break;
                 }
                 for orbit in found {
                     met.extend(&orbit.points);
                     if let Some(orbit) = self.refined(strobe, &map, orbit) {
-                        self.admit(strobe, &map, orbit, cancel);
+                        self.admit(strobe, &map, orbit, cancel)?;
                     }
                 }
             }
@@ -62,7 +64,7 @@ impl Catalogue {
         if found {
             self.rebuild(&strobe.pendulum);
         }
-        found
+        Ok(found)
     }
 }
 
@@ -78,15 +80,11 @@ fn least_gaps(strobe: &Strobe, [widest, fastest]: State) -> [Vec<State>; LONGEST
     let rows = if symmetric { SIDE / 2 } else { SIDE };
     let count = rows * SIDE;
     let starts: Vec<State> = (0..(count + SIDE).min(SIDE * SIDE)).map(at).collect();
-    let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) =
-        starts.iter().map(|s| (s[0], s[1])).unzip();
-    let mut turns = vec![0.0; starts.len()];
+    let mut states = States::from(starts.as_slice());
     std::array::from_fn(|_| {
-        // Lengths agree, so this cannot fail.
-        let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, 1);
-        let gap: Vec<f64> = (0..starts.len())
-            .map(|k| strobe.angle.distance([theta[k], velocity[k]], starts[k]))
-            .collect();
+        strobe.advance(&mut states, 1);
+        let ends = states.iter().zip(&starts);
+        let gap: Vec<f64> = ends.map(|(end, start)| strobe.angle.distance(end, *start)).collect();
         let lowest = |k: &usize| {
             let (i, j) = (k % SIDE, k / SIDE);
             let rows = j.saturating_sub(1)..=(j + 1).min(SIDE - 1);

@@ -8,7 +8,7 @@
 //! the largest level such that every sample within it comes back lower.
 
 use std::f64::consts::TAU;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -16,8 +16,9 @@ use serde::{Deserialize, Serialize};
 use super::effort::Sampling;
 use super::find::SAME;
 use super::gauge::Gauge;
+use crate::error::{Error, unless_cancelled};
 use crate::integrate::accuracy::wrapped;
-use crate::integrate::{State, Strobe};
+use crate::integrate::{State, States, Strobe};
 use crate::model::Angle;
 use crate::orbit::PeriodicOrbit;
 
@@ -77,17 +78,18 @@ const LEAST_SHRINKING: f64 = 1e-4;
 /// The part of the sampled radius that is used.
 const MARGIN: f64 = 0.9;
 
-/// The ellipses of the points of `orbit`; empty if sampling finds no safe level or `cancel` was
-/// set.
+/// The ellipses of the points of `orbit`; empty if sampling finds no safe level.
 ///
 /// Ellipses that cross `theta = pi` are included twice, one turn apart.
-#[must_use]
+///
+/// # Errors
+/// [`Error::Interrupted`] if `cancel` was set.
 pub fn ellipses(
     strobe: &Strobe,
     orbit: &PeriodicOrbit,
     sampling: &Sampling,
     cancel: &AtomicBool,
-) -> Vec<Ellipse> {
+) -> Result<Vec<Ellipse>, Error> {
     let mut traps = Vec::new();
     let shrink = orbit.multipliers.largest().sqrt().max(LEAST_SHRINK);
     let lower = 1.0 - LEFT * (1.0 - shrink);
@@ -95,18 +97,16 @@ pub fn ellipses(
     for (point, (centre, monodromy)) in points.take(sampling.points) {
         let kinked = Gauge::of_kink(&strobe.pendulum, orbit, shrink);
         let own = || lyapunov_root(&(monodromy / shrink)).map(Gauge::Ellipse);
-        let Some(gauge) = kinked.or_else(own) else { return Vec::new() };
+        let Some(gauge) = kinked.or_else(own) else { return Ok(Vec::new()) };
         let root = gauge.root();
-        if cancel.load(Ordering::Relaxed) {
-            return Vec::new();
-        }
+        unless_cancelled(cancel)?;
         let widest = 3.0 / extent(&root);
         let part = sampling.ratio.powi(sampling.levels as i32);
         let from = |round: usize| widest * part.powi(round as i32);
         let radius = (0..sampling.rounds).find_map(|round| {
             safe_radius(strobe, orbit.n, *centre, &gauge, lower, sampling, from(round))
         });
-        let Some(radius) = radius else { return Vec::new() };
+        let Some(radius) = radius else { return Ok(Vec::new()) };
         let shape = root.map(|x| x / radius);
         let reach = radius * extent(&root);
         for turn in strobe.angle.turns() {
@@ -116,7 +116,7 @@ pub fn ellipses(
             }
         }
     }
-    traps
+    Ok(traps)
 }
 
 /// These ellipses around the mirror image of their orbit, whose points have moved by `moved`
@@ -172,22 +172,19 @@ fn safe_radius(
     let Sampling { rays, levels, ratio, returns, .. } = *sampling;
     let radii: Vec<f64> = (0..levels).map(|k| widest * ratio.powi(k as i32)).collect();
     let count = rays * levels;
-    let (mut theta, mut velocity) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    for radius in &radii {
-        for ray in 0..rays {
-            let angle = TAU * (ray as f64 + 0.5) / rays as f64;
-            let [dtheta, dv] = gauge.point(angle);
-            theta.push(centre[0] + radius * dtheta);
-            velocity.push(centre[1] + radius * dv);
-        }
-    }
-    let mut turns = vec![0.0; count];
+    let sample = |k: usize| {
+        let (radius, ray) = (radii[k / rays], k % rays);
+        let angle = TAU * (ray as f64 + 0.5) / rays as f64;
+        let [dtheta, dv] = gauge.point(angle);
+        [centre[0] + radius * dtheta, centre[1] + radius * dv]
+    };
+    let mut states: States = (0..count).map(sample).collect();
     let mut best: Option<f64> = None;
     for _ in 0..returns {
-        strobe.advance(&mut theta, &mut velocity, &mut turns, n).ok()?;
+        strobe.advance(&mut states, n);
         let height = |i: usize| {
-            let (x, y) = (strobe.angle.wrapped(theta[i] - centre[0]), velocity[i] - centre[1]);
-            gauge.height([x, y])
+            let [theta, velocity] = states.get(i);
+            gauge.height([strobe.angle.wrapped(theta - centre[0]), velocity - centre[1]])
         };
         // From the smallest level outward, up to the first one with a sample that rises.
         let safe = (0..levels)
@@ -262,14 +259,13 @@ impl Band {
         let narrower = |width: &f64| MARGIN * width < limit;
         let widths: Vec<f64> =
             (0..LEVELS).map(|k| 4.0 * RATIO.powi(k as i32)).filter(narrower).collect();
-        let (mut theta, mut velocity) = band.sides(&widths);
-        let mut turns = vec![0.0; theta.len()];
+        let mut edges = band.edges(&widths);
         let mut best: Option<[f64; 2]> = None;
         for _ in 0..RETURNS {
-            strobe.advance(&mut theta, &mut velocity, &mut turns, 1).ok()?;
+            strobe.advance(&mut edges, 1);
             let holds = |k: &usize| {
                 (k * SIDES..(k + 1) * SIDES)
-                    .all(|i| band.distance([theta[i], velocity[i]]) < BAND_LOWER * widths[*k])
+                    .all(|i| band.distance(edges.get(i)) < BAND_LOWER * widths[*k])
             };
             // Interpolation of the curve limits how narrow a band can be judged.
             let mut safe = (0..widths.len()).rev().skip_while(|k| !holds(k)).take_while(holds);
@@ -303,26 +299,24 @@ impl Band {
     }
 
     /// States along both edges of bands of these half widths.
-    fn sides(&self, widths: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    fn edges(&self, widths: &[f64]) -> States {
         let state = |(k, width): (usize, f64)| {
             let at = TAU * (((k / 2) as f64 + 0.5) / (SIDES / 2) as f64 - 0.5);
             let side = if k.is_multiple_of(2) { -width } else { width };
-            (at, self.at(at) + side)
+            [at, self.at(at) + side]
         };
-        widths.iter().flat_map(|width| (0..SIDES).map(|k| (k, *width))).map(state).unzip()
+        widths.iter().flat_map(|width| (0..SIDES).map(|k| (k, *width))).map(state).collect()
     }
 
     /// The least distance from the curve at which states of the edges remain; `None` if all come within `near` of it.
     fn stays(&self, strobe: &Strobe, width: f64, near: f64) -> Option<f64> {
-        let (mut theta, mut velocity) = self.sides(&[width]);
-        let mut turns = vec![0.0; theta.len()];
+        let mut edges = self.edges(&[width]);
         let shrinking = (width / near).ln()
             / (strobe.pendulum.damping_rate() * strobe.pendulum.period()).max(LEAST_SHRINKING);
         let mut elsewhere = None;
         for _ in 0..RETURNS + (PATIENCE * shrinking) as usize / RETURNS {
-            // Lengths agree, so this cannot fail.
-            let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, RETURNS);
-            let far = theta.iter().zip(&velocity).map(|(theta, v)| self.distance([*theta, *v]));
+            strobe.advance(&mut edges, RETURNS);
+            let far = edges.iter().map(|state| self.distance(state));
             let far = far.filter(|distance| distance.is_nan() || *distance >= near);
             elsewhere = far.min_by(f64::total_cmp);
             elsewhere?;

@@ -6,6 +6,7 @@ use super::capture::{self, Fate};
 use super::chaos::{self, ChaoticSet, spread};
 use super::find::{Catalogue, Ending, open};
 use super::kind::Kind;
+use crate::error::Error;
 use crate::integrate::{State, Strobe};
 
 /// Power of e by which damping must shrink a free motion before uncaptured trajectories can be
@@ -23,63 +24,65 @@ impl Catalogue {
     /// Decides which trajectories uncaptured after `bound` periods are chaotic.
     ///
     /// Observed trajectories are set to their final states.
-    pub fn watch(
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
+    pub fn observe(
         &mut self,
         strobe: &Strobe,
         endings: &mut [Ending],
         bound: u32,
         cancel: &AtomicBool,
-    ) {
+    ) -> Result<(), Error> {
         let free: Vec<(usize, State)> = endings
             .iter()
             .enumerate()
             .filter_map(|(k, end)| if let Ending::Open(s) = end { Some((k, *s)) } else { None })
             .collect();
         let alone = self.attractors.iter().all(|a| a.kind.is_chaotic());
-        let most = if alone { self.effort.watched_alone } else { self.effort.watched };
+        let most = if alone { self.effort.observed_alone } else { self.effort.observed };
         let stride = free.len().div_ceil(most).max(1);
         let (places, sample): (Vec<usize>, Vec<State>) = free.into_iter().step_by(stride).unzip();
-        let length = self.effort.watch * bound;
+        let length = self.effort.observation * bound;
         // Nearly conservative motion takes longer than this to show where it ends.
-        let watched = strobe.pendulum.period() * f64::from(bound + length);
-        if sample.is_empty() || strobe.pendulum.damping_rate() * watched < LEAST_DECAY {
-            return;
+        let duration = strobe.pendulum.period() * f64::from(bound + length);
+        if sample.is_empty() || strobe.pendulum.damping_rate() * duration < LEAST_DECAY {
+            return Ok(());
         }
         let mut runs = Vec::with_capacity(sample.len());
         for part in sample.chunks(OBSERVED) {
             let all = sample.len() * length as usize;
             self.progress.show(runs.len() * length as usize, all);
-            let observed = chaos::observed(strobe, &self.traps, part, length, &self.effort, cancel);
-            let Some(observed) = observed else { return };
-            runs.extend(observed);
+            let (traps, effort) = (&self.traps, &self.effort);
+            runs.extend(chaos::observed(strobe, traps, part, length, effort, cancel)?);
         }
         for (place, run) in places.into_iter().zip(&runs) {
             endings[place] = self.ending(run.fate, run.state);
         }
         if runs.iter().all(|run| run.fate != Fate::Open) {
-            return;
+            return Ok(());
         }
-        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel) {
+        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel)? {
             // They have settled by now.
-            return self.watch(strobe, endings, bound, cancel);
+            return self.observe(strobe, endings, bound, cancel);
         }
         let new: Vec<ChaoticSet> =
-            chaos::sets(strobe, &self.traps, &self.known, runs, length, &self.effort, cancel)
+            chaos::sets(strobe, &self.traps, &self.known, runs, length, &self.effort, cancel)?
                 .into_iter()
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
                 .collect();
         if new.is_empty() {
-            return;
+            return Ok(());
         }
         let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
-        if self.find_short_cycles(strobe, &points, cancel) {
+        if self.find_short_cycles(strobe, &points, cancel)? {
             // A trajectory classified as chaotic may end there.
-            return self.watch(strobe, endings, bound, cancel);
+            return self.observe(strobe, endings, bound, cancel);
         }
         let symmetric = strobe.pendulum.is_mirror_symmetric();
         for set in new {
             if self.sets.iter().any(|old| old.same_as(&set))
-                || !self.stays(strobe, &set, length, cancel)
+                || !self.stays(strobe, &set, length, cancel)?
             {
                 continue;
             }
@@ -90,6 +93,7 @@ impl Catalogue {
             self.sets.push(set);
         }
         self.rebuild(&strobe.pendulum);
+        Ok(())
     }
 
     /// Quasi-periodic rotations among the sets of a similar pendulum: runs from their points, observed for twice
@@ -100,26 +104,17 @@ impl Catalogue {
         known: &[ChaoticSet],
         bound: u32,
         cancel: &AtomicBool,
-    ) {
+    ) -> Result<(), Error> {
         for old in known.iter().filter(|set| set.band.is_some()) {
             let starts = spread(&old.points, self.effort.proved);
-            let settled = capture::outcomes(strobe, &self.traps, bound, &starts, cancel);
-            let ends: Vec<State> = settled.iter().flatten().map(|o| o.state).collect();
-            let open = settled.is_some_and(|all| all.iter().all(|o| o.fate == Fate::Open));
-            if !open {
+            let settled = capture::outcomes(strobe, &self.traps, bound, &starts, cancel)?;
+            if settled.iter().any(|o| o.fate != Fate::Open) {
                 continue;
             }
+            let ends: Vec<State> = settled.iter().map(|o| o.state).collect();
             let (traps, effort) = (&self.traps, &self.effort);
-            let runs = chaos::observed(strobe, traps, &ends, 2 * bound, effort, cancel);
-            let found = chaos::sets(
-                strobe,
-                traps,
-                &[],
-                runs.unwrap_or_default(),
-                2 * bound,
-                effort,
-                cancel,
-            );
+            let runs = chaos::observed(strobe, traps, &ends, 2 * bound, effort, cancel)?;
+            let found = chaos::sets(strobe, traps, &[], runs, 2 * bound, effort, cancel)?;
             let new = |set: &ChaoticSet| {
                 set.band.is_some() && !self.sets.iter().any(|other| other.same_as(set))
             };
@@ -127,30 +122,36 @@ impl Catalogue {
             self.sets.extend(new);
             self.rebuild(&strobe.pendulum);
         }
+        Ok(())
     }
 
     /// Whether an apparent chaotic attractor coexisting with another one is not a transient to it.
     ///
     /// Such transients are long: [`STAYING`] trajectories are observed from points of the set, or until one
     /// ends.
-    fn stays(&self, strobe: &Strobe, set: &ChaoticSet, length: u32, cancel: &AtomicBool) -> bool {
+    fn stays(
+        &self,
+        strobe: &Strobe,
+        set: &ChaoticSet,
+        length: u32,
+        cancel: &AtomicBool,
+    ) -> Result<bool, Error> {
         if self.attractors.iter().all(|a| a.kind.is_chaotic()) || set.band.is_some() {
-            return true;
+            return Ok(true);
         }
         let (count, periods) = STAYING;
         let mut points = spread(&set.points, count);
         let (mut over, mut part) = (0, length.min(periods));
         while over < periods {
-            let found = capture::outcomes(strobe, &self.traps, part, &points, cancel);
-            let Some(outcomes) = found.filter(|all| all.iter().all(|o| o.fate == Fate::Open))
-            else {
-                return false;
-            };
+            let outcomes = capture::outcomes(strobe, &self.traps, part, &points, cancel)?;
+            if outcomes.iter().any(|o| o.fate != Fate::Open) {
+                return Ok(false);
+            }
             points = outcomes.iter().map(|o| o.state).collect();
             over += part;
             part = over.min(periods - over);
         }
-        true
+        Ok(true)
     }
 }
 

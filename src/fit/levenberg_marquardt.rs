@@ -1,13 +1,13 @@
 //! The Levenberg-Marquardt method at fixed windows.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use super::normal::{Normal, Step};
 use super::problem::Problem;
 use super::single_window::relax;
 use super::step_scale::StepScale;
 use super::window::Window;
-use crate::error::Error;
+use crate::error::{Error, unless_cancelled};
 
 /// The first damping tried after a step that failed.
 const FIRST_DAMPING: f64 = 1e-4;
@@ -45,13 +45,12 @@ pub struct Point {
 }
 
 impl Point {
-    /// The point at `values`.
-    ///
-    /// # Errors
-    /// [`Error::Diverges`] where a motion leaves the range of numbers, or a value is out of range.
-    pub fn new(problem: &Problem, values: Vec<f64>, windows: Vec<Window>) -> Result<Self, Error> {
-        let normal = Normal::at(problem, &values, &windows).ok_or(Error::Diverges)?;
-        Ok(Self { values, windows, normal, in_vain: 0.0 })
+    /// The point at `values`; none where a motion leaves the range of numbers, or a value is out of
+    /// range.
+    #[must_use]
+    pub fn new(problem: &Problem, values: Vec<f64>, windows: Vec<Window>) -> Option<Self> {
+        let normal = Normal::at(problem, &values, &windows)?;
+        Some(Self { values, windows, normal, in_vain: 0.0 })
     }
 
     /// The number of samples with nonzero weight, less that of parameters and initial states
@@ -91,7 +90,7 @@ impl Point {
             window.start[0] += part * step[0];
             window.start[1] += part * step[1];
         }
-        Self::new(problem, values, windows).ok()
+        Self::new(problem, values, windows)
     }
 
     /// The point after a step if it is lower, and the number of points tried: a linear step; if
@@ -103,7 +102,7 @@ impl Point {
         step: &Step,
         held: &[usize],
         cancel: &AtomicBool,
-    ) -> (usize, Option<Self>) {
+    ) -> Result<(usize, Option<Self>), Error> {
         let chi2 = self.normal.chi2;
         let lower = |next: &Self| next.normal.chi2 < chi2;
         let keeps = |next: &Self, part: f64| chi2 - next.normal.chi2 > part * step.gain;
@@ -111,7 +110,7 @@ impl Point {
             || (0..problem.scales.len()).filter(|k| problem.scales[*k] == StepScale::Width);
         let mut straight = self.moved(problem, step);
         if straight.as_ref().is_some_and(|next| keeps(next, KEPT)) {
-            return (1, straight);
+            return Ok((1, straight));
         }
         let (mut tried, mut bent) = (1, None);
         if widths().next().is_some() {
@@ -127,11 +126,11 @@ impl Point {
         if let Some(next) = straight.as_mut().filter(|next| !fair(next))
             && !bent.as_ref().is_some_and(fair)
         {
-            relax(problem, next, self, step, cancel);
+            relax(problem, next, self, step, cancel)?;
             self.in_vain = next.in_vain;
         }
         let both = straight.filter(lower).into_iter().chain(bent);
-        (tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2)))
+        Ok((tried, both.min_by(|a, b| a.normal.chi2.total_cmp(&b.normal.chi2))))
     }
 
     /// The point to which all but `held` follows, and the number tried, while steps gain `enough`.
@@ -195,9 +194,7 @@ pub fn descend(
     let ended =
         |steps, converged, promised| Ok(Outcome { steps, converged, given_up: false, promised });
     loop {
-        if cancel.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted);
-        }
+        unless_cancelled(cancel)?;
         let chi2 = point.normal.chi2;
         let step = point.normal.step_between(damping, held, &point.ends(problem));
         let promised = step.gain - point.in_vain;
@@ -216,7 +213,7 @@ pub fn descend(
         if steps >= limit.steps {
             return ended(steps, false, promised);
         }
-        let (tried, next) = point.lower(problem, &step, held, cancel);
+        let (tried, next) = point.lower(problem, &step, held, cancel)?;
         steps += tried;
         if let Some(next) = next {
             fell = chi2 - next.normal.chi2;

@@ -14,7 +14,7 @@ use crate::lanes::dispatch::Register;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::pack::Bundle;
 use crate::lanes::{Lane, Real};
-use crate::model::{Observation, Pendulum};
+use crate::model::{Observation, Parameter, Pendulum};
 
 /// Largest number of derivatives in one pass.
 const WIDEST: usize = 16;
@@ -145,10 +145,10 @@ impl Follow<'_> {
             along(value, direction.unwrap_or(usize::MAX))
         };
         let Shaped { pendulum, gravity, rod_sensor, rate } = self.shaped;
-        let parameter = |index: usize, value: f64| number(Slot::Parameter(index), value);
+        let parameter = |one: Parameter, value: f64| number(Slot::Parameter(one), value);
         let mut ode =
             OdeProblem::with_rate(pendulum, *rate, true, self.problem.tolerance, parameter)
-                .watched()
+                .finding_turns()
                 .with_gravity(number(Slot::Gravity, *gravity));
         if let Some(recorded) = &record.recorded {
             ode = ode.driven_by(Arc::clone(recorded));
@@ -247,8 +247,8 @@ struct Sensor(Observation<Tangent<f64, READINGS>>);
 
 impl Sensor {
     fn new(pendulum: &Pendulum, columns: &Columns, rod: bool) -> Self {
-        let all = Observation::lift(pendulum, |index, value| {
-            let place = columns.reading.iter().position(|(_, own)| *own == index);
+        let all = Observation::lift(pendulum, |parameter, value| {
+            let place = columns.reading.iter().position(|(_, one)| *one == parameter);
             Tangent::seeded(value, place.map_or(usize::MAX, |place| place + 2))
         });
         Self(if rod { all.scaling() } else { all })

@@ -6,8 +6,8 @@ use super::step_scale::StepScale;
 use crate::error::Error;
 use crate::integrate::reference::problem::greatest_rate;
 use crate::lanes::InstructionSet;
-use crate::model::Pendulum;
 use crate::model::effects::Action;
+use crate::model::{Parameter, Pendulum};
 
 /// Largest number of free parameters of a record's reading.
 pub const MOST_READINGS: usize = 7;
@@ -17,8 +17,8 @@ pub const MOST_READINGS: usize = 7;
 pub enum Slot {
     /// `(w0 / w_ref)^2`.
     Gravity,
-    /// The parameter at that place in [`Pendulum::parameters`].
-    Parameter(usize),
+    /// A parameter of the pendulum.
+    Parameter(Parameter),
     /// [`RodSensor::bias`].
     Bias,
     /// [`RodSensor::tilt`].
@@ -38,10 +38,9 @@ impl Free {
     /// The range of its values: that of the parameter of an effect, otherwise unbounded.
     fn range(&self, records: &[Record]) -> [f64; 2] {
         let of_effect = |(record, slot): &(usize, Slot)| {
-            let Slot::Parameter(place) = *slot else { return None };
-            let pendulum = &records[*record].pendulum;
-            let (effect, own) = pendulum.owner(place)?;
-            Some(pendulum.effects[effect].kind.definition().parameters.at(own).range)
+            let Slot::Parameter(Parameter::OfEffect { effect, place }) = *slot else { return None };
+            let effects = &records[*record].pendulum.effects;
+            Some(effects[effect].kind.definition().parameters.at(place).range)
         };
         self.places.first().and_then(of_effect).unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
@@ -87,8 +86,8 @@ pub struct Shaped {
 pub struct Columns {
     /// Parameters on which the motion depends.
     pub motion: Vec<(usize, Slot)>,
-    /// Parameters on which only the reading depends, with their place in [`Pendulum::parameters`].
-    pub reading: Vec<(usize, usize)>,
+    /// Parameters on which only the reading depends.
+    pub reading: Vec<(usize, Parameter)>,
 }
 
 impl Columns {
@@ -110,32 +109,30 @@ impl Problem {
     /// # Errors
     /// [`Error::Lengths`] where a record's arrays differ in length, [`Error::Range`] for a number
     /// that is not finite, a time that is not after the one before it, a negative weight, a record
-    /// with fewer than 3 trusted samples, or a free parameter that its record does not have;
-    /// [`Error::Simd`], see [`InstructionSet::choose`].
+    /// with fewer than 3 trusted samples; [`Error::NoParameter`] for a free parameter that its pendulum
+    /// does not have; [`Error::Simd`], see [`InstructionSet::choose`].
     pub fn new(records: Vec<Record>, free: Vec<Free>, tolerance: f64) -> Result<Self, Error> {
         for record in &records {
             record.check()?;
         }
-        let known: Vec<usize> = records.iter().map(|r| r.pendulum.parameters().len()).collect();
         for Free { places, start } in &free {
             if !start.is_finite() {
                 return Err(range("start of a free parameter", *start, "a finite number"));
             }
             for (record, slot) in places {
-                let Some(known) = known.get(*record) else {
+                let index = *record as f64;
+                let Some(record) = records.get(*record) else {
                     let allowed = "one of those given";
-                    return Err(range("record of a free parameter", *record as f64, allowed));
+                    return Err(range("record of a free parameter", index, allowed));
                 };
-                if matches!(slot, Slot::Bias | Slot::Tilt) && records[*record].rod_sensor.is_none()
-                {
+                if matches!(slot, Slot::Bias | Slot::Tilt) && record.rod_sensor.is_none() {
                     let allowed = "one with a gyroscope or an accelerometer";
-                    return Err(range("record of a bias or tilt", *record as f64, allowed));
+                    return Err(range("record of a bias or tilt", index, allowed));
                 }
-                if let Slot::Parameter(index) = *slot
-                    && index >= *known
+                if let Slot::Parameter(parameter) = *slot
+                    && !record.pendulum.has(parameter)
                 {
-                    let allowed = "one that the pendulum has";
-                    return Err(range("place of a free parameter", index as f64, allowed));
+                    return Err(Error::NoParameter { name: format!("{parameter:?}") });
                 }
             }
         }
@@ -169,9 +166,9 @@ impl Problem {
     #[must_use]
     pub fn columns(&self, index: usize) -> Columns {
         let pendulum = &self.records[index].pendulum;
-        let reads = |parameter: usize| {
-            let owner = pendulum.owner(parameter);
-            owner.is_some_and(|(effect, _)| pendulum.effects[effect].is(&[Action::Reading]))
+        let reads = |parameter: Parameter| match parameter {
+            Parameter::OfEffect { effect, .. } => pendulum.effects[effect].is(&[Action::Reading]),
+            _ => false,
         };
         let mut columns = Columns::default();
         for (place, free) in self.free.iter().enumerate() {
@@ -197,7 +194,7 @@ impl Problem {
         for (free, value) in self.free.iter().zip(values) {
             match free.slot(index) {
                 Some(Slot::Gravity) => shaped.gravity = *value,
-                Some(Slot::Parameter(place)) => shaped.pendulum.set_parameter(place, *value),
+                Some(Slot::Parameter(parameter)) => shaped.pendulum.set(parameter, *value),
                 Some(Slot::Bias) => shaped.change(|sensor| sensor.bias = *value),
                 Some(Slot::Tilt) => shaped.change(|sensor| sensor.tilt = *value),
                 None => {}
@@ -222,8 +219,8 @@ impl Shaped {
     }
 
     fn is_sound(&self) -> bool {
-        let numbers = self.pendulum.parameters();
-        let finite = numbers.iter().all(|(_, value)| value.is_finite());
+        let parameters = self.pendulum.parameters().into_iter();
+        let finite = parameters.map(|one| self.pendulum.value(one)).all(f64::is_finite);
         let in_range = self.pendulum.effects.iter().all(|effect| {
             let parameters = effect.kind.definition().parameters;
             parameters

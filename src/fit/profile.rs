@@ -5,7 +5,7 @@
 //! by Newton's method on the quadratic model at each point (Venzon & Moolgavkar 1988, Applied
 //! Statistics 37, 87).
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::levenberg_marquardt::Point;
 use super::normal::pseudo_inverse;
 use super::problem::Problem;
-use crate::error::Error;
+use crate::error::{Error, unless_cancelled};
 
 /// Largest number of steps toward one end.
 const MOST_STEPS: usize = 40;
@@ -32,12 +32,9 @@ pub fn intervals(
     cancel: &AtomicBool,
 ) -> Result<Vec<[f64; 2]>, Error> {
     let ends: Vec<(usize, f64)> = which.iter().flat_map(|k| [(*k, -1.0), (*k, 1.0)]).collect();
-    let found: Vec<f64> =
-        ends.par_iter().map(|(k, sense)| end(problem, best, *k, *sense, level, cancel)).collect();
-    if cancel.load(Ordering::Relaxed) {
-        return Err(Error::Interrupted);
-    }
-    Ok(found.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
+    let one = |(k, sense): &(usize, f64)| end(problem, best, *k, *sense, level, cancel);
+    let values: Vec<f64> = ends.par_iter().map(one).collect::<Result<_, Error>>()?;
+    Ok(values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
 }
 
 fn end(
@@ -47,14 +44,12 @@ fn end(
     sense: f64,
     level: f64,
     cancel: &AtomicBool,
-) -> f64 {
+) -> Result<f64, Error> {
     let target = best.normal.chi2 + level;
     let mut point = best.clone();
     let mut shrink = 1.0;
     for _ in 0..MOST_STEPS {
-        if cancel.load(Ordering::Relaxed) {
-            break;
-        }
+        unless_cancelled(cancel)?;
         // With the parameter's step b the others follow: h - b k.
         let (information, pull) = point.normal.reduced(0.0);
         let inverse = pseudo_inverse(&information, &[which]);
@@ -67,12 +62,12 @@ fn end(
         let curvature = information[(which, which)] - column.dot(&along);
         let root = slope * slope + curvature * (target - remaining);
         if curvature.is_nan() || curvature <= 0.0 {
-            return f64::NAN;
+            return Ok(f64::NAN);
         }
         let full = (slope + sense * root.max(0.0).sqrt()) / curvature;
         let settled = (remaining - target).abs() < NEAR * level && least.gain < NEAR * level;
         if settled {
-            return point.values[which] + full;
+            return Ok(point.values[which] + full);
         }
         let aim = |part: f64| {
             let b = part * full;
@@ -88,5 +83,5 @@ fn end(
         // Along a curved ridge a step that was too long soon is again.
         shrink = (2.0 * shrink).min(1.0);
     }
-    f64::NAN
+    Ok(f64::NAN)
 }

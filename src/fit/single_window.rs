@@ -46,7 +46,7 @@ pub fn fit_alone(
     cancel: &AtomicBool,
 ) -> Result<Option<SingleWindow>, Error> {
     let held: Vec<usize> = (0..values.len()).collect();
-    let Ok(mut point) = Point::new(problem, values.to_vec(), vec![window]) else {
+    let Some(mut point) = Point::new(problem, values.to_vec(), vec![window]) else {
         return Ok(None);
     };
     let promised = point.normal.step(0.0, &held).gain;
@@ -60,18 +60,21 @@ pub fn fit_alone(
 
 /// Windows of `point` that rose although `step` from `before` predicted a fall get initial states
 /// fitted separately.
+///
 /// A motion near the top, or one that friction nearly holds, may take another course after a
 /// slightly too long step, which no other window can compensate: one alone would block the descent.
-/// too far, and no other window can make that good: one alone would hold up the search.
+///
+/// # Errors
+/// [`Error::Interrupted`] when `cancel` is set.
 pub fn relax(
     problem: &Problem,
     point: &mut Point,
     before: &Point,
     step: &Step,
     cancel: &AtomicBool,
-) {
+) -> Result<(), Error> {
     if point.windows.len() == 1 {
-        return;
+        return Ok(());
     }
     let missed: Vec<f64> = (0..point.windows.len())
         .map(|k| point.normal.parts[k] - before.normal.parts[k] + step.gains[k])
@@ -80,25 +83,26 @@ pub fn relax(
     let risen: Vec<usize> = (0..missed.len()).filter(|k| missed[*k] > PART_MISSED * most).collect();
     if risen.len() > FEW {
         // Not one or two windows: the step itself is too long.
-        return;
+        return Ok(());
     }
-    let fitted =
-        |values: &[f64], window| fit_alone(problem, values, window, RELAXED, cancel).ok()?;
-    let found = |k: usize| {
+    let fitted = |values: &[f64], window| fit_alone(problem, values, window, RELAXED, cancel);
+    let relaxed = |k: usize| -> Result<Option<(usize, Point, f64)>, Error> {
         // From where the step led, and from where it was.
-        let from = [point.windows[k], before.windows[k]];
-        let both = from.into_iter().filter_map(|window| fitted(&point.values, window));
+        let led = fitted(&point.values, point.windows[k])?;
+        let was = fitted(&point.values, before.windows[k])?;
         let chi2 = |one: &SingleWindow| one.point.normal.chi2;
-        let best = both.min_by(|a, b| chi2(a).total_cmp(&chi2(b)))?;
-        let in_vain = fitted(&before.values, before.windows[k])?.in_vain;
-        Some((k, best.point, in_vain))
+        let both = led.into_iter().chain(was);
+        let Some(best) = both.min_by(|a, b| chi2(a).total_cmp(&chi2(b))) else { return Ok(None) };
+        let old = fitted(&before.values, before.windows[k])?;
+        Ok(old.map(|old| (k, best.point, old.in_vain)))
     };
-    let all: Vec<(usize, Point, f64)> = risen.into_par_iter().filter_map(found).collect();
-    for (k, best, in_vain) in all {
+    let all: Vec<_> = risen.into_par_iter().map(relaxed).collect::<Result<_, Error>>()?;
+    for (k, best, in_vain) in all.into_iter().flatten() {
         if best.normal.chi2 < point.normal.parts[k] {
             point.windows[k] = best.windows[0];
             point.normal.replace(k, best.normal);
         }
         point.in_vain += in_vain;
     }
+    Ok(())
 }

@@ -9,6 +9,7 @@
 
 use super::problem::{Free, Slot};
 use super::record::Record;
+use crate::model::Parameter;
 
 /// Largest change of a width in one step, as the logarithm of the ratio.
 const FARTHEST: f64 = 2.0;
@@ -30,20 +31,21 @@ impl StepScale {
     /// The scale of the parameter `free`, one of `all` of `records`.
     #[must_use]
     pub fn of(free: &Free, all: &[Free], records: &[Record]) -> Self {
-        let Some((record, Slot::Parameter(place))) = free.places.first().copied() else {
+        let Some((record, Slot::Parameter(Parameter::OfEffect { effect, place }))) =
+            free.places.first().copied()
+        else {
             return Self::Linear;
         };
-        let pendulum = &records[record].pendulum;
-        let Some((effect, own)) = pendulum.owner(place) else { return Self::Linear };
-        let parameters = pendulum.effects[effect].kind.definition().parameters;
+        let parameters = records[record].pendulum.effects[effect].kind.definition().parameters;
         let positive = |index: usize| parameters.at(index).range[0] > 0.0;
         let is_free = |index: usize| {
-            let slot = (record, Slot::Parameter(place - own + index));
+            let other = Parameter::OfEffect { effect, place: index };
+            let slot = (record, Slot::Parameter(other));
             all.iter().any(|free| free.places.contains(&slot))
         };
-        match own {
+        match place {
             0 if (1..parameters.count()).any(|k| positive(k) && is_free(k)) => Self::Size,
-            1.. if positive(own) => Self::Width,
+            1.. if positive(place) => Self::Width,
             _ => Self::Linear,
         }
     }

@@ -1,4 +1,4 @@
-//! A record cut into windows, each with its own initial state.
+//! A record divided into windows, each with its own initial state.
 
 use super::problem::Problem;
 use super::record::Record;
@@ -25,7 +25,7 @@ pub struct Window {
 
 /// Windows of about `length` of all records, one after the other, from the first sample that counts;
 /// none is longer than its record allows. `state` tells the state at a sample of a record.
-pub fn cut(
+pub fn windows_of(
     problem: &Problem,
     length: f64,
     mut state: impl FnMut(usize, usize) -> State,

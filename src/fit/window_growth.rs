@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::levenberg_marquardt::{Limit, Outcome, Point, descend};
 use super::problem::Problem;
 use super::single_window::{SingleWindow, fit_alone};
-use super::window::{Window, cut, guess, halves};
+use super::window::{Window, guess, halves, windows_of};
 use crate::error::Error;
 use crate::integrate::State;
 
@@ -96,7 +96,7 @@ pub fn fit(
         return widened(problem, settings, Limit { target: f64::INFINITY, ..last }, cancel);
     };
     let held = held(problem, settings);
-    let mut point = Point::new(problem, problem.start(), windows)?;
+    let mut point = Point::new(problem, problem.start(), windows).ok_or(Error::Diverges)?;
     let outcome = descend(problem, &mut point, &held, last, cancel)?;
     let Outcome { steps, converged, given_up, promised } = outcome;
     Ok(Fit { point, steps, stages: 1, converged, given_up, promised })
@@ -118,9 +118,9 @@ fn widened(
     let rough = Limit { gain: 0.1, part: 1e-3, ..last };
     let held = held(problem, settings);
     let mut length = settings.shortest.min(most);
-    let windows = cut(problem, length, |record, at| guess(&problem.records[record], at));
+    let windows = windows_of(problem, length, |record, at| guess(&problem.records[record], at));
     let windows = settled(problem, &problem.start(), windows, cancel)?;
-    let mut point = Point::new(problem, problem.start(), windows)?;
+    let mut point = Point::new(problem, problem.start(), windows).ok_or(Error::Diverges)?;
     let (mut steps, mut stages) = (0, 0);
     loop {
         let limit = if length < most { rough } else { last };
@@ -141,23 +141,14 @@ fn widened(
         if length > 0.6 * most {
             length = most;
         }
-        let windows = cut(problem, length, states(problem, &point));
+        let windows = windows_of(problem, length, states(problem, &point));
         // A curve that was good in parts may be lost as a whole: then the initial states are all
         // that is known.
-        point = match Point::new(problem, point.values.clone(), windows) {
-            Ok(next) => next,
-            Err(_) => {
-                let promised = f64::INFINITY;
-                return Ok(Fit {
-                    point,
-                    steps,
-                    stages,
-                    converged: false,
-                    given_up: false,
-                    promised,
-                });
-            }
+        let Some(next) = Point::new(problem, point.values.clone(), windows) else {
+            let (converged, given_up, promised) = (false, false, f64::INFINITY);
+            return Ok(Fit { point, steps, stages, converged, given_up, promised });
         };
+        point = next;
     }
 }
 
@@ -195,7 +186,7 @@ fn split(problem: &Problem, point: &Point, cancel: &AtomicBool) -> Result<Option
     if windows.len() == point.windows.len() {
         return Ok(None);
     }
-    Ok(Point::new(problem, point.values.clone(), windows).ok())
+    Ok(Point::new(problem, point.values.clone(), windows))
 }
 
 /// The windows with the initial states that fit best at fixed parameters, each by itself: a motion

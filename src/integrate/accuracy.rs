@@ -1,6 +1,7 @@
 //! The number of steps a period that a tolerance requires.
 
-use super::kernel::stroboscopic::{State, Strobe};
+use super::kernel::stroboscopic::Strobe;
+use super::states::{State, States};
 use crate::error::Error;
 use crate::lanes::InstructionSet;
 use crate::model::{Angle, Pendulum};
@@ -15,17 +16,19 @@ const MOST_STEPS: usize = 20_000;
 
 /// The error of `strobe` on `starts`: the 95th percentile of the distance that halving the step
 /// makes after five periods.
-/// Starts that leave the range of numbers on either side have an infinite error.
 /// Starts that leave the range of numbers on either side count as infinitely far.
 #[must_use]
 pub fn error_reached(strobe: &Strobe, starts: &[State]) -> f64 {
-    let coarse = after(strobe, starts);
-    let fine = after(&strobe.refined(2), starts);
+    let [coarse, fine] = [strobe, &strobe.refined(2)].map(|strobe| {
+        let mut states = States::from(starts);
+        strobe.advance(&mut states, PERIODS);
+        states
+    });
     let mut distances: Vec<f64> = coarse
         .iter()
-        .zip(&fine)
+        .zip(fine.iter())
         .map(|(a, b)| {
-            let d = strobe.angle.distance(*a, *b);
+            let d = strobe.angle.distance(a, b);
             if d.is_finite() { d } else { f64::INFINITY }
         })
         .collect();
@@ -44,15 +47,6 @@ pub fn distance(a: State, b: State) -> f64 {
 #[must_use]
 pub fn wrapped(angle: f64) -> f64 {
     Angle::Circle.wrapped(angle)
-}
-
-fn after(strobe: &Strobe, starts: &[State]) -> Vec<State> {
-    let mut theta: Vec<f64> = starts.iter().map(|s| s[0]).collect();
-    let mut velocity: Vec<f64> = starts.iter().map(|s| s[1]).collect();
-    let mut turns = vec![0.0; starts.len()];
-    // The three have one length, so this cannot fail.
-    let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, PERIODS);
-    theta.into_iter().zip(velocity).map(|(a, b)| [a, b]).collect()
 }
 
 /// The stroboscopic map with the fewest steps a period that reach `tol`, and the error reached.

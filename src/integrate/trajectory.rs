@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::accuracy::{PERIODS, TOLERANCES};
-use super::kernel::stroboscopic::State;
 use super::reference::event::{Event, EventKind};
 use super::reference::problem::{FINEST, OdeProblem};
 use super::reference::sample::{Sampled, sample};
+use super::states::State;
 use super::tangent::{Number, Tangent};
 use crate::error::Error;
 use crate::memory;
@@ -84,7 +84,7 @@ pub fn simulate(
     request: &Request,
     cancel: &AtomicBool,
 ) -> Result<Trajectory, Error> {
-    let run = simulate_watched(pendulum, request, &[], cancel, &mut |_, _| ())?;
+    let run = simulate_live(pendulum, request, &[], cancel, &mut |_, _| ())?;
     if cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(run) }
 }
 
@@ -95,7 +95,7 @@ pub fn simulate(
 ///
 /// # Errors
 /// Those of [`simulate`]; [`Error::Interrupted`] only before there is a sample.
-pub fn simulate_watched(
+pub fn simulate_live(
     pendulum: &Pendulum,
     request: &Request,
     times: &[f64],
@@ -258,7 +258,7 @@ impl Run {
         cancel: &AtomicBool,
         show: Show<'_>,
     ) -> Self {
-        let ode = OdeProblem::new(pendulum, true, tolerance, |_, value| value).watched();
+        let ode = OdeProblem::new(pendulum, true, tolerance, |_, value| value).finding_turns();
         sample(&ode, 0.0, request.start, times, |_, new| {
             show(&mut new.iter().copied());
             !cancel.load(Ordering::Relaxed)
@@ -275,7 +275,7 @@ impl Run {
         show: Show<'_>,
     ) -> (Self, Vec<f64>) {
         let constant = |_, value| Tangent::<f64, 1>::constant(value);
-        let ode = OdeProblem::new(pendulum, true, tolerance, constant).watched();
+        let ode = OdeProblem::new(pendulum, true, tolerance, constant).finding_turns();
         let start = request.start.map(|value| Tangent { value, slope: [FRAC_1_SQRT_2] });
         let (mut lengths, mut scale) = (vec![0.0], 0.0);
         let run = sample(&ode, 0.0, start, times, |driver, new| {

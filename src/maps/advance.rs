@@ -4,54 +4,49 @@ use rayon::prelude::*;
 
 use super::control::{Control, pool};
 use crate::error::Error;
-use crate::integrate::Strobe;
+use crate::integrate::{State, States, Strobe};
 use crate::memory;
 
 /// Starts per task: enough to fill any bundle many times.
 const BLOCK: usize = 1024;
 /// Periods between two checks of the control.
 const STRETCH: usize = 64;
-/// Bytes of a start: where it began and its turns.
-const EACH: usize = 24;
+/// Bytes of a start: its state and turns in a block, and in the result.
+const EACH: usize = 48;
 
-/// Advances every start by `periods` forcing periods, in place; the net turns come back.
+/// The states after `periods` forcing periods from `starts`, and the net turns until then.
 ///
 /// # Errors
-/// [`Error::Lengths`] if the slices differ in length, [`Error::NotMappable`] for effects that a map
-/// cannot have, [`Error::Memory`], [`Error::Interrupted`] after [`Control::cancel`].
+/// [`Error::NotMappable`] for effects that a map cannot have, [`Error::Memory`],
+/// [`Error::Interrupted`] after [`Control::cancel`].
 pub fn advance(
     strobe: &Strobe,
-    theta: &mut [f64],
-    velocity: &mut [f64],
+    starts: &[State],
     periods: usize,
     threads: usize,
     control: &Control,
-) -> Result<Vec<i64>, Error> {
-    if theta.len() != velocity.len() {
-        let given = (theta.len(), velocity.len());
-        return Err(Error::Lengths { given, names: ("theta", "velocity") });
-    }
+) -> Result<(States, Vec<i64>), Error> {
     strobe.pendulum.check_mappable()?;
-    memory::reckon("starts", theta.len(), EACH)?;
-    control.begin(theta.len());
-    let first = theta.to_vec();
-    let mut turns = vec![0.0; theta.len()];
-    pool(threads)?.install(|| {
-        theta
-            .par_chunks_mut(BLOCK)
-            .zip(velocity.par_chunks_mut(BLOCK))
-            .zip(turns.par_chunks_mut(BLOCK))
-            .try_for_each(|((theta, velocity), turns)| {
-                for begin in (0..periods).step_by(STRETCH) {
-                    control.check()?;
-                    strobe.advance(theta, velocity, turns, STRETCH.min(periods - begin))?;
-                }
-                control.add(theta.len());
-                Ok(())
-            })
-    })?;
-    let net = |((turns, end), start): ((f64, &f64), f64)| {
-        (turns + (end - start) / std::f64::consts::TAU).round() as i64
+    memory::reckon("starts", starts.len(), EACH)?;
+    control.begin(starts.len());
+    let block = |part: &[State]| {
+        let mut states = States::from(part);
+        for begin in (0..periods).step_by(STRETCH) {
+            control.check()?;
+            strobe.advance(&mut states, STRETCH.min(periods - begin));
+        }
+        control.add(part.len());
+        Ok(states)
     };
-    Ok(turns.into_iter().zip(theta.iter()).zip(first).map(net).collect())
+    let blocks: Vec<States> = pool(threads)?
+        .install(|| starts.par_chunks(BLOCK).map(block).collect::<Result<_, Error>>())?;
+    let mut ends = States::default();
+    for block in blocks {
+        ends.append(block);
+    }
+    let net = |((turns, end), start): ((&f64, &f64), &State)| {
+        (turns + (end - start[0]) / std::f64::consts::TAU).round() as i64
+    };
+    let turns = ends.turns().iter().zip(ends.theta()).zip(starts).map(net).collect();
+    Ok((ends, turns))
 }

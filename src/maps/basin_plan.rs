@@ -12,6 +12,7 @@ use super::control::Control;
 use super::finite_time::{FiniteTime, finite_time};
 use super::label::{Labels, UNDECIDED, label};
 use super::starts::Starts;
+use super::stored::{from_bytes, to_bytes};
 use crate::attractor::{Attractor, Catalogue, Effort};
 use crate::error::Error;
 use crate::integrate::{State, Strobe, accuracy};
@@ -147,17 +148,19 @@ impl Plan {
         let sample = starts.sampled_states(ERROR_SAMPLE, options.seed);
         let (strobe, reached_error) = accuracy::choose(pendulum, &sample, options.tol, simd)?;
         let searched = search_periods(&strobe, options.max_periods);
-        let mut catalogue = known.map_or_else(
-            || Catalogue::new(&strobe, Effort::THOROUGH),
-            |known| known.catalogue.continued(&strobe, searched, control.flag()),
-        );
+        let cancel = control.flag();
+        let mut catalogue = match known {
+            Some(known) => known.catalogue.continued(&strobe, searched, cancel)?,
+            None => Catalogue::new(&strobe, Effort::THOROUGH, cancel)?,
+        };
         catalogue.progress = control.shared();
         let seeds = starts.sampled_states(SEARCH_SAMPLE, options.seed);
-        let endings = catalogue.endings(&strobe, &seeds, searched, control.flag());
-        control.check()?;
+        let endings = catalogue.endings(&strobe, &seeds, searched, cancel)?;
         let labelling = if !pendulum.is_dissipative() {
             Labelling::Conservative
-        } else if catalogue.only_chaos().is_some() && catalogue.holds_all(&strobe, &endings) {
+        } else if catalogue.only_chaos().is_some()
+            && catalogue.holds_all(&strobe, &endings, cancel)?
+        {
             Labelling::OnlyChaos
         } else {
             Labelling::Basins
@@ -180,12 +183,9 @@ impl Plan {
     }
 
     /// The plan as bytes, for [`Plan::restored`].
-    ///
-    /// # Errors
-    /// [`Error::Stored`] if there is no room for them.
-    pub fn stored(&self) -> Result<Vec<u8>, Error> {
-        postcard::to_allocvec(&(&self.facts, &self.catalogue))
-            .map_err(|_| Error::Stored { what: "plan of a basin map" })
+    #[must_use]
+    pub fn stored(&self) -> Vec<u8> {
+        to_bytes(&(&self.facts, &self.catalogue))
     }
 
     /// The plan of `pendulum` that [`Plan::stored`] has written.
@@ -193,9 +193,7 @@ impl Plan {
     /// # Errors
     /// [`Error::Stored`] for bytes that are no plan; [`Error::Simd`].
     pub fn restored(pendulum: &Pendulum, bytes: &[u8]) -> Result<Self, Error> {
-        let read: (Facts, Catalogue) = postcard::from_bytes(bytes)
-            .map_err(|_| Error::Stored { what: "plan of a basin map" })?;
-        let (facts, catalogue) = read;
+        let (facts, catalogue): (Facts, Catalogue) = from_bytes("plan of a basin map", bytes)?;
         let strobe = Strobe::new(pendulum, facts.steps, InstructionSet::choose()?);
         Ok(Self { strobe, catalogue: catalogue.restored(pendulum), facts })
     }
@@ -256,7 +254,7 @@ impl Plan {
         let before: Vec<[u64; 2]> = self.catalogue.attractors.iter().map(Attractor::mark).collect();
         let searched = search_periods(&self.strobe, self.facts.given);
         self.catalogue.progress = control.shared();
-        if self.catalogue.search(&self.strobe, open, searched, control.flag()) {
+        if self.catalogue.search(&self.strobe, open, searched, control.flag())? {
             self.facts.bound = self.settling_bound().max(self.facts.bound);
         } else if self.facts.bound < self.most_periods() {
             // The remaining starts are integrated up to the whole bound.
@@ -264,7 +262,6 @@ impl Plan {
         } else {
             return Ok(None);
         }
-        control.check()?;
         let place = |mark| self.catalogue.attractors.iter().position(|a| a.mark() == mark);
         let moved = before.into_iter().map(|mark| place(mark).map_or(UNDECIDED, |i| i as i16 + 1));
         Ok(Some(moved.collect()))

@@ -9,7 +9,7 @@ use crate::attractor::Attractor;
 use crate::attractor::rest::standing;
 use crate::attractor::trap::Band;
 use crate::error::Error;
-use crate::integrate::{State, Strobe};
+use crate::integrate::{State, States, Strobe, TangentStates};
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
 use crate::orbit::rotation::running_states;
@@ -176,13 +176,12 @@ impl Follow<'_> {
             .collect();
         let rates = cell.found.iter().map(|f| -f.attractor.exponent).filter(|rate| *rate > 0.0);
         let slowest = rates.fold(f64::INFINITY, f64::min);
-        let least = cell.watched.max((ROUNDS * ROUND) as u32);
+        let least = cell.observed.max((ROUNDS * ROUND) as u32);
         let periods = decay_periods(&strobe.pendulum, slowest, least, self.bound) as usize;
         for round in 1..=periods.div_ceil(ROUND) {
             self.control.check()?;
-            step(strobe, state, ROUND);
-            let mut next = *state;
-            step(strobe, &mut next, 1);
+            *state = after(strobe, *state, ROUND);
+            let next = after(strobe, *state, 1);
             let arrived = |a: &Attractor| {
                 if a.is_held() {
                     let same = (state[0].cos() < 0.0) == (a.points[0][0].cos() < 0.0);
@@ -207,7 +206,7 @@ impl Follow<'_> {
         }
         let mut loose = Vec::with_capacity(KEPT);
         for _ in 0..KEPT {
-            step(strobe, state, 1);
+            *state = after(strobe, *state, 1);
             loose.push(*state);
         }
         Ok((None, loose))
@@ -217,21 +216,13 @@ impl Follow<'_> {
 /// The attractor without a period that a motion is nearest to on average: chaos, if the motion's exponent is nearer
 /// to that of the attractor than to 0, where a slow one has it; a quasi-periodic rotation within [`LIKE`].
 fn on_set(strobe: &Strobe, cell: &Cell, state: State) -> Option<usize> {
-    let (mut theta, mut velocity, mut turns) = ([state[0]], [state[1]], [0.0]);
-    let (mut along, mut across, mut growth) = ([1.0], [0.0], [0.0]);
+    let mut motion = TangentStates::along(&[state], [1.0, 0.0]);
     let mut points = Vec::with_capacity(KEPT);
     for _ in 0..KEPT {
-        // Lengths agree, so this cannot fail.
-        let _ = strobe.stretch(
-            (&mut theta, &mut velocity),
-            &mut turns,
-            (&mut along, &mut across),
-            &mut growth,
-            1,
-        );
-        points.push([theta[0], velocity[0]]);
+        strobe.stretch(&mut motion, 1);
+        points.push(motion.states().get(0));
     }
-    let exponent = growth[0] / (KEPT as f64 * strobe.pendulum.period());
+    let exponent = motion.growth()[0] / (KEPT as f64 * strobe.pendulum.period());
     let mean = |a: &Attractor| -> f64 {
         let nearest = |p: &State| {
             let away = a.points.iter().map(|q| a.angle.distance(*p, *q));
@@ -254,9 +245,9 @@ fn leading(cell: &Cell) -> Option<State> {
     found.attractor.points.first().copied()
 }
 
-fn step(strobe: &Strobe, state: &mut State, periods: usize) {
-    let (mut theta, mut velocity, mut turns) = ([state[0]], [state[1]], [0.0]);
-    // Lengths agree, so this cannot fail.
-    let _ = strobe.advance(&mut theta, &mut velocity, &mut turns, periods);
-    *state = [theta[0], velocity[0]];
+/// The state after `periods` forcing periods.
+fn after(strobe: &Strobe, state: State, periods: usize) -> State {
+    let mut states = States::from([state].as_slice());
+    strobe.advance(&mut states, periods);
+    states.get(0)
 }

@@ -60,7 +60,7 @@ pub fn settling_periods(pendulum: &Pendulum, rate: Option<f64>) -> u32 {
 
 /// Periods after which a search begins to observe uncaptured trajectories. A bound `given` for the starts is one for
 /// the search too, which no bound makes shorter than usual damping does, or than a million integration steps: what
-/// is called chaos is watched for as long.
+/// is called chaos is observed for as long.
 #[must_use]
 pub fn search_periods(strobe: &Strobe, given: Option<u32>) -> u32 {
     let least = (LEAST / SEARCHED).min(LEAST_STEPS / strobe.steps() as u32).max(1);
@@ -71,5 +71,5 @@ pub fn search_periods(strobe: &Strobe, given: Option<u32>) -> u32 {
 /// Periods without capture after which a trajectory is classified as chaotic.
 #[must_use]
 pub fn chaos_periods(strobe: &Strobe, given: Option<u32>) -> u32 {
-    search_periods(strobe, given) * (1 + Effort::THOROUGH.watch)
+    search_periods(strobe, given) * (1 + Effort::THOROUGH.observation)
 }

@@ -9,6 +9,7 @@ use super::bounds::cell_periods;
 use crate::attractor::attracting::{Alike, attracting};
 use crate::attractor::chaos::spread;
 use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
+use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::PeriodicOrbit;
@@ -41,7 +42,7 @@ pub struct Cell {
     /// Share of the starts that left the range of numbers.
     pub failed: f64,
     /// Periods within which no trap captured its chaotic trajectories; 0 without chaos.
-    pub watched: u32,
+    pub observed: u32,
     /// How each of its starts ended.
     ends: Vec<End>,
 }
@@ -83,30 +84,34 @@ pub struct Search {
 
 impl Search {
     /// The attractors of cell `number`: rests, orbits found from `hints`, and those of its starts.
-    #[must_use]
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn cell(
         &self,
         number: usize,
         strobe: &Strobe,
         hints: &[Hint],
         cancel: &AtomicBool,
-    ) -> Cell {
+    ) -> Result<Cell, Error> {
         if !strobe.pendulum.is_dissipative() {
             // Nothing attracts.
-            return Cell { open: 1.0, ..Cell::default() };
+            return Ok(Cell { open: 1.0, ..Cell::default() });
         }
-        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
-        let further = followed(&mut catalogue, strobe, hints, cancel);
+        let mut catalogue = Catalogue::new(strobe, Effort::BRISK, cancel)?;
+        let further = followed(&mut catalogue, strobe, hints, cancel)?;
         let mut starts: Vec<State> = self.starts_of(number).collect();
         starts.extend(further);
-        let endings = catalogue.endings(strobe, &starts, self.bound_of(strobe), cancel);
-        self.told(number, strobe, &catalogue, &endings)
+        let endings = catalogue.endings(strobe, &starts, self.bound_of(strobe), cancel)?;
+        self.told(number, strobe, &catalogue, &endings, cancel)
     }
 
     /// `cell` again, with further `hints`: starts that its orbits have captured stay there, the others go
     /// on from where they were. `None` if no orbit is new, and what starts from the hints is captured by known
     /// ones or joins chaos that is known.
-    #[must_use]
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` was set.
     pub fn again(
         &self,
         number: usize,
@@ -114,24 +119,24 @@ impl Search {
         cell: &Cell,
         hints: &[Hint],
         cancel: &AtomicBool,
-    ) -> Option<Cell> {
+    ) -> Result<Option<Cell>, Error> {
         if !strobe.pendulum.is_dissipative() {
-            return None;
+            return Ok(None);
         }
-        let mut catalogue = Catalogue::new(strobe, Effort::BRISK);
+        let mut catalogue = Catalogue::new(strobe, Effort::BRISK, cancel)?;
         catalogue.take_over_chaos(cell.found.iter().map(|f| &f.attractor));
         let own: Vec<Hint> = cell.found.iter().filter_map(|f| Hint::of(&f.attractor)).collect();
-        let restarts = followed(&mut catalogue, strobe, &own, cancel);
+        let restarts = followed(&mut catalogue, strobe, &own, cancel)?;
         let known = catalogue.attractors.len();
         let open = |states: Vec<State>| states.into_iter().map(Ending::Open).collect();
-        let mut further: Vec<Ending> = open(followed(&mut catalogue, strobe, hints, cancel));
+        let mut further: Vec<Ending> = open(followed(&mut catalogue, strobe, hints, cancel)?);
         let bound = self.bound_of(strobe);
-        catalogue.settle(strobe, &mut further, bound, cancel);
+        catalogue.settle(strobe, &mut further, bound, cancel)?;
         let gained = catalogue.attractors.len() > known;
         let ended = further.iter().all(|ending| !matches!(ending, Ending::Open(_)));
-        let joined = cell.watched > 0 && hints.iter().all(|hint| hint.n.is_some());
+        let joined = cell.observed > 0 && hints.iter().all(|hint| hint.n.is_some());
         if !gained && (ended || joined) {
-            return None;
+            return Ok(None);
         }
         let same = |old: &Attractor, new: &Attractor| {
             old.n.is_some() && old.kind == new.kind && new.passes(old.points[0], SAME)
@@ -149,11 +154,11 @@ impl Search {
             cell.ends.iter().zip(self.starts_of(number)).map(ending).collect();
         endings.extend(open(restarts));
         if gained {
-            catalogue.settle(strobe, &mut endings, bound, cancel);
+            catalogue.settle(strobe, &mut endings, bound, cancel)?;
         }
         endings.extend(further);
-        catalogue.watch(strobe, &mut endings, bound, cancel);
-        Some(self.told(number, strobe, &catalogue, &endings))
+        catalogue.observe(strobe, &mut endings, bound, cancel)?;
+        self.told(number, strobe, &catalogue, &endings, cancel).map(Some)
     }
 
     /// The starts of cell `number`.
@@ -209,13 +214,14 @@ impl Search {
         strobe: &Strobe,
         catalogue: &Catalogue,
         endings: &[Ending],
-    ) -> Cell {
+        cancel: &AtomicBool,
+    ) -> Result<Cell, Error> {
         let endings = &endings[..self.each];
         let open: Vec<State> = endings
             .iter()
             .filter_map(|e| if let Ending::Open(state) = e { Some(*state) } else { None })
             .collect();
-        let mut placed = catalogue.place(strobe, &open).into_iter();
+        let mut placed = catalogue.place(strobe, &open, cancel)?.into_iter();
         let at: HashMap<[u64; 2], usize> =
             catalogue.attractors.iter().enumerate().map(|(i, a)| (a.mark(), i)).collect();
         let mut counts = vec![0_usize; catalogue.attractors.len()];
@@ -249,9 +255,9 @@ impl Search {
                 Found { attractor, share: share(*count) }
             })
             .collect();
-        let watched = self.bound_of(strobe) * (1 + Effort::BRISK.watch);
-        let watched = if catalogue.has_chaos() { watched } else { 0 };
-        Cell { found, open: share(undecided), failed: share(failed), watched, ends }
+        let observed = self.bound_of(strobe) * (1 + Effort::BRISK.observation);
+        let observed = if catalogue.has_chaos() { observed } else { 0 };
+        Ok(Cell { found, open: share(undecided), failed: share(failed), observed, ends })
     }
 }
 
@@ -261,10 +267,10 @@ fn followed(
     strobe: &Strobe,
     hints: &[Hint],
     cancel: &AtomicBool,
-) -> Vec<State> {
-    let mut further = catalogue.take_over(strobe, &cycles(hints), cancel);
+) -> Result<Vec<State>, Error> {
+    let mut further = catalogue.take_over(strobe, &cycles(hints), cancel)?;
     further.extend(hints.iter().filter(|hint| hint.n.is_none()).flat_map(|h| &h.points));
-    further
+    Ok(further)
 }
 
 /// The points and periods of the periodic ones.

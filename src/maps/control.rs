@@ -1,9 +1,12 @@
 //! Progress and cancellation of a long computation, and its threads.
 
-use std::sync::Arc;
+use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
-use crate::error::Error;
+use rayon::ThreadPool;
+
+use crate::error::{Error, unless_cancelled};
 use crate::progress::Progress;
 
 /// Progress and cancellation, shared between threads.
@@ -50,7 +53,7 @@ impl Control {
     /// # Errors
     /// [`Error::Interrupted`] after [`Control::cancel`].
     pub fn check(&self) -> Result<(), Error> {
-        if self.cancel.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+        unless_cancelled(&self.cancel)
     }
 }
 
@@ -83,15 +86,34 @@ fn coprime(a: usize, b: usize) -> bool {
     if b == 0 { a == 1 } else { coprime(b, a % b) }
 }
 
-/// Largest number of workers; more only wait for one another.
+/// Largest number of workers, of a call and of all idle pools together; more only wait for one another.
 const MOST_THREADS: usize = 256;
 
-/// A pool of `threads` workers; 0 means one for each processor. It lives as long as the call that made
-/// it: a child of the process has none of its parent's threads, and would wait for them.
+/// A pool that no call uses.
+struct Idle {
+    /// Its process: a child of the process has none of its parent's threads, and would wait for them.
+    process: u32,
+    /// The number of workers requested; 0 for one for each processor.
+    threads: usize,
+    pool: ThreadPool,
+}
+
+/// Idle pools, kept for later calls. The lock is only tried: a child of the process may have got it locked.
+static IDLE: Mutex<Vec<Idle>> = Mutex::new(Vec::new());
+
+/// The workers of one call; when it has ended they are kept for another one of as many.
+#[derive(Debug)]
+pub struct Workers {
+    threads: usize,
+    /// There until it is dropped.
+    pool: Option<ThreadPool>,
+}
+
+/// The `threads` workers of a call; 0 means one for each processor. Calls at the same time have their own.
 ///
 /// # Errors
 /// [`Error::Range`] above 256, [`Error::Threads`] if the system refuses.
-pub fn pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
+pub fn pool(threads: usize) -> Result<Workers, Error> {
     if threads > MOST_THREADS {
         let value = threads as f64;
         return Err(Error::Range {
@@ -100,8 +122,43 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool, Error> {
             allowed: "a whole number from 1 to 256",
         });
     }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Error::Threads(e.to_string()))
+    let pool = match idle(threads) {
+        Some(pool) => pool,
+        None => rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| Error::Threads(e.to_string()))?,
+    };
+    Ok(Workers { threads, pool: Some(pool) })
+}
+
+/// Takes an idle pool of this process.
+fn idle(threads: usize) -> Option<ThreadPool> {
+    // Whoever holds the lock: without it a pool is built.
+    let mut idle = IDLE.try_lock().ok()?;
+    let process = std::process::id();
+    let place = idle.iter().position(|one| (one.process, one.threads) == (process, threads))?;
+    Some(idle.swap_remove(place).pool)
+}
+
+impl Deref for Workers {
+    type Target = ThreadPool;
+
+    fn deref(&self) -> &ThreadPool {
+        self.pool.as_ref().expect("it is there until it is dropped")
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        let Some(pool) = self.pool.take() else { return };
+        // Whoever holds the lock: without it the threads of this pool end.
+        let Ok(mut idle) = IDLE.try_lock() else { return };
+        let process = std::process::id();
+        let all = idle.iter().filter(|one| one.process == process);
+        let workers: usize = all.map(|one| one.pool.current_num_threads()).sum();
+        if workers + pool.current_num_threads() <= MOST_THREADS {
+            idle.push(Idle { process, threads: self.threads, pool });
+        }
+    }
 }

@@ -1,11 +1,13 @@
 //! Layers of a map without basins: turns and stretching over a fixed time.
 
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
 use rayon::prelude::*;
 
 use super::control::Control;
 use super::starts::Starts;
 use crate::error::Error;
-use crate::integrate::Strobe;
+use crate::integrate::{State, Strobe, TangentStates};
 
 /// Starts per task.
 const BLOCK: usize = 4096;
@@ -41,28 +43,17 @@ pub fn finite_time(
         turns.par_chunks_mut(BLOCK).zip(exponent.par_chunks_mut(BLOCK)).enumerate().try_for_each(
             |(block, (turns, exponent))| {
                 let size = turns.len();
-                let states = (0..size).map(|i| starts.get(block * BLOCK + i));
-                let (mut theta, mut velocity): (Vec<f64>, Vec<f64>) =
-                    states.map(|[a, b]| (a, b)).unzip();
-                let first = theta.clone();
-                let part = std::f64::consts::FRAC_1_SQRT_2;
-                let mut tangents = (vec![part; size], vec![part; size]);
-                let (mut whole, mut growth) = (vec![0.0; size], vec![0.0; size]);
+                let first: Vec<State> = (0..size).map(|i| starts.get(block * BLOCK + i)).collect();
+                let mut all = TangentStates::along(&first, [FRAC_1_SQRT_2; 2]);
                 for _ in 0..periods {
                     control.check()?;
-                    let tangents = (&mut tangents.0[..], &mut tangents.1[..]);
-                    strobe.stretch(
-                        (&mut theta, &mut velocity),
-                        &mut whole,
-                        tangents,
-                        &mut growth,
-                        1,
-                    )?;
+                    strobe.stretch(&mut all, 1);
                 }
+                let ends = all.states();
                 for i in 0..size {
-                    let net = whole[i] + (theta[i] - first[i]) / std::f64::consts::TAU;
+                    let net = ends.turns()[i] + (ends.theta()[i] - first[i][0]) / TAU;
                     turns[i] = net.round() as i32;
-                    exponent[i] = (growth[i] / time) as f32;
+                    exponent[i] = (all.growth()[i] / time) as f32;
                 }
                 control.add(size);
                 Ok(())

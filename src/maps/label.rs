@@ -1,6 +1,5 @@
 //! Assignment of every start to the attractor that captures it, on all threads.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicI16, AtomicI32, AtomicUsize, Ordering};
 
 use super::control::{Control, Spread};
@@ -87,7 +86,6 @@ struct Shared<'a> {
     label: Vec<AtomicI16>,
     settle: Vec<AtomicI32>,
     turns: Vec<AtomicI32>,
-    open: Mutex<Vec<(usize, State)>>,
 }
 
 impl Shared<'_> {
@@ -106,8 +104,8 @@ struct Worker<'a> {
     lot: Vec<(usize, State)>,
     open: Vec<(usize, State)>,
     work: u64,
-    /// Whether memory for open trajectories was lacking.
-    full: Option<Error>,
+    /// The first error of a lot.
+    failed: Option<Error>,
 }
 
 impl Source for Worker<'_> {
@@ -143,28 +141,29 @@ impl Source for Worker<'_> {
         shared.turns[index].store(turns, Ordering::Relaxed);
         self.work += u64::from(outcome.work);
         shared.control.add(1);
-        if self.lot.len() >= LOT {
-            self.sort_lot();
+        if self.lot.len() >= LOT
+            && let Err(error) = self.sort_lot()
+        {
+            self.failed.get_or_insert(error);
         }
     }
 }
 
 impl Worker<'_> {
     /// Assigns the open trajectories of the lot to the chaotic attractors on which they stay.
-    fn sort_lot(&mut self) {
-        let Shared { catalogue, strobe, label, .. } = self.shared;
+    fn sort_lot(&mut self) -> Result<(), Error> {
+        let Shared { catalogue, strobe, label, control, .. } = self.shared;
         let lot = std::mem::take(&mut self.lot);
-        if let Err(error) = memory::room("starts", &mut self.open, lot.len()) {
-            self.full = Some(error);
-            return;
-        }
+        memory::room("starts", &mut self.open, lot.len())?;
         let states: Vec<State> = lot.iter().map(|(_, state)| *state).collect();
-        for ((index, state), home) in lot.into_iter().zip(catalogue.homes(strobe, &states)) {
-            match home {
+        let sets = catalogue.chaos_of(strobe, &states, control.flag())?;
+        for ((index, state), set) in lot.into_iter().zip(sets) {
+            match set {
                 Some(attractor) => label[index].store(attractor as i16 + 1, Ordering::Relaxed),
                 None => self.open.push((index, state)),
             }
         }
+        Ok(())
     }
 }
 
@@ -197,32 +196,28 @@ pub fn label(
         label: (0..count).map(|_| AtomicI16::new(UNDECIDED)).collect(),
         settle: (0..count).map(|_| AtomicI32::new(NEVER)).collect(),
         turns: (0..count).map(|_| AtomicI32::new(0)).collect(),
-        open: Mutex::new(Vec::new()),
     };
     control.begin(count);
-    let work: Result<Vec<u64>, Error> = pool
-        .broadcast(|_| {
-            let mut worker = Worker {
-                shared: &shared,
-                range: 0..0,
-                lot: Vec::new(),
-                open: Vec::new(),
-                work: 0,
-                full: None,
-            };
-            capture::run(strobe, &catalogue.traps, bound, control.flag(), &mut worker);
-            worker.sort_lot();
-            if let Ok(mut open) = shared.open.lock() {
-                memory::room("starts", &mut open, worker.open.len())?;
-                open.append(&mut worker.open);
-            }
-            worker.full.map_or(Ok(worker.work), Err)
-        })
-        .into_iter()
-        .collect();
-    let work = work?.into_iter().sum();
-    control.check()?;
-    let mut open = shared.open.into_inner().unwrap_or_default();
+    let workers = pool.broadcast(|_| {
+        let mut worker = Worker {
+            shared: &shared,
+            range: 0..0,
+            lot: Vec::new(),
+            open: Vec::new(),
+            work: 0,
+            failed: None,
+        };
+        capture::run(strobe, &catalogue.traps, bound, control.flag(), &mut worker)?;
+        worker.sort_lot()?;
+        worker.failed.map_or(Ok((worker.work, worker.open)), Err)
+    });
+    let (mut work, mut open) = (0, Vec::new());
+    for worker in workers {
+        let (periods, mut left) = worker?;
+        work += periods;
+        memory::room("starts", &mut open, left.len())?;
+        open.append(&mut left);
+    }
     open.sort_by_key(|(index, _)| *index);
     Ok(Labels {
         label: shared.label.into_iter().map(AtomicI16::into_inner).collect(),

@@ -164,24 +164,23 @@ impl Run<'_> {
     ) -> Result<(), Error> {
         let pendulum = &self.strobe.pendulum;
         let searched = search_periods(self.strobe, max_periods);
-        let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH);
+        let cancel = self.control.flag();
+        let mut catalogue = Catalogue::new(self.strobe, Effort::THOROUGH, cancel)?;
         catalogue.progress = self.control.shared();
-        catalogue.search(self.strobe, seeds, searched, self.control.flag());
-        self.control.check()?;
+        catalogue.search(self.strobe, seeds, searched, cancel)?;
         let (mut fate, mut periods) = self.follow(trajectory, &catalogue, result.bound)?;
-        let mut home = self.home(trajectory, &catalogue, fate);
-        if fate == Fate::Open && home.is_none() {
+        let mut set = self.chaos_of(trajectory, &catalogue, fate)?;
+        if fate == Fate::Open && set.is_none() {
             // An attractor that the search has not found: it is repeated from the present state.
             let here: Vec<State> = trajectory.states.last().copied().into_iter().collect();
-            catalogue.search(self.strobe, &here, searched, self.control.flag());
-            self.control.check()?;
+            catalogue.search(self.strobe, &here, searched, cancel)?;
             if max_periods.is_none() {
                 result.bound = settling_periods(pendulum, catalogue.slowest());
             }
             (fate, periods) = self.follow(trajectory, &catalogue, result.bound)?;
-            home = self.home(trajectory, &catalogue, fate);
+            set = self.chaos_of(trajectory, &catalogue, fate)?;
         }
-        if let (Fate::Open, Some(index)) = (fate, home) {
+        if let (Fate::Open, Some(index)) = (fate, set) {
             let chaos = catalogue.attractors[index].clone();
             let per_period = chaos.exponent * self.strobe.pendulum.period();
             let apart = (APART - NEAR.ln()) / per_period;
@@ -228,8 +227,8 @@ impl Run<'_> {
             let to = (looked + STRETCH).min(bound);
             trajectory.extend(self.strobe, to, self.pool, self.control)?;
             let states = &trajectory.states[looked..to];
-            let found = outcomes(self.strobe, &catalogue.traps, AT_ONCE, states, flag);
-            for (k, end) in found.ok_or(Error::Interrupted)?.iter().enumerate() {
+            let ends = outcomes(self.strobe, &catalogue.traps, AT_ONCE, states, flag)?;
+            for (k, end) in ends.iter().enumerate() {
                 if end.fate != Fate::Open {
                     return Ok((end.fate, (looked + k) as u32 + end.periods));
                 }
@@ -240,17 +239,18 @@ impl Run<'_> {
     }
 
     /// The chaotic attractor that an unsettled trajectory stays on.
-    fn home(
+    fn chaos_of(
         &self,
         trajectory: &TangentTrajectory,
         catalogue: &Catalogue,
         fate: Fate,
-    ) -> Option<usize> {
+    ) -> Result<Option<usize>, Error> {
         let last: Vec<State> = trajectory.states.last().copied().into_iter().collect();
         if fate != Fate::Open {
-            return None;
+            return Ok(None);
         }
-        catalogue.homes(self.strobe, &last).into_iter().next().flatten()
+        let sets = catalogue.chaos_of(self.strobe, &last, self.control.flag())?;
+        Ok(sets.into_iter().next().flatten())
     }
 
     /// Number of the `ends` of an ensemble that are captured: by known attractors, or by those that
@@ -271,10 +271,9 @@ impl Run<'_> {
             .collect();
         if !suspects.is_empty() {
             let searched = search_periods(self.strobe, None);
-            catalogue.search(self.strobe, &suspects, searched, self.control.flag());
+            catalogue.search(self.strobe, &suspects, searched, self.control.flag())?;
         }
-        let found = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag());
-        let found = found.ok_or(Error::Interrupted)?;
-        Ok(found.iter().filter(|o| o.fate != Fate::Open).count())
+        let outcomes = outcomes(self.strobe, &catalogue.traps, TAKEN, ends, self.control.flag())?;
+        Ok(outcomes.iter().filter(|o| o.fate != Fate::Open).count())
     }
 }

@@ -16,6 +16,7 @@
 //!   under a torque
 //! - [`advance`]: plain integration of many starts
 //! - [`bounds`]: the number of periods within which a trajectory must settle
+//! - `stored`: plans and blocks as bytes
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
@@ -40,6 +41,7 @@ pub mod parameter_map;
 pub mod reliability;
 pub mod resolution;
 pub mod starts;
+mod stored;
 pub mod survey;
 pub mod tangent_growth;
 pub mod tongues;

@@ -147,7 +147,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
 }
 
 /// A start during the iteration.
-struct Walker {
+struct Iteration {
     first: State,
     point: State,
     least: f64,
@@ -164,20 +164,20 @@ pub(super) fn approach(
     reach: f64,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<State>, Error> {
-    let walker = |start: &State| Walker {
+    let begun = |start: &State| Iteration {
         first: *start,
         point: *start,
         least: f64::INFINITY,
         best: *start,
         begun_at: f64::INFINITY,
     };
-    let mut walkers: Vec<Walker> = starts.iter().map(walker).collect();
+    let mut iterations: Vec<Iteration> = starts.iter().map(begun).collect();
     let mut arrived: Vec<State> = Vec::new();
     for iteration in 0..ITERATIONS {
-        if walkers.is_empty() {
+        if iterations.is_empty() {
             break;
         }
-        let nodes: Vec<State> = walkers
+        let nodes: Vec<State> = iterations
             .iter()
             .flat_map(|w| {
                 let [x, y] = w.point;
@@ -186,7 +186,7 @@ pub(super) fn approach(
             .collect();
         let values = field(&nodes)?;
         let mut on = Vec::new();
-        for (mut w, values) in walkers.into_iter().zip(values.chunks_exact(3)) {
+        for (mut w, values) in iterations.into_iter().zip(values.chunks_exact(3)) {
             let [at, right, above] = [values[0], values[1], values[2]].map(Vector2::from);
             let size = at.norm();
             if iteration == 0 {
@@ -206,16 +206,16 @@ pub(super) fn approach(
             let Some(step) = slope.lu().solve(&-at) else { continue };
             let damped = (LONGEST_STEP / step.norm()).min(1.0);
             w.point = [w.point[0] + damped * step[0], w.point[1] + damped * step[1]];
-            let way = (w.point[0] - w.first[0]).hypot(w.point[1] - w.first[1]);
+            let travel = (w.point[0] - w.first[0]).hypot(w.point[1] - w.first[1]);
             // False too if the step is not a number.
-            if way <= reach {
+            if travel <= reach {
                 on.push(w);
             }
         }
-        walkers = on;
+        iterations = on;
     }
     // Close to a zero and slow: branches meet there.
-    arrived.extend(walkers.iter().map(|w| w.best));
+    arrived.extend(iterations.iter().map(|w| w.best));
     let mut seen = HashSet::new();
     arrived.retain(|point| seen.insert(point.map(|x| (x / SAME).round() as i64)));
     Ok(arrived)

@@ -199,12 +199,9 @@ fn beginnings(
     let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, InstructionSet::choose()?)?;
     // The displacement is the total one, of which the turns are net.
     let displacements = |from: &[State]| -> Result<Vec<State>, Error> {
-        let mut theta: Vec<f64> = from.iter().map(|s| s[0]).collect();
-        let mut velocity: Vec<f64> = from.iter().map(|s| s[1]).collect();
-        let (n, threads) = (request.n, request.threads);
-        let turns = advance(&strobe, &mut theta, &mut velocity, n, threads, control)?;
-        let ends = theta.iter().zip(&velocity).zip(turns);
-        let gap = |(start, ((theta, velocity), turns)): (&State, ((&f64, &f64), i64))| {
+        let (ends, turns) = advance(&strobe, from, request.n, request.threads, control)?;
+        let ends = ends.to_vec().into_iter().zip(turns);
+        let gap = |(start, ([theta, velocity], turns)): (&State, (State, i64))| {
             let rest = strobe.angle.wrapped(theta - start[0]);
             [(turns - request.w) as f64 * TAU + rest, velocity - start[1]]
         };

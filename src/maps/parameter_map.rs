@@ -10,21 +10,20 @@ use super::resolution::Resolution;
 use super::survey::{Block, Survey};
 use crate::error::Error;
 use crate::integrate::State;
-use crate::model::Pendulum;
+use crate::model::{Parameter, Pendulum};
 
 /// Places along a curve in the space of the parameters.
 #[derive(Clone, Debug, Default)]
 pub struct Range {
-    /// Indices in [`Pendulum::parameters`], each with its value at every place; without any there is one place,
-    /// the pendulum itself.
-    pub parameters: Vec<(usize, Vec<f64>)>,
+    /// Each with its value at every place; without any there is one place, the pendulum itself.
+    pub parameters: Vec<(Parameter, Vec<f64>)>,
 }
 
 impl Range {
     /// One parameter and the values that it takes.
     #[must_use]
-    pub fn of(index: usize, values: Vec<f64>) -> Self {
-        Self { parameters: vec![(index, values)] }
+    pub fn of(parameter: Parameter, values: Vec<f64>) -> Self {
+        Self { parameters: vec![(parameter, values)] }
     }
 
     /// The number of places.
@@ -100,13 +99,13 @@ impl Plane<'_> {
         let mut pendulum = self.base.clone();
         let [i, j] = self.place(cell);
         let [columns, rows] = self.axes;
-        for (index, values) in &columns.parameters {
-            pendulum.set_parameter(*index, values[i]);
+        for (parameter, values) in &columns.parameters {
+            pendulum.set(*parameter, values[i]);
         }
-        for (index, values) in &rows.parameters {
-            let other = columns.parameters.iter().find(|(known, _)| known == index);
+        for (parameter, values) in &rows.parameters {
+            let other = columns.parameters.iter().find(|(known, _)| known == parameter);
             let factor = other.map_or(1.0, |(_, values)| values[i]);
-            pendulum.set_parameter(*index, factor * values[j]);
+            pendulum.set(*parameter, factor * values[j]);
         }
         pendulum
     }

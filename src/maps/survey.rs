@@ -14,6 +14,7 @@ use super::control::Control;
 use super::parameter_map::{ParameterMap, Plane, Request};
 use super::resolution::Resolution;
 use super::starts::Starts;
+use super::stored::{from_bytes, to_bytes};
 use crate::error::Error;
 use crate::integrate::Strobe;
 use crate::lanes::InstructionSet;
@@ -75,9 +76,8 @@ impl Survey {
     /// Those of [`Survey::new`], and [`Error::Stored`] for other bytes.
     pub fn restored(base: &Pendulum, request: &Request, state: &[u8]) -> Result<Self, Error> {
         Self::with(base, request, |plane, simd| {
-            let stored: Option<Resolution> = postcard::from_bytes(state).ok();
-            let resolution = stored.and_then(|stored| stored.restored(plane, simd));
-            resolution.ok_or(Error::Stored { what: "state" })
+            let stored: Resolution = from_bytes("state", state)?;
+            stored.restored(plane, simd).ok_or(Error::Stored { what: "state" })
         })
     }
 
@@ -103,7 +103,7 @@ impl Survey {
     /// The measured steps, for [`Survey::restored`].
     #[must_use]
     pub fn state(&self) -> Vec<u8> {
-        stored(&self.resolution)
+        to_bytes(&self.resolution)
     }
 
     /// The bound of its request.
@@ -191,7 +191,7 @@ impl Survey {
                 let around = plane.neighbours(cell, stride, true);
                 let others = around.iter().filter_map(|other| hinted(*other));
                 let hints = Cell::hints(others, strobe.pendulum.is_mirror_symmetric());
-                let found = self.search.cell(cell, &strobe, &hints, control.flag());
+                let found = self.search.cell(cell, &strobe, &hints, control.flag())?;
                 control.add(1);
                 Ok((at, found))
             };
@@ -206,7 +206,6 @@ impl Survey {
             }
             stride /= 2;
         }
-        control.check()?;
         let cells: Vec<Cell> = found.into_iter().flatten().collect();
         Ok(Block { gained: vec![0; cells.len()], cells, searched_again: 0 })
     }
@@ -247,12 +246,11 @@ impl Survey {
                 return Ok(None);
             }
             let again = self.search.again(cell, &strobe, &old.cells[at], &lacking, control.flag());
-            let Some(found) = again else { return Ok(None) };
+            let Some(found) = again? else { return Ok(None) };
             Ok(Some((at, found.has_more_than(&old.cells[at], symmetric), found)))
         };
         let all = (0..own.len()).into_par_iter().filter_map(|at| one(at).transpose());
         let again: Vec<(usize, bool, Cell)> = all.collect::<Result<_, Error>>()?;
-        control.check()?;
         if again.is_empty() {
             return Ok(None);
         }
@@ -290,10 +288,10 @@ impl Survey {
     /// # Errors
     /// [`Error::Stored`] if they are not those of this block of the survey.
     pub fn block(&self, block: usize, bytes: &[u8]) -> Result<Block, Error> {
-        let found: Option<Block> = postcard::from_bytes(bytes).ok();
+        let stored: Block = from_bytes("block", bytes)?;
         let count = self.cells(block).len();
-        let fits = |b: &Block| b.cells.len() == count && b.gained.len() == count;
-        found.filter(fits).ok_or(Error::Stored { what: "block" })
+        let fits = stored.cells.len() == count && stored.gained.len() == count;
+        if fits { Ok(stored) } else { Err(Error::Stored { what: "block" }) }
     }
 }
 
@@ -301,7 +299,7 @@ impl Block {
     /// Its bytes, for [`Survey::block`].
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        stored(self)
+        to_bytes(self)
     }
 
     /// Whether a cell may give others something new after a pass.
@@ -316,9 +314,4 @@ impl Block {
     pub fn gained(&self, pass: usize) -> bool {
         (0..self.cells.len()).any(|at| self.gained_in(pass, at))
     }
-}
-
-/// The bytes of a value.
-fn stored(value: &impl Serialize) -> Vec<u8> {
-    postcard::to_allocvec(value).unwrap_or_else(|_| unreachable!("a vector takes any bytes"))
 }

@@ -1,53 +1,35 @@
 //! Growth of tangents along many trajectories, on all threads, window by window.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use rayon::prelude::*;
 
 use super::control::Control;
 use crate::error::Error;
-use crate::integrate::{State, Strobe};
+use crate::integrate::{State, Strobe, TangentStates};
 use crate::memory;
 
 /// Trajectories per task.
 const BLOCK: usize = 32;
 
-/// Trajectories with a tangent each.
+/// Trajectories with a tangent each, in blocks of one task.
 #[derive(Clone, Debug)]
 pub struct Bundle {
-    theta: Vec<f64>,
-    velocity: Vec<f64>,
-    turns: Vec<f64>,
-    tangents: (Vec<f64>, Vec<f64>),
+    blocks: Vec<TangentStates>,
 }
 
 impl Bundle {
     /// The bundle at these states, every tangent along `(1, 1)/sqrt 2`.
     #[must_use]
     pub fn new(states: &[State]) -> Self {
-        let part = vec![std::f64::consts::FRAC_1_SQRT_2; states.len()];
-        Self {
-            theta: states.iter().map(|s| s[0]).collect(),
-            velocity: states.iter().map(|s| s[1]).collect(),
-            turns: vec![0.0; states.len()],
-            tangents: (part.clone(), part),
-        }
-    }
-
-    /// Number of trajectories.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.theta.len()
-    }
-
-    /// Whether it is empty.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.theta.is_empty()
+        let block = |states: &[State]| TangentStates::along(states, [FRAC_1_SQRT_2; 2]);
+        Self { blocks: states.chunks(BLOCK).map(block).collect() }
     }
 
     /// The present states, angles in [-pi, pi].
     #[must_use]
     pub fn states(&self) -> Vec<State> {
-        self.theta.iter().zip(&self.velocity).map(|(a, b)| [*a, *b]).collect()
+        self.blocks.iter().flat_map(|block| block.states().iter()).collect()
     }
 
     /// Advances `windows` times by `window` periods; returns the natural logarithms of the growth
@@ -65,34 +47,24 @@ impl Bundle {
         pool: &rayon::ThreadPool,
         control: &Control,
     ) -> Result<Vec<Vec<f64>>, Error> {
-        let parts = self
-            .theta
-            .par_chunks_mut(BLOCK)
-            .zip(self.velocity.par_chunks_mut(BLOCK))
-            .zip(self.turns.par_chunks_mut(BLOCK))
-            .zip(self.tangents.0.par_chunks_mut(BLOCK))
-            .zip(self.tangents.1.par_chunks_mut(BLOCK));
-        let rows: Result<Vec<Vec<Vec<f64>>>, Error> = pool.install(|| {
-            parts
-                .map(|((((theta, velocity), turns), across), along)| {
-                    let count = theta.len();
-                    let mut rows = vec![Vec::with_capacity(windows); count];
-                    for _ in 0..windows {
-                        control.check()?;
-                        let mut growth = vec![0.0; count];
-                        let states = (&mut *theta, &mut *velocity);
-                        let tangents = (&mut *across, &mut *along);
-                        strobe.stretch(states, turns, tangents, &mut growth, window)?;
-                        for (row, gain) in rows.iter_mut().zip(growth) {
-                            row.push(gain);
-                        }
-                    }
-                    control.add(count);
-                    Ok(rows)
-                })
-                .collect()
-        });
-        Ok(rows?.into_iter().flatten().collect())
+        let rows = |block: &mut TangentStates| {
+            let count = block.states().len();
+            let mut rows = vec![Vec::with_capacity(windows); count];
+            for _ in 0..windows {
+                control.check()?;
+                block.reset_growth();
+                strobe.stretch(block, window);
+                for (row, gain) in rows.iter_mut().zip(block.growth()) {
+                    row.push(*gain);
+                }
+            }
+            control.add(count);
+            Ok(rows)
+        };
+        let blocks = self.blocks.par_iter_mut();
+        let all: Vec<Vec<Vec<f64>>> =
+            pool.install(|| blocks.map(rows).collect::<Result<_, Error>>())?;
+        Ok(all.into_iter().flatten().collect())
     }
 }
 

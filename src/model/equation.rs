@@ -17,6 +17,7 @@ use std::sync::Arc;
 use super::drive::Motion;
 use super::effects::{Action, Kind, MOST_PARAMETERS, Mappable, Point};
 use super::formula::Formula;
+use super::parameter::Parameter;
 use super::pendulum::Pendulum;
 use crate::lanes::Real;
 use crate::lanes::sine::{Degree, Fine};
@@ -90,19 +91,10 @@ impl Forcing<f64> {
 }
 
 impl<R: Real> Equation<R> {
-    /// The equation of `pendulum`; `number` makes a number of parameter `index`
-    /// ([`Pendulum::parameters`] lists them) and its value.
-    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
-        let mut index = 0;
-        let mut next = |value: f64| {
-            index += 1;
-            number(index - 1, value)
-        };
-        let gamma = next(pendulum.gamma);
-        let theta_r = next(pendulum.theta_r);
-        let torque = next(pendulum.torque);
-        let (p, omega) = (next(pendulum.drive.p), next(pendulum.drive.omega));
-        let phase = next(pendulum.drive.phase);
+    /// The equation of `pendulum`; `number` makes a number of a parameter and its value.
+    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(Parameter, f64) -> R) -> Self {
+        let [gamma, theta_r, torque, p, omega, phase] =
+            Parameter::COMMON.map(|parameter| number(parameter, pendulum.value(parameter)));
         let zero = gamma.like(0.0);
         let mut motion = Motion {
             p,
@@ -120,8 +112,8 @@ impl<R: Real> Equation<R> {
         let mut holds = [false; 2];
         let (mut corner, mut mode, mut keepers) = (None, None, [None, None]);
         let probe = Point::nowhere(zero);
-        for effect in &pendulum.effects {
-            let parameters = effect.lift(&mut next);
+        for (index, effect) in pendulum.effects.iter().enumerate() {
+            let parameters = effect.lift(index, &mut number);
             if effect.kind.switch(&parameters, &probe).is_some() {
                 corner = Some((effect.kind.clone(), parameters));
             }

@@ -2,6 +2,7 @@
 //! ignore it.
 
 use super::effects::{Action, Kind, MOST_PARAMETERS};
+use super::parameter::Parameter;
 use super::pendulum::Pendulum;
 use crate::lanes::Real;
 
@@ -12,21 +13,14 @@ pub struct Observation<R> {
 }
 
 impl<R: Real> Observation<R> {
-    /// The observation of `pendulum`; `number` makes a number of parameter `index` ([`Pendulum::parameters`] lists
-    /// them) and its value, as for [`Equation::lift`](super::Equation::lift).
-    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(usize, f64) -> R) -> Self {
-        let mut first = Pendulum::OWN_PARAMETERS;
+    /// The observation of `pendulum`; `number` makes a number of a parameter and its value, as for
+    /// [`Equation::lift`](super::Equation::lift).
+    pub fn lift(pendulum: &Pendulum, mut number: impl FnMut(Parameter, f64) -> R) -> Self {
         let mut readings = Vec::new();
-        for effect in &pendulum.effects {
+        for (index, effect) in pendulum.effects.iter().enumerate() {
             if effect.is(&[Action::Reading]) {
-                let mut index = first;
-                let parameters = effect.lift(|value| {
-                    index += 1;
-                    number(index - 1, value)
-                });
-                readings.push((effect.kind.clone(), parameters));
+                readings.push((effect.kind.clone(), effect.lift(index, &mut number)));
             }
-            first += effect.values().len();
         }
         Self { readings }
     }

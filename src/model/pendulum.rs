@@ -7,6 +7,7 @@ use super::drive::{HarmonicDrive, Motion};
 use super::effects::law::NOT_PERIODIC;
 use super::effects::{Action, Effect, Kind, Mappable, Role};
 use super::equation::Equation;
+use super::parameter::Parameter;
 use crate::error::Error;
 
 /// The parametrically excited pendulum, nondimensional, with the equation of motion [`Equation`].
@@ -47,9 +48,6 @@ pub enum Route {
 }
 
 impl Pendulum {
-    /// Number of parameters in addition to those of its effects.
-    pub const OWN_PARAMETERS: usize = 6;
-
     /// Without friction and effects. Checks the ranges: all finite, gamma not negative, omega
     /// positive.
     ///
@@ -88,17 +86,17 @@ impl Pendulum {
     /// [`Error::Twice`] if it is there already.
     pub fn with_effect(mut self, effect: Effect) -> Result<Self, Error> {
         let name = effect.kind.definition().name.to_owned();
-        let place = match effect.kind {
-            Kind::ViscousDamping => Some(("gamma", &mut self.gamma)),
-            Kind::CoulombFriction => Some(("theta_r", &mut self.theta_r)),
-            Kind::BiasTorque => Some(("torque", &mut self.torque)),
+        let same = match effect.kind {
+            Kind::ViscousDamping => Some(Parameter::Gamma),
+            Kind::CoulombFriction => Some(Parameter::ThetaR),
+            Kind::BiasTorque => Some(Parameter::Torque),
             _ => None,
         };
-        if let Some((other, slot)) = place {
-            if *slot != 0.0 {
-                return Err(Error::Twice { name, other: other.to_owned() });
+        if let Some(parameter) = same {
+            if self.value(parameter) != 0.0 {
+                return Err(Error::Twice { name, other: self.name_of(parameter) });
             }
-            *slot = effect.parameters[0];
+            self.set(parameter, effect.parameters[0]);
             return Ok(self);
         }
         let several = effect.kind == Kind::BearingHarmonic;
@@ -119,74 +117,6 @@ impl Pendulum {
     #[must_use]
     pub fn equation(&self) -> Equation<f64> {
         Equation::lift(self, |_, value| value)
-    }
-
-    /// The names and values of all parameters, in the order in which [`Equation::lift`] asks for
-    /// them.
-    #[must_use]
-    pub fn parameters(&self) -> Vec<(String, f64)> {
-        let own: [_; Self::OWN_PARAMETERS] = [
-            ("gamma", self.gamma),
-            ("theta_r", self.theta_r),
-            ("torque", self.torque),
-            ("p", self.drive.p),
-            ("omega", self.drive.omega),
-            ("phase", self.drive.phase),
-        ];
-        let mut all: Vec<(String, f64)> = own.map(|(name, value)| (name.to_owned(), value)).into();
-        for effect in &self.effects {
-            let definition = effect.kind.definition();
-            all.extend(definition.parameters.iter().zip(effect.values()).map(
-                |(parameter, value)| (format!("{}.{}", definition.name, parameter.name), *value),
-            ));
-        }
-        all
-    }
-
-    /// The place of a parameter in [`Pendulum::parameters`], the first of that name.
-    ///
-    /// # Errors
-    /// [`Error::NoParameter`] if it has none of that name.
-    pub fn place(&self, name: &str) -> Result<usize, Error> {
-        let place = self.parameters().iter().position(|(known, _)| known == name);
-        place.ok_or_else(|| Error::NoParameter { name: name.to_owned() })
-    }
-
-    /// Sets the parameter of that place in [`Pendulum::parameters`], without a check: a fit passes
-    /// through values that no pendulum has.
-    ///
-    /// # Panics
-    /// If there is no such place.
-    pub fn set_parameter(&mut self, index: usize, value: f64) {
-        let own = match index {
-            0 => Some(&mut self.gamma),
-            1 => Some(&mut self.theta_r),
-            2 => Some(&mut self.torque),
-            3 => Some(&mut self.drive.p),
-            4 => Some(&mut self.drive.omega),
-            5 => Some(&mut self.drive.phase),
-            _ => None,
-        };
-        if let Some(slot) = own {
-            *slot = value;
-            return;
-        }
-        let (effect, parameter) = self.owner(index).expect("a place in the list of parameters");
-        self.effects[effect].parameters[parameter] = value;
-    }
-
-    /// The effect, and the place among its parameters, of parameter `index`; nothing where it is the
-    /// pendulum's own, or none.
-    #[must_use]
-    pub fn owner(&self, index: usize) -> Option<(usize, usize)> {
-        let mut place = index.checked_sub(Self::OWN_PARAMETERS)?;
-        for (which, effect) in self.effects.iter().enumerate() {
-            if place < effect.values().len() {
-                return Some((which, place));
-            }
-            place -= effect.values().len();
-        }
-        None
     }
 
     /// The acceleration `th''` at time `tau`, with the sense of `velocity` unchanged for a long

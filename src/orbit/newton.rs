@@ -159,8 +159,8 @@ fn least_gap(derivative: &Matrix2<f64>) -> f64 {
     RESIDUAL.max(ROUNDING * derivative.norm())
 }
 
-/// A start of Newton's method on its way.
-struct Way {
+/// The iteration of Newton's method from one start.
+struct Iteration {
     start: State,
     n: usize,
     point: State,
@@ -178,30 +178,34 @@ fn polish(
     reach: f64,
     known: &[State],
 ) -> Vec<Option<(State, usize)>> {
-    let way = |(start, n): &(State, usize)| {
+    let begun = |(start, n): &(State, usize)| {
         let start = [map.angle.wrapped(start[0]), start[1]];
-        Way { start, n: *n, point: start, first: f64::INFINITY, best: None }
+        Iteration { start, n: *n, point: start, first: f64::INFINITY, best: None }
     };
-    let mut ways: Vec<Way> = starts.iter().map(way).collect();
-    let mut going: Vec<usize> = (0..ways.len()).collect();
+    let mut iterations: Vec<Iteration> = starts.iter().map(begun).collect();
+    let mut going: Vec<usize> = (0..iterations.len()).collect();
     for iteration in 0..ITERATIONS {
-        let points: Vec<_> = going.iter().map(|k| (ways[*k].point, ways[*k].n)).collect();
+        let points: Vec<_> =
+            going.iter().map(|k| (iterations[*k].point, iterations[*k].n)).collect();
         let images = map.iterate_all(&points);
         let mut images = images.iter();
         going.retain(|k| {
-            images.next().is_some_and(|image| ways[*k].step(map, image, iteration, reach, known))
+            images
+                .next()
+                .is_some_and(|image| iterations[*k].step(map, image, iteration, reach, known))
         });
         if going.is_empty() {
             break;
         }
     }
-    let converged =
-        |way: Way| way.best.filter(|(least, _)| *least < 1.0).map(|(_, point)| (point, way.n));
-    ways.into_iter().map(converged).collect()
+    let converged = |one: Iteration| {
+        one.best.filter(|(least, _)| *least < 1.0).map(|(_, point)| (point, one.n))
+    };
+    iterations.into_iter().map(converged).collect()
 }
 
-impl Way {
-    /// Steps on from the image of the point; false at the end of the way.
+impl Iteration {
+    /// Steps on from the image of the point; false where the iteration ends.
     fn step(
         &mut self,
         map: &PoincareMap,
@@ -256,7 +260,7 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
     let mut points = Vec::with_capacity(n);
     let mut derivatives = Vec::with_capacity(n);
     let mut products = Vec::with_capacity(n);
-    let mut way = 0.0;
+    let mut travel = 0.0;
     let mut state = first;
     for _ in 0..n {
         points.push(state);
@@ -264,10 +268,10 @@ fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> 
         derivatives.push(image.derivative);
         products.push(image.product);
         // Not only by the turns removed: a point at pi may come back at -pi.
-        way += image.turns as f64 * TAU + image.state[0] - state[0];
+        travel += image.turns as f64 * TAU + image.state[0] - state[0];
         state = image.state;
     }
-    let w = (way / TAU).round() as i64;
+    let w = (travel / TAU).round() as i64;
     let residual = map.gap(first, state).norm();
     if n == 1
         && first[1].abs() < SAME_POINT

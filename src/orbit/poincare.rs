@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::integrate::reference::flow::Flow;
 use crate::integrate::tangent::Tangent;
-use crate::integrate::{Moving, Schedule, State, Strobe};
+use crate::integrate::{Moving, Schedule, State, Strobe, TangentStates};
 use crate::lanes::sine::Fine;
 use crate::model::pendulum::Route;
 use crate::model::{Angle, Pendulum};
@@ -22,13 +22,13 @@ pub struct PoincareMap {
     pub pendulum: Pendulum,
     /// Topology of its angle.
     pub angle: Angle,
-    way: Way,
+    integrator: Integrator,
 }
 
 /// Equal steps where gravity, drive, torque and viscous damping are all; else the integrator for any
 /// model; or the steps of a strobe.
 #[derive(Clone, Debug)]
-enum Way {
+enum Integrator {
     Plain(Schedule),
     Any(Box<Flow>),
     Lanes(Box<Strobe>),
@@ -53,33 +53,33 @@ impl PoincareMap {
     #[must_use]
     pub fn new(pendulum: &Pendulum) -> Self {
         let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_load();
-        let way = if plain {
+        let integrator = if plain {
             let pull = pendulum.greatest_pull().sqrt();
             let steps = (pendulum.period() * pull / STEP).ceil() as usize;
-            Way::Plain(Schedule::period(pendulum, steps.max(32)))
+            Integrator::Plain(Schedule::period(pendulum, steps.max(32)))
         } else {
-            Way::Any(Box::new(Flow::new(pendulum)))
+            Integrator::Any(Box::new(Flow::new(pendulum)))
         };
-        Self { pendulum: pendulum.clone(), angle: pendulum.angle(), way }
+        Self { pendulum: pendulum.clone(), angle: pendulum.angle(), integrator }
     }
 
     /// The map of `strobe`'s steps, with the same precision and speed.
     #[must_use]
     pub fn of_steps(strobe: &Strobe) -> Self {
-        let way = Way::Lanes(Box::new(strobe.clone()));
-        Self { pendulum: strobe.pendulum.clone(), angle: strobe.angle, way }
+        let integrator = Integrator::Lanes(Box::new(strobe.clone()));
+        Self { pendulum: strobe.pendulum.clone(), angle: strobe.angle, integrator }
     }
 
     /// Advances by one period.
     #[must_use]
     pub fn once(&self, state: State) -> Image {
-        let flow_of = match &self.way {
-            Way::Plain(schedule) => {
+        let flow_of = match &self.integrator {
+            Integrator::Plain(schedule) => {
                 let shrinking = (-self.pendulum.gamma * self.pendulum.period()).exp();
                 return Image { product: Some(shrinking), ..flow(self.angle, schedule, state) };
             }
-            Way::Any(flow_of) => flow_of,
-            Way::Lanes(strobe) => return stretched(strobe, &[state])[0],
+            Integrator::Any(flow_of) => flow_of,
+            Integrator::Lanes(strobe) => return stretched(strobe, &[state])[0],
         };
         let arrival = flow_of.carry(state, 0.0, self.pendulum.period());
         let [[a, b], [c, d]] = arrival.derivative;
@@ -100,8 +100,8 @@ impl PoincareMap {
 
     /// Advances several states by one period.
     fn once_all(&self, states: &[State]) -> Vec<Image> {
-        match &self.way {
-            Way::Lanes(strobe) => stretched(strobe, states),
+        match &self.integrator {
+            Integrator::Lanes(strobe) => stretched(strobe, states),
             _ => states.iter().map(|state| self.once(*state)).collect(),
         }
     }
@@ -141,34 +141,25 @@ impl PoincareMap {
 
 /// Advances each state by one period of `strobe`, with a lane for each column of the derivative.
 fn stretched(strobe: &Strobe, states: &[State]) -> Vec<Image> {
-    let twice = |part: usize| -> Vec<f64> { states.iter().flat_map(|s| [s[part]; 2]).collect() };
-    let (mut theta, mut velocity) = (twice(0), twice(1));
-    let (mut turns, mut growth) = (vec![0.0; theta.len()], vec![0.0; theta.len()]);
-    let (mut along, mut across) =
-        ([1.0, 0.0].repeat(states.len()), [0.0, 1.0].repeat(states.len()));
-    // Lengths agree, so this cannot fail.
-    let _ = strobe.stretch(
-        (&mut theta, &mut velocity),
-        &mut turns,
-        (&mut along, &mut across),
-        &mut growth,
-        1,
-    );
+    let both = |state: &State| [(*state, [1.0, 0.0]), (*state, [0.0, 1.0])];
+    let mut all: TangentStates = states.iter().flat_map(both).collect();
+    strobe.stretch(&mut all, 1);
     let image = |i: usize| {
-        let size = [growth[i], growth[i + 1]].map(f64::exp);
+        let size = [i, i + 1].map(|k| all.growth()[k].exp());
+        let [along, across] = [i, i + 1].map(|k| all.tangent(k));
         Image {
-            state: [theta[i], velocity[i]],
-            turns: turns[i] as i64,
+            state: all.states().get(i),
+            turns: all.states().turns()[i] as i64,
             derivative: Matrix2::new(
-                along[i] * size[0],
-                along[i + 1] * size[1],
-                across[i] * size[0],
-                across[i + 1] * size[1],
+                along[0] * size[0],
+                across[0] * size[1],
+                along[1] * size[0],
+                across[1] * size[1],
             ),
             product: None,
         }
     };
-    (0..theta.len()).step_by(2).map(image).collect()
+    (0..all.states().len()).step_by(2).map(image).collect()
 }
 
 /// A schedule's flow with its derivative.

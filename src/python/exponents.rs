@@ -9,7 +9,7 @@ use pendmap::maps::tangent_growth::Bundle;
 use pyo3::prelude::*;
 
 use super::convert::{Array, Attractor, array, states};
-use super::long_calls::watched;
+use super::long_calls::interruptible;
 use super::model::Model;
 use super::motion::strobe;
 use super::{raise, reckon};
@@ -86,7 +86,7 @@ pub fn lyapunov(
     let start = [start.0, start.1];
     let request = Request { start, precision, tol, max_periods, threads, seed };
     let found =
-        watched(py, progress.as_ref(), |control| exponent_of(&pendulum, &request, control))?;
+        interruptible(py, progress.as_ref(), |control| exponent_of(&pendulum, &request, control))?;
     let ensemble = found.ensemble;
     let mut attractor = found.attractor;
     if let (Some(attractor), Some(ensemble), End::Chaotic) = (&mut attractor, &ensemble, found.end)
@@ -139,7 +139,7 @@ pub fn growth<'py>(
     // A row of windows for each start, and the array of all.
     reckon("starts", states.len(), 16 * windows.saturating_add(8))?;
     let pool = pool(threads).map_err(raise)?;
-    let rows = watched(py, progress.as_ref(), |control| {
+    let rows = interruptible(py, progress.as_ref(), |control| {
         control.begin(states.len());
         Bundle::new(&states).grow(&strobe, windows, window, &pool, control)
     })?;

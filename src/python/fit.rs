@@ -140,7 +140,9 @@ fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<P
         let slot = match (name.as_str(), pendulum) {
             ("bias", _) => Slot::Bias,
             ("tilt", _) => Slot::Tilt,
-            (name, Some(pendulum)) if name != "gravity" => Slot::Parameter(pendulum.place(name)?),
+            (name, Some(pendulum)) if name != "gravity" => {
+                Slot::Parameter(pendulum.parameter(name)?)
+            }
             _ => Slot::Gravity,
         };
         Ok((*record, slot))

@@ -16,7 +16,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 
 /// Runs `work` on another thread and waits for it, detached from the interpreter; at every
 /// pause it checks for signals and calls `progress(done, total)`.
-pub fn watched<T: Send>(
+pub fn interruptible<T: Send>(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&Control) -> Result<T, Error> + Send,
@@ -29,18 +29,17 @@ pub fn watched<T: Send>(
     stop.map_or_else(|| result.map_err(raise), Err)
 }
 
-/// Like [`watched`], in a pool of this call's own: threads of an earlier call would be missing in a
-/// forked child, and work given to them would never finish.
+/// Like [`interruptible`], on as many workers.
 pub fn pooled<T: Send>(
     py: Python<'_>,
     threads: usize,
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&Control) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
-    watched(py, progress, |control| pool(threads)?.install(|| work(control)))
+    interruptible(py, progress, |control| pool(threads)?.install(|| work(control)))
 }
 
-/// Like [`watched`] with any action at every pause; returns the result of `work`, and the signal or
+/// Like [`interruptible`] with any action at every pause; returns the result of `work`, and the signal or
 /// error of `report` that stopped it.
 pub fn stopped<T: Send>(
     py: Python<'_>,
@@ -50,18 +49,18 @@ pub fn stopped<T: Send>(
     let control = Control::default();
     py.detach(|| {
         thread::scope(|scope| {
-            let (sender, receiver) = channel();
+            let (sender, ended) = channel::<()>();
             let shared = &control;
             let task = move || {
-                // The receiver waits until this arrives, so it is still there.
-                let _ = sender.send(work(shared));
+                // Dropped at the end, however the work ends.
+                let _sender = sender;
+                work(shared)
             };
             let begun = thread::Builder::new().spawn_scoped(scope, task);
-            begun.map_err(|why| raise(Error::Threads(why.to_string())))?;
+            let worker = begun.map_err(|why| raise(Error::Threads(why.to_string())))?;
             let mut stop: Option<PyErr> = None;
             loop {
-                match receiver.recv_timeout(PAUSE) {
-                    Ok(result) => return Ok((result, stop)),
+                match ended.recv_timeout(PAUSE) {
                     Err(RecvTimeoutError::Timeout) if stop.is_none() => {
                         let look = Python::attach(|py| {
                             py.check_signals()?;
@@ -73,11 +72,11 @@ pub fn stopped<T: Send>(
                         }
                     }
                     Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => {
-                        return Err(PyRuntimeError::new_err("a worker thread ended unexpectedly"));
-                    }
+                    Ok(()) | Err(RecvTimeoutError::Disconnected) => break,
                 }
             }
+            let unexpected = |_| PyRuntimeError::new_err("a worker thread ended unexpectedly");
+            Ok((worker.join().map_err(unexpected)?, stop))
         })
     })
 }

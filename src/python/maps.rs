@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::convert::{Array, Attractor, array, states};
-use super::long_calls::watched;
+use super::long_calls::interruptible;
 use super::model::Model;
 use super::raise;
 
@@ -188,7 +188,7 @@ impl BasinPlan {
         let known = near.map(|near| near.plan.clone());
         let plan = match state {
             Some(bytes) => Plan::restored(&pendulum, bytes).map_err(raise)?,
-            None => watched(py, progress.as_ref(), |control| match known {
+            None => interruptible(py, progress.as_ref(), |control| match known {
                 Some(known) => known.continued(&pendulum, &starts, &options, control),
                 None => Plan::new(&pendulum, &starts, &options, control),
             })?,
@@ -198,8 +198,8 @@ impl BasinPlan {
 
     /// The plan as bytes.
     #[getter]
-    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.plan.stored().map_err(raise)?))
+    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.plan.stored())
     }
 
     /// `basins`, `conservative` or `only_chaos`.
@@ -259,9 +259,10 @@ impl BasinPlan {
         if first > last || last > self.starts.len() {
             return Err(PyIndexError::new_err("starts beyond the last one"));
         }
-        let (labels, layers) = watched(py, progress.as_ref(), |control| {
+        let (labels, layers) = interruptible(py, progress.as_ref(), |control| {
             let states = (first..last).map(|i| self.starts.get(i)).collect();
-            self.plan.cells(&Starts::List(states), &pool(self.threads)?, control)
+            let pool = pool(self.threads)?;
+            self.plan.cells(&Starts::List(states), &pool, control)
         })?;
         Ok(LabelledStarts::new(py, labels, layers))
     }
@@ -274,7 +275,7 @@ impl BasinPlan {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(LabelledStarts, Texture)> {
         let Self { plan, starts, threads, .. } = self;
-        let (labels, layers, found) = watched(py, progress.as_ref(), |control| {
+        let (labels, layers, found) = interruptible(py, progress.as_ref(), |control| {
             let pool = pool(*threads)?;
             let (labels, layers) = ends(plan, starts, &pool, control)?;
             let found = match starts {
@@ -301,8 +302,9 @@ impl BasinPlan {
         if picks.iter().any(|k| *k >= self.starts.len()) {
             return Err(PyIndexError::new_err("starts beyond the last one"));
         }
-        let labels = watched(py, progress.as_ref(), |control| {
-            self.plan.label(&self.starts, Some(&picks), &pool(self.threads)?, control)
+        let labels = interruptible(py, progress.as_ref(), |control| {
+            let pool = pool(self.threads)?;
+            self.plan.label(&self.starts, Some(&picks), &pool, control)
         })?;
         Ok(LabelledStarts::new(py, labels, None))
     }
@@ -317,7 +319,7 @@ impl BasinPlan {
     ) -> PyResult<Option<Array<i16>>> {
         let states = states(&theta, &velocity)?;
         let plan = &mut self.plan;
-        let moved = watched(py, None, |control| plan.further(&states, control))?;
+        let moved = interruptible(py, None, |control| plan.further(&states, control))?;
         Ok(moved.map(|moved| array(py, moved)))
     }
 
@@ -333,8 +335,9 @@ impl BasinPlan {
         labels: PyReadonlyArray1<'_, i16>,
     ) -> PyResult<Reliability> {
         let own = labels.as_slice()?.to_vec();
-        let found = watched(py, None, |control| {
-            reliability(&self.plan, &self.starts, &own, self.seed, &pool(self.threads)?, control)
+        let found = interruptible(py, None, |control| {
+            let pool = pool(self.threads)?;
+            reliability(&self.plan, &self.starts, &own, self.seed, &pool, control)
         })?;
         Ok(Reliability {
             unreliable: found.either,
@@ -356,7 +359,7 @@ impl BasinPlan {
             return Ok(None);
         }
         let thinned = Thinned { labels: labels.as_slice()?.to_vec(), columns };
-        let Uncertain { eps, uncertain, tried } = watched(py, None, |control| {
+        let Uncertain { eps, uncertain, tried } = interruptible(py, None, |control| {
             let pool = pool(self.threads)?;
             uncertainty([theta, velocity], &thinned, self.seed, |states| {
                 Ok(self.plan.label(&Starts::List(states), None, &pool, control)?.label)
@@ -410,8 +413,9 @@ impl TextureSum {
     fn add(&mut self, py: Python<'_>, labels: PyReadonlyArray1<'_, i16>) -> PyResult<()> {
         let cells = labels.as_slice()?.to_vec();
         let sum = &mut self.0;
-        watched(py, None, |_| {
-            sum.add(&cells, &pool(0)?);
+        interruptible(py, None, |_| {
+            let pool = pool(0)?;
+            sum.add(&cells, &pool);
             Ok(())
         })
     }

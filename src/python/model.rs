@@ -101,7 +101,7 @@ impl GivenParameter {
 
 /// The range of parameters of a pendulum, each with as many values.
 pub fn range(pendulum: &Pendulum, along: Vec<(String, Vec<f64>)>) -> PyResult<Range> {
-    let one = |(name, values): (String, Vec<f64>)| Ok((pendulum.place(&name)?, values));
+    let one = |(name, values): (String, Vec<f64>)| Ok((pendulum.parameter(&name)?, values));
     let parameters =
         along.into_iter().map(one).collect::<Result<Vec<_>, Error>>().map_err(raise)?;
     let found = Range { parameters };

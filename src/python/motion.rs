@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use super::convert::{Array, array, states};
-use super::long_calls::{stopped, watched};
+use super::long_calls::{interruptible, stopped};
 use super::model::Model;
 use super::raise;
 
@@ -109,11 +109,11 @@ pub fn advance<'py>(
 ) -> PyResult<Advanced<'py>> {
     let pendulum = model.pendulum()?;
     let strobe = strobe(&pendulum, steps_per_period)?;
-    let mut theta = theta.as_slice()?.to_vec();
-    let mut velocity = velocity.as_slice()?.to_vec();
-    let turns = watched(py, progress.as_ref(), |control| {
-        advance_all(&strobe, &mut theta, &mut velocity, periods, threads, control)
+    let starts = states(&theta, &velocity)?;
+    let (ends, turns) = interruptible(py, progress.as_ref(), |control| {
+        advance_all(&strobe, &starts, periods, threads, control)
     })?;
+    let [theta, velocity] = [ends.theta(), ends.velocity()].map(<[f64]>::to_vec);
     Ok((theta.into_pyarray(py), velocity.into_pyarray(py), turns.into_pyarray(py)))
 }
 
@@ -191,8 +191,8 @@ pub fn simulate(
     let pendulum = model.pendulum()?;
     let request = Request { start: [start.0, start.1], until, tol, samples, lyapunov };
     let Some(live) = live else {
-        let run = watched(py, None, |control| {
-            let run = trajectory::simulate_watched(
+        let run = interruptible(py, None, |control| {
+            let run = trajectory::simulate_live(
                 &pendulum,
                 &request,
                 &times,
@@ -204,7 +204,7 @@ pub fn simulate(
         return Ok(Trajectory::new(py, run));
     };
     let seen = Mutex::new([Vec::new(), Vec::new(), Vec::new()]);
-    let hand_over = |py: Python<'_>| {
+    let deliver = |py: Python<'_>| {
         let [times, angles, velocities] =
             take(&mut *seen.lock().expect("no panic while it is held"));
         if times.is_empty() {
@@ -221,15 +221,13 @@ pub fn simulate(
     };
     let (result, stop) = stopped(
         py,
-        |py, _| hand_over(py),
-        |control| {
-            trajectory::simulate_watched(&pendulum, &request, &times, control.flag(), &mut see)
-        },
+        |py, _| deliver(py),
+        |control| trajectory::simulate_live(&pendulum, &request, &times, control.flag(), &mut see),
     )?;
     if let Some(error) = stop.filter(|e| !e.is_instance_of::<PyKeyboardInterrupt>(py)) {
         return Err(error);
     }
     let run = result.map_err(raise)?;
-    hand_over(py)?;
+    deliver(py)?;
     Ok(Trajectory::new(py, run))
 }

@@ -10,7 +10,7 @@ use pendmap::orbit::{PoincareMap, newton};
 use pyo3::prelude::*;
 
 use super::convert::Attractor;
-use super::long_calls::watched;
+use super::long_calls::interruptible;
 use super::maps::{AxisTuple, axes};
 use super::model::Model;
 use super::raise;
@@ -49,7 +49,8 @@ pub fn orbits(
     let pendulum = model.pendulum()?;
     let [theta, velocity] = axes(theta, velocity)?;
     let request = Request { n: winding.0, w: winding.1, theta, velocity, threads };
-    let found = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
+    let found =
+        interruptible(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     let closed = found.closed.iter().map(|orbit| attractor::Attractor::periodic(&pendulum, orbit));
     let all: Vec<attractor::Attractor> =
         closed.chain(found.running.iter().map(attractor::Attractor::running)).collect();

@@ -10,7 +10,7 @@ use pendmap::maps::parameter_map::{self as maps, Request, parameter_map as searc
 use pyo3::prelude::*;
 
 use super::convert::{Array, array, states};
-use super::long_calls::watched;
+use super::long_calls::interruptible;
 use super::model::{Model, range};
 use super::raise;
 
@@ -89,7 +89,7 @@ impl ParameterMap {
             share: number(&|f| f.share),
             undecided: array(py, cells.clone().map(|cell| cell.open).collect()),
             failed: array(py, cells.clone().map(|cell| cell.failed).collect()),
-            chaos_periods: array(py, cells.map(|cell| cell.watched).collect()),
+            chaos_periods: array(py, cells.map(|cell| cell.observed).collect()),
             reached_error: map.resolution.reached_error,
             searched_again: map.searched_again,
             simd: InstructionSet::choose().map_err(raise)?.name(),
@@ -129,7 +129,8 @@ impl Followed {
 /// The names of a model's parameters, in the order of their places.
 #[pyfunction]
 pub fn parameter_names(model: Model) -> PyResult<Vec<String>> {
-    Ok(model.pendulum()?.parameters().into_iter().map(|(name, _)| name).collect())
+    let pendulum = model.pendulum()?;
+    Ok(pendulum.parameters().into_iter().map(|one| pendulum.name_of(one)).collect())
 }
 
 /// The attractors over a plane of two parameters: columns over all attractors of all cells, and over cells.
@@ -159,7 +160,7 @@ pub fn parameter_map(
         kept: HINTED,
         threads,
     };
-    let map = watched(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
+    let map = interruptible(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     ParameterMap::new(py, &map)
 }
 
@@ -191,7 +192,7 @@ pub fn bifurcation(
         bound,
         threads,
     };
-    let found = watched(py, progress.as_ref(), |control| {
+    let found = interruptible(py, progress.as_ref(), |control| {
         diagram::bifurcation(&pendulum, &request, control)
     })?;
     Bifurcation::of(py, &found)

@@ -4,7 +4,7 @@ use pendmap::error::Error;
 use pendmap::maps::tongues::{Balance, Critical, tongues as search};
 use pyo3::prelude::*;
 
-use super::long_calls::watched;
+use super::long_calls::interruptible;
 use super::model::Model;
 
 /// Critical amplitudes of the drive at one frequency, ascending.
@@ -49,7 +49,7 @@ pub fn tongues(
 ) -> PyResult<Vec<CriticalAmplitudes>> {
     let pendulum = model.pendulum()?;
     let balance = if inverted { Balance::Inverted } else { Balance::Hanging };
-    let found = watched(py, progress.as_ref(), |control| {
+    let found = interruptible(py, progress.as_ref(), |control| {
         match search(&pendulum, balance, &omegas, p_max, folds, threads, control) {
             Err(Error::NoRest { .. }) if inverted => Ok(None),
             found => found.map(Some),

@@ -45,7 +45,7 @@ fn trajectories_that_leave_their_region_form_no_set() {
         let (effort, cancel) = (Effort::THOROUGH, AtomicBool::new(false));
         let traps = Traps::default();
         let runs = observed(&strobe, &traps, &states, 200, &effort, &cancel).expect("runs");
-        let found = sets(&strobe, &traps, &[], runs, 200, &effort, &cancel);
+        let found = sets(&strobe, &traps, &[], runs, 200, &effort, &cancel).expect("sets");
         assert!(found.is_empty(), "{simd}");
     }
 }

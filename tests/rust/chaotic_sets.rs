@@ -4,19 +4,18 @@
 use std::f64::consts::{PI, TAU};
 
 use pendmap::attractor::{Attractor, Kind};
-use pendmap::integrate::State;
-use pendmap::integrate::Strobe;
+use pendmap::integrate::{State, Strobe};
 use pendmap::maps::basins::{BasinMap, Labelling};
 use pendmap::maps::bifurcation::{Request, bifurcation};
 use pendmap::maps::cell::{Cell, Search};
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::Range;
+use pendmap::model::Parameter;
 
 use crate::support::{basins_on_plane, driven, instruction_sets, plane, spread};
 
 /// Steps a period of the integration in this file.
 const STEPS: usize = 200;
-const P: usize = 3;
 
 /// `theta'' + 0.1 theta' + (1 + p cos(omega tau)) sin theta = 0`.
 struct Own {
@@ -136,7 +135,8 @@ fn searched_from(own: &Own, number: usize) -> Cell {
     let starts = plane(1000).sampled_states(9 * (number + 1), 1);
     let search = Search { starts, each: 9, bound: None, kept: 64 };
     let strobe = Strobe::new(&driven(0.1, own.p, own.omega), 40, instruction_sets()[0]);
-    search.cell(number, &strobe, &[], Control::default().flag())
+    let control = Control::default();
+    search.cell(number, &strobe, &[], control.flag()).expect("a cell")
 }
 
 fn searched(own: &Own) -> Cell {
@@ -162,7 +162,7 @@ fn chaotic_attractors_do_not_depend_on_the_starts() {
 fn libration_chaos_is_followed_to_its_crisis() {
     let values: Vec<f64> = (0..16).map(|k| 1.3413 + 0.0001 * f64::from(k)).collect();
     let request = Request {
-        axis: Range::of(P, values.clone()),
+        axis: Range::of(Parameter::P, values.clone()),
         starts: plane(1000).sampled_states(549, 1),
         each: 9,
         first: None,
@@ -184,7 +184,7 @@ fn libration_chaos_is_followed_to_its_crisis() {
         if !expected {
             continue;
         }
-        assert!(cell.watched > 1000, "p = {p}: {} periods", cell.watched);
+        assert!(cell.observed > 1000, "p = {p}: {} periods", cell.observed);
     }
 }
 

@@ -9,7 +9,7 @@ use pendmap::integrate::tangent::Tangent;
 use pendmap::model::effects::{
     Action, Definition, Family, Group, MOST_PARAMETERS, Mappable, Parameter, Power, Role,
 };
-use pendmap::model::{Effect, Equation, Kind, Observation, Pendulum};
+use pendmap::model::{self, Effect, Equation, Kind, Observation, Pendulum};
 
 use crate::support::{driven, spread};
 
@@ -251,7 +251,7 @@ fn readings_follow_one_another_in_order() {
 }
 
 /// Number of derivatives, at least the effect's: its pendulum's parameters, angle and velocity.
-const MOST: usize = Pendulum::OWN_PARAMETERS + MOST_PARAMETERS + 2;
+const MOST: usize = model::Parameter::COMMON.len() + MOST_PARAMETERS + 2;
 pub type Dual = Tangent<f64, MOST>;
 
 /// Acceleration and reading, with derivatives if `R` has them.
@@ -265,26 +265,34 @@ pub fn evaluated(
         Some((which, h)) if which == index => value + h,
         _ => value,
     };
-    let count = pendulum.parameters().len();
-    let equation = Equation::lift(pendulum, change);
+    let all = pendulum.parameters();
+    let place =
+        |one: model::Parameter| all.iter().position(|other| *other == one).expect("its own");
+    let of_model = |one: model::Parameter, value: f64| change(place(one), value);
+    let count = all.len();
+    let equation = Equation::lift(pendulum, of_model);
     let [theta, velocity] = [change(count, at[0]), change(count + 1, at[1])];
     let forcing = equation.forcing(tau);
     let point = equation.point(&forcing, theta, velocity, 1_f64.copysign(at[1]));
     let lab = pendulum.lab_time + tau;
-    let reading = Observation::lift(pendulum, change).read(theta, velocity, lab);
+    let reading = Observation::lift(pendulum, of_model).read(theta, velocity, lab);
     [equation.acceleration(&forcing, &point), reading]
 }
 
 pub fn derivatives(pendulum: &Pendulum, tau: f64, at: State) -> [Dual; 2] {
-    let count = pendulum.parameters().len();
+    let all = pendulum.parameters();
+    let place =
+        |one: model::Parameter| all.iter().position(|other| *other == one).expect("its own");
     let seeded = |index: usize, value: f64| Dual::seeded(value, index);
+    let of_model = |one: model::Parameter, value: f64| seeded(place(one), value);
+    let count = all.len();
     let constant = |value: f64| Dual { value, slope: [0.0; MOST] };
-    let equation = Equation::lift(pendulum, seeded);
+    let equation = Equation::lift(pendulum, of_model);
     let [theta, velocity] = [seeded(count, at[0]), seeded(count + 1, at[1])];
     let forcing = equation.forcing(constant(tau));
     let point = equation.point(&forcing, theta, velocity, constant(1_f64.copysign(at[1])));
     let lab = constant(pendulum.lab_time + tau);
-    let reading = Observation::lift(pendulum, seeded).read(theta, velocity, lab);
+    let reading = Observation::lift(pendulum, of_model).read(theta, velocity, lab);
     [equation.acceleration(&forcing, &point), reading]
 }
 

@@ -7,7 +7,7 @@ use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{State, States, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::basins;
 use pendmap::maps::control::Control;
@@ -15,9 +15,7 @@ use pendmap::model::effects::Mappable;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::effects::{Draws, has};
-use crate::support::{
-    advanced, bits, columns, driven, instruction_sets, plane, simd, spread, unchecked,
-};
+use crate::support::{advanced, bits, driven, instruction_sets, plane, simd, spread, unchecked};
 
 /// All effects that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {
@@ -50,15 +48,13 @@ fn one_at_a_time_gives_the_same_bits() {
             let strobe = Strobe::new(&pendulum, 30, simd);
             let states = spread(100, PI, 3.0);
             let run = |singly: bool| {
-                let (mut theta, mut velocity) = columns(&states);
-                let mut turns = vec![0.0; states.len()];
-                let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
+                let mut all = States::from(states.as_slice());
                 if singly {
-                    strobe.advance_singly(a, b, c, 2).expect("equal lengths");
+                    strobe.advance_singly(&mut all, 2);
                 } else {
-                    strobe.advance(a, b, c, 2).expect("equal lengths");
+                    strobe.advance(&mut all, 2);
                 }
-                [bits(&theta), bits(&velocity), bits(&turns)]
+                [all.theta(), all.velocity(), all.turns()].map(bits)
             };
             assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
         }
@@ -163,7 +159,7 @@ fn maps_refuse_effects_that_do_not_repeat_every_turn() {
         let pendulum = has(driven(0.1, 0.6, 2.0), effect.clone());
         let map = basins(&pendulum, &plane(4), &unchecked(), &Control::default()).map(|_| ());
         let strobe = Strobe::new(&pendulum, 20, simd());
-        let moved = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default()).map(|_| ());
+        let moved = advance(&strobe, &[[1.0, 0.0]], 1, 1, &Control::default()).map(|_| ());
         for result in [map, moved] {
             match result {
                 Ok(()) => assert!(allowed, "{effect:?}"),

@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, DVector};
 use pendmap::fit::levenberg_marquardt::{Limit, Point, descend};
 use pendmap::fit::normal::Normal;
 use pendmap::fit::profile::intervals;
-use pendmap::fit::window::{Window, cut};
+use pendmap::fit::window::{Window, windows_of};
 use pendmap::fit::{Free, Problem, Record, Settings, Slot, fit};
-use pendmap::model::Kind;
+use pendmap::model::{Kind, Parameter};
 
 use crate::fit_records::{TOLERANCE, everything, free, line, record, with};
 use crate::support::{driven, undriven};
@@ -33,9 +33,15 @@ fn several() -> (Problem, Vec<f64>) {
         record(own(0.4), None, [1.0, 0.2], 40.0),
     ];
     records[2].longest = 15.0;
-    let slots = [Slot::Gravity, Slot::Parameter(0), Slot::Parameter(1), Slot::Parameter(6)];
+    let offset = Parameter::OfEffect { effect: 0, place: 0 };
+    let slots = [
+        Slot::Gravity,
+        Slot::Parameter(Parameter::Gamma),
+        Slot::Parameter(Parameter::ThetaR),
+        Slot::Parameter(offset),
+    ];
     let mut free = free(&slots, 3, &[1.05_f64.powi(2), 0.06, 0.01, 0.0]);
-    free.push(Free { places: vec![(2, Slot::Parameter(5))], start: 0.2 });
+    free.push(Free { places: vec![(2, Slot::Parameter(Parameter::Phase))], start: 0.2 });
     let truth = vec![1.0, 0.02, 0.03, 0.01, 0.0];
     (Problem::new(records, free, TOLERANCE).expect("a problem"), truth)
 }
@@ -67,7 +73,7 @@ fn initial_states_are_eliminated_exactly() {
         let record = &problem.records[record];
         pendmap::fit::window::guess(record, sample)
     };
-    let windows = cut(&problem, 9.0, at);
+    let windows = windows_of(&problem, 9.0, at);
     assert!(windows.len() > 12);
     let point = Point::new(&problem, truth.clone(), windows.clone()).expect("a point");
     // The whole problem: all parameters and all initial states at once.
@@ -176,7 +182,8 @@ fn a_stuck_pendulum_determines_only_its_angle() {
     let pendulum = pendulum.with_friction(0.2).expect("in range");
     let record = record(pendulum, None, [0.05, 0.0], 20.0);
     let count = record.times.len();
-    let slots = [Slot::Gravity, Slot::Parameter(0), Slot::Parameter(1)];
+    let slots =
+        [Slot::Gravity, Slot::Parameter(Parameter::Gamma), Slot::Parameter(Parameter::ThetaR)];
     let problem =
         Problem::new(vec![record], free(&slots, 1, &[1.0, 0.1, 0.2]), 1e-9).expect("a problem");
     let window = Window { record: 0, from: 0, to: count, start: [0.07, 0.0] };
@@ -229,7 +236,8 @@ fn invalid_fits_are_refused() {
     );
     assert!(refusal(&|_, f| f[0].start = f64::INFINITY).contains("start of a free parameter"));
     assert!(refusal(&|_, f| f[0].places.push((9, Slot::Gravity))).contains("record of a free"));
-    assert!(refusal(&|_, f| f[0].places[0].1 = Slot::Parameter(40)).contains("place of a free"));
+    let none = Slot::Parameter(Parameter::OfEffect { effect: 40, place: 0 });
+    assert!(refusal(&|_, f| f[0].places[0].1 = none).contains("one of the model"));
     let cancel = AtomicBool::new(true);
     assert!(fit(&problem, Settings::default(), None, &cancel).is_err());
 }

@@ -11,7 +11,7 @@ use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
 use pendmap::lanes::InstructionSet;
 use pendmap::model::recorded::{Quantity, Samples};
-use pendmap::model::{Kind, Pendulum, Recorded};
+use pendmap::model::{Kind, Parameter, Pendulum, Recorded};
 
 use crate::fit_records::{TOLERANCE, every, everything, free, line, record, with};
 use crate::support::{driven, instruction_sets, undriven};
@@ -305,7 +305,7 @@ fn derivatives_hold_under_a_recorded_motion() {
 fn derivatives_hold_where_friction_is_negative() {
     // A missing term of a model may lead there.
     let mut pendulum = with(undriven(0.05, 0.0), &[(Kind::QuadraticDrag, &[0.1])]);
-    pendulum.set_parameter(1, -0.01);
+    pendulum.set(Parameter::ThetaR, -0.01);
     let start = [1.5, 0.0];
     let record = record(pendulum.clone(), None, [1.5, -0.2], 30.0);
     let turns = {

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use pendmap::fit::levenberg_marquardt::{Limit, Outcome, Point, descend};
 use pendmap::fit::window::Window;
 use pendmap::fit::{Problem, Record, Slot};
-use pendmap::model::{Kind, Pendulum};
+use pendmap::model::{Kind, Parameter, Pendulum};
 
 use crate::fit_records::{TOLERANCE, free, record, with};
 use crate::support::undriven;
@@ -25,7 +25,7 @@ fn searched(
     let windows: Vec<Window> = (records.iter().zip(starts).enumerate())
         .map(|(k, (r, start))| Window { record: k, from: 0, to: r.times.len(), start: *start })
         .collect();
-    let slots = [Slot::Gravity, Slot::Parameter(0)];
+    let slots = [Slot::Gravity, Slot::Parameter(Parameter::Gamma)];
     let all = free(&slots, records.len(), &[1.02, 0.026]);
     let problem = Problem::new(records, all, TOLERANCE).expect("a problem");
     let mut point = Point::new(&problem, problem.start(), windows).expect("a motion");

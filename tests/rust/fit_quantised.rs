@@ -4,6 +4,7 @@ use pendmap::fit::levenberg_marquardt::Point;
 use pendmap::fit::quantised::{Likelihood, likelihood, surplus};
 use pendmap::fit::window::Window;
 use pendmap::fit::{Counts, Problem, Slot};
+use pendmap::model::Parameter;
 
 use crate::fit_records::{free, record};
 use crate::support::undriven;
@@ -94,7 +95,7 @@ fn the_pull_is_the_slope_of_the_likelihood() {
     own.weights[7] = 0.0;
     own.counts = Some(Counts::new(count, &own.weights).expect("counts"));
     let number = own.times.len();
-    let slots = [Slot::Gravity, Slot::Parameter(0)];
+    let slots = [Slot::Gravity, Slot::Parameter(Parameter::Gamma)];
     let problem =
         Problem::new(vec![own], free(&slots, 1, &[1.002, 0.101]), 1e-13).expect("a problem");
     let window = Window { record: 0, from: 0, to: number, start: [1.503, 0.004] };

@@ -66,8 +66,8 @@ pub fn free(slots: &[Slot], records: usize, start: &[f64]) -> Vec<Free> {
 /// Gravity, then all parameters of the pendulum, and their values.
 pub fn everything(pendulum: &Pendulum) -> (Vec<Slot>, Vec<f64>) {
     let parameters = pendulum.parameters();
-    let slots = (0..parameters.len()).map(Slot::Parameter);
-    let values = parameters.iter().map(|(_, value)| *value);
+    let slots = parameters.iter().copied().map(Slot::Parameter);
+    let values = parameters.iter().map(|parameter| pendulum.value(*parameter));
     (
         std::iter::once(Slot::Gravity).chain(slots).collect(),
         std::iter::once(1.0).chain(values).collect(),

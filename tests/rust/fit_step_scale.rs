@@ -6,17 +6,21 @@ use pendmap::fit::levenberg_marquardt::{Limit, Outcome, Point, descend};
 use pendmap::fit::step_scale::StepScale;
 use pendmap::fit::window::Window;
 use pendmap::fit::{Problem, Slot};
-use pendmap::model::Kind;
+use pendmap::model::{Kind, Parameter};
 
 use crate::fit_records::{TOLERANCE, free, record, with};
 use crate::support::undriven;
 
 const RELEASES: [f64; 3] = [2.6, 1.7, 1.1];
 /// Coulomb friction, then strength, position and width of the rough spot.
-const PLACES: [usize; 4] = [1, 6, 7, 8];
+const PLACES: [Parameter; 4] = [Parameter::ThetaR, of_spot(0), of_spot(1), of_spot(2)];
+
+const fn of_spot(place: usize) -> Parameter {
+    Parameter::OfEffect { effect: 0, place }
+}
 
 /// Free decays over a rough spot; friction and the free parameters of the spot start elsewhere.
-fn rough(spot: [f64; 3], places: &[usize], start: &[f64]) -> Problem {
+fn rough(spot: [f64; 3], places: &[Parameter], start: &[f64]) -> Problem {
     let own = with(
         undriven(0.01, 0.0).with_friction(0.0025).expect("in range"),
         &[(Kind::RoughSpot, &spot)],

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use pendmap::error::Error;
-use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
+use pendmap::integrate::{States, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::control::Control;
 use pendmap::model::effects::{Action, Mappable};
@@ -16,8 +16,7 @@ use proptest::prelude::*;
 use crate::effects::{Draws, derivatives, evaluated, has};
 use crate::effects_as_formulas::{formula, rewritten, term};
 use crate::support::{
-    advanced, basins_on_plane, bits, cell_names, columns, driven, instruction_sets, simd, spread,
-    undriven,
+    advanced, basins_on_plane, bits, cell_names, driven, instruction_sets, simd, spread, undriven,
 };
 
 /// The formula with values for its parameters.
@@ -185,15 +184,13 @@ fn one_at_a_time_gives_a_formula_s_bits() {
                 let strobe = Strobe::new(&pendulum, 30, simd);
                 let states = spread(100, PI, 3.0);
                 let run = |singly: bool| {
-                    let (mut theta, mut velocity) = columns(&states);
-                    let mut turns = vec![0.0; states.len()];
-                    let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
+                    let mut all = States::from(states.as_slice());
                     if singly {
-                        strobe.advance_singly(a, b, c, 2).expect("equal lengths");
+                        strobe.advance_singly(&mut all, 2);
                     } else {
-                        strobe.advance(a, b, c, 2).expect("equal lengths");
+                        strobe.advance(&mut all, 2);
                     }
-                    [bits(&theta), bits(&velocity), bits(&turns)]
+                    [all.theta(), all.velocity(), all.turns()].map(bits)
                 };
                 assert_eq!(run(false), run(true), "{simd}, {}", term.0);
             }
@@ -267,7 +264,7 @@ fn maps_refuse_formulas_that_do_not_repeat() {
         let own = effect(&formula("mine", term, &[("k", power)]), &[0.1]);
         assert_eq!(own.kind.definition().mappable, Mappable::No, "{term}");
         let strobe = Strobe::new(&has(driven(0.1, 0.6, 2.0), own), 20, simd());
-        let error = advance(&strobe, &mut [1.0], &mut [0.0], 1, 1, &Control::default());
+        let error = advance(&strobe, &[[1.0, 0.0]], 1, 1, &Control::default());
         let line = error.map(|_| ()).expect_err(term).to_string();
         let begin = "mine can be in one trajectory, not in maps: ";
         assert!(line.starts_with(begin) && line.contains(why), "{line}");

@@ -6,14 +6,13 @@ use std::sync::atomic::AtomicBool;
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::trajectory::{Request, simulate};
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{State, States, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::support::{
-    advanced, basins_on_plane, bits, columns, driven, instruction_sets, plane, simd, spread,
-    unchecked,
+    advanced, basins_on_plane, bits, driven, instruction_sets, plane, simd, spread, unchecked,
 };
 use crate::truths::{list, number, truths};
 
@@ -28,10 +27,10 @@ fn sticks_and_slips_under_drive_end_where_they_should() {
             let get = |key: &str| number(&truth[key]);
             let pendulum = rubbing(get("gamma"), get("p"), get("omega"), get("theta_r"));
             let strobe = Strobe::new(&pendulum, 200, simd);
-            let (mut theta, mut velocity, mut turns) = ([get("theta0")], [get("v0")], [0.0]);
-            let periods = get("periods") as usize;
-            strobe.advance(&mut theta, &mut velocity, &mut turns, periods).expect("lengths");
-            let found = [theta[0] + TAU * turns[0], velocity[0]];
+            let mut states = States::from([[get("theta0"), get("v0")]].as_slice());
+            strobe.advance(&mut states, get("periods") as usize);
+            let [theta, velocity] = states.get(0);
+            let found = [theta + TAU * states.turns()[0], velocity];
             let error = distance(found, [get("theta"), get("v")]);
             assert!(error < 1e-8, "{simd}: {error:e} at {truth}");
         }
@@ -82,15 +81,13 @@ fn one_at_a_time_gives_the_same_bits() {
             let strobe = Strobe::new(pendulum, 40, simd);
             let states = spread(200, PI, 3.0);
             let run = |singly: bool| {
-                let (mut theta, mut velocity) = columns(&states);
-                let mut turns = vec![0.0; states.len()];
-                let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
+                let mut all = States::from(states.as_slice());
                 if singly {
-                    strobe.advance_singly(a, b, c, 4).expect("equal lengths");
+                    strobe.advance_singly(&mut all, 4);
                 } else {
-                    strobe.advance(a, b, c, 4).expect("equal lengths");
+                    strobe.advance(&mut all, 4);
                 }
-                [bits(&theta), bits(&velocity), bits(&turns)]
+                [all.theta(), all.velocity(), all.turns()].map(bits)
             };
             assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
         }

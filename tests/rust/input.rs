@@ -3,11 +3,10 @@
 use std::sync::atomic::AtomicBool;
 
 use pendmap::error::Error;
-use pendmap::integrate::Strobe;
+use pendmap::integrate::States;
 use pendmap::integrate::accuracy::choose;
 use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::lanes::InstructionSet;
-use pendmap::maps::advance::advance;
 use pendmap::maps::basins::{Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::maps::starts::{Axis, Starts};
@@ -84,35 +83,12 @@ fn trajectories() {
 
 #[test]
 fn arrays_of_different_lengths() {
-    let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, simd());
-    let lengths = |given, names| Some(Error::Lengths { given, names });
-    let go = |a: usize, b: usize, c: usize| {
-        let (mut a, mut b, mut c) = (vec![0.0; a], vec![0.0; b], vec![0.0; c]);
-        let singly = strobe.advance_singly(&mut a, &mut b, &mut c, 1).err();
-        assert_eq!(strobe.advance(&mut a, &mut b, &mut c, 1).err(), singly);
-        singly
-    };
-    assert_eq!(go(3, 3, 3), None);
-    assert_eq!(go(0, 0, 0), None);
-    assert_eq!(go(3, 2, 3), lengths((3, 2), ("theta", "velocity")));
-    assert_eq!(go(3, 3, 4), lengths((3, 4), ("theta", "turns")));
-    let error = go(3, 2, 3).expect("refused").to_string();
-    assert_eq!(error, "theta and velocity must be as many values, got 3 and 2");
-
-    let stretch = |n: [usize; 6]| {
-        let [mut a, mut b, mut c, mut d, mut e, mut f] = n.map(|n| vec![1.0; n]);
-        strobe.stretch((&mut a, &mut b), &mut c, (&mut d, &mut e), &mut f, 1).err()
-    };
-    assert_eq!(stretch([2; 6]), None);
-    assert_eq!(stretch([2, 1, 2, 2, 2, 2]), lengths((2, 1), ("theta", "velocity")));
-    assert_eq!(stretch([2, 2, 1, 2, 2, 2]), lengths((2, 1), ("theta", "turns")));
-    assert_eq!(stretch([2, 2, 2, 1, 2, 2]), lengths((2, 1), ("theta", "tangent theta")));
-    assert_eq!(stretch([2, 2, 2, 2, 1, 2]), lengths((2, 1), ("theta", "tangent velocity")));
-    assert_eq!(stretch([2, 2, 2, 2, 2, 1]), lengths((2, 1), ("theta", "growth")));
-
-    let (mut a, mut b) = (vec![0.0; 5], vec![0.0; 4]);
-    let on_threads = advance(&strobe, &mut a, &mut b, 1, 1, &Control::default());
-    assert_eq!(on_threads.err(), lengths((5, 4), ("theta", "velocity")));
+    let go = |a: usize, b: usize| States::new(vec![0.0; a], vec![0.0; b]).map(|all| all.len());
+    assert_eq!(go(3, 3), Ok(3));
+    assert_eq!(go(0, 0), Ok(0));
+    let error = go(3, 2).expect_err("refused");
+    assert_eq!(error, Error::Lengths { given: (3, 2), names: ("theta", "velocity") });
+    assert_eq!(error.to_string(), "theta and velocity must be as many values, got 3 and 2");
 }
 
 #[test]

@@ -3,25 +3,24 @@
 use std::f64::consts::PI;
 
 use pendmap::integrate::accuracy::{choose, distance, error_reached};
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{State, States, Strobe};
 use pendmap::lanes::{InstructionSet, Isa, Job, Lane, dispatch};
 use pendmap::model::Pendulum;
 
-use crate::support::{
-    advanced, bits, columns, driven, fine_strobe, instruction_sets, simd, spread,
-};
+use crate::support::{advanced, bits, driven, fine_strobe, instruction_sets, simd, spread};
 
 /// Angles, velocities and turns, as bits.
 fn result(strobe: &Strobe, states: &[State], periods: usize, singly: bool) -> [Vec<u64>; 3] {
-    let (mut theta, mut velocity) = columns(states);
-    let mut turns: Vec<f64> = (0..states.len()).map(|i| i as f64).collect();
-    let (a, b, c) = (&mut theta[..], &mut velocity[..], &mut turns[..]);
-    if singly {
-        strobe.advance_singly(a, b, c, periods).expect("equal lengths");
-    } else {
-        strobe.advance(a, b, c, periods).expect("equal lengths");
+    let mut all = States::from(states);
+    // Twice: turns are added.
+    for _ in 0..2 {
+        if singly {
+            strobe.advance_singly(&mut all, periods);
+        } else {
+            strobe.advance(&mut all, periods);
+        }
     }
-    [bits(&theta), bits(&velocity), bits(&turns)]
+    [all.theta(), all.velocity(), all.turns()].map(bits)
 }
 
 fn cases() -> [Pendulum; 3] {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use pendmap::attractor::find::attracting;
+use pendmap::attractor::attracting::attracting;
 use pendmap::error::Error;
 use pendmap::integrate::Strobe;
 use pendmap::integrate::accuracy::distance;

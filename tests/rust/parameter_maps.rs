@@ -9,14 +9,10 @@ use pendmap::maps::cell::Cell;
 use pendmap::maps::control::Control;
 use pendmap::maps::parameter_map::{ParameterMap, Range, Request, parameter_map};
 use pendmap::maps::survey::{Block, Survey};
-use pendmap::model::Pendulum;
+use pendmap::model::{Parameter, Pendulum};
 
 use crate::support::{driven, plane};
 use crate::truths::{attractors_at, fractions_at, number, table, truths};
-
-/// Indices in the list of parameters.
-const P: usize = 3;
-const OMEGA: usize = 4;
 
 fn evenly(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| low + (high - low) * k as f64 / (count.max(2) - 1) as f64).collect()
@@ -27,7 +23,7 @@ fn starts(count: usize) -> Vec<State> {
 }
 
 fn asked(p: Vec<f64>, omega: Vec<f64>, count: usize, threads: usize) -> Request {
-    let axes = [Range::of(P, p), Range::of(OMEGA, omega)];
+    let axes = [Range::of(Parameter::P, p), Range::of(Parameter::Omega, omega)];
     let starts = starts(61 * count);
     Request { axes, starts, each: count, tol: 1e-6, bound: None, kept: 1, threads }
 }
@@ -44,7 +40,7 @@ fn mapped(
 }
 
 fn diagram(base: &Pendulum, p: Vec<f64>) -> Diagram {
-    let axis = Range::of(P, p);
+    let axis = Range::of(Parameter::P, p);
     let (starts, each, first) = (starts(549), 9, None);
     let request =
         bifurcation::Request { axis, starts, each, first, tol: 1e-6, bound: None, threads: 0 };

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use pendmap::attractor::{Catalogue, Effort};
 use pendmap::integrate::accuracy::choose;
-use pendmap::integrate::{Moving, Schedule, State, Strobe};
+use pendmap::integrate::{Moving, Schedule, State, States, Strobe};
 use pendmap::lanes::sine::Fine;
 use pendmap::lanes::{InstructionSet, Isa, Job, Lane, dispatch};
 use pendmap::maps::basins::{BasinMap, Options, basins};
@@ -75,8 +75,9 @@ pub fn basins_on_plane(pendulum: &Pendulum, count: usize) -> BasinMap {
 pub fn searched(pendulum: &Pendulum, starts: &Starts, simd: InstructionSet) -> (Strobe, Catalogue) {
     let sample = starts.sampled_states(400, 0);
     let (strobe, _) = choose(pendulum, &sample, 1e-6, simd).expect("steps");
-    let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH);
-    catalogue.search(&strobe, &sample, 1000, &AtomicBool::new(false));
+    let never = AtomicBool::new(false);
+    let mut catalogue = Catalogue::new(&strobe, Effort::THOROUGH, &never).expect("attractors");
+    catalogue.search(&strobe, &sample, 1000, &never).expect("attractors");
     (strobe, catalogue)
 }
 
@@ -129,17 +130,11 @@ pub fn assert_same(a: &Labels, b: &Labels, what: &str) {
     assert_eq!(a.work, b.work, "work: {what}");
 }
 
-/// States as the two arrays of the kernel's arguments.
-pub fn columns(states: &[State]) -> (Vec<f64>, Vec<f64>) {
-    states.iter().map(|s| (s[0], s[1])).unzip()
-}
-
 /// The states after `periods` periods, wrapped.
 pub fn advanced(strobe: &Strobe, states: &[State], periods: usize) -> Vec<State> {
-    let (mut theta, mut velocity) = columns(states);
-    let mut turns = vec![0.0; states.len()];
-    strobe.advance(&mut theta, &mut velocity, &mut turns, periods).expect("equal lengths");
-    theta.into_iter().zip(velocity).map(|(a, b)| [a, b]).collect()
+    let mut all = States::from(states);
+    strobe.advance(&mut all, periods);
+    all.to_vec()
 }
 
 /// One trajectory through a schedule; the angle is not wrapped.

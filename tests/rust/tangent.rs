@@ -3,11 +3,11 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use pendmap::integrate::accuracy::wrapped;
-use pendmap::integrate::{State, Strobe};
+use pendmap::integrate::{State, States, Strobe, TangentStates};
 use pendmap::model::Pendulum;
 use pendmap::orbit::PoincareMap;
 
-use crate::support::{bits, columns, driven, instruction_sets, spread};
+use crate::support::{bits, driven, instruction_sets, spread};
 
 fn cases() -> [Pendulum; 4] {
     [
@@ -93,30 +93,20 @@ fn stretch_is_the_growth_of_a_tangent() {
             .collect();
         for simd in instruction_sets() {
             let strobe = Strobe::new(&pendulum, 200, simd);
-            let (mut theta, mut velocity) = columns(&states);
-            let count = states.len();
-            let mut turns = vec![0.0; count];
-            let mut tangents = (vec![part; count], vec![part; count]);
-            let mut growth = vec![0.0; count];
+            let mut all = TangentStates::along(&states, [part; 2]);
             // In two calls: growth is added, tangents continue.
             for periods in [1, 3] {
-                strobe
-                    .stretch(
-                        (&mut theta, &mut velocity),
-                        &mut turns,
-                        (&mut tangents.0, &mut tangents.1),
-                        &mut growth,
-                        periods,
-                    )
-                    .expect("equal lengths");
+                strobe.stretch(&mut all, periods);
             }
+            let (ends, growth) = (all.states(), all.growth());
             for (i, (state, log, unit, whole)) in expected.iter().enumerate() {
-                let error = (wrapped(theta[i] - state[0])).hypot(velocity[i] - state[1]);
-                let tilt = (tangents.0[i] - unit[0]).hypot(tangents.1[i] - unit[1]);
+                let ([theta, velocity], tangent) = (ends.get(i), all.tangent(i));
+                let error = (wrapped(theta - state[0])).hypot(velocity - state[1]);
+                let tilt = (tangent[0] - unit[0]).hypot(tangent[1] - unit[1]);
                 assert!(error < 1e-9, "state {i} on {simd}: {error:e}");
                 assert!((growth[i] - log).abs() < 1e-9, "growth {i}: {} {log}", growth[i]);
                 assert!(tilt < 1e-8, "direction {i} on {simd}: {tilt:e}");
-                assert!((turns[i] - *whole as f64).abs() < 1e-12, "turns {i} on {simd}");
+                assert!((ends.turns()[i] - *whole as f64).abs() < 1e-12, "turns {i} on {simd}");
             }
         }
     }
@@ -127,23 +117,11 @@ fn a_tangent_beside_a_state_does_not_change_it() {
     for simd in instruction_sets() {
         let strobe = Strobe { fine: true, ..Strobe::new(&driven(0.1, 1.2, 2.0), 24, simd) };
         let states = spread(70, PI, 2.5);
-        let (mut theta, mut velocity) = columns(&states);
-        let mut turns = vec![0.0; states.len()];
-        strobe.advance(&mut theta, &mut velocity, &mut turns, 1).expect("equal lengths");
-        let (mut a, mut b) = columns(&states);
-        let mut whole = vec![0.0; states.len()];
-        let mut tangents = (vec![1.0; states.len()], vec![0.0; states.len()]);
-        let mut growth = vec![0.0; states.len()];
-        strobe
-            .stretch(
-                (&mut a, &mut b),
-                &mut whole,
-                (&mut tangents.0, &mut tangents.1),
-                &mut growth,
-                1,
-            )
-            .expect("equal lengths");
-        assert_eq!(bits(&theta), bits(&a), "{simd}");
-        assert_eq!(bits(&velocity), bits(&b), "{simd}");
+        let mut plain = States::from(states.as_slice());
+        strobe.advance(&mut plain, 1);
+        let mut beside = TangentStates::along(&states, [1.0, 0.0]);
+        strobe.stretch(&mut beside, 1);
+        assert_eq!(bits(plain.theta()), bits(beside.states().theta()), "{simd}");
+        assert_eq!(bits(plain.velocity()), bits(beside.states().velocity()), "{simd}");
     }
 }

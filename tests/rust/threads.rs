@@ -1,5 +1,7 @@
 //! Threads, progress and cancellation: equality of results, and immediate response.
 
+use std::collections::HashSet;
+use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
 use pendmap::error::Error;
@@ -11,8 +13,8 @@ use pendmap::maps::finite_time::finite_time;
 use pendmap::model::Pendulum;
 
 use crate::support::{
-    assert_same, bits, cell_names, chaos_among_others, columns, driven, plane, relabelled,
-    searched, simd, spread, unchecked,
+    assert_same, bits, cell_names, chaos_among_others, driven, plane, relabelled, searched, simd,
+    spread, unchecked,
 };
 
 #[test]
@@ -59,11 +61,44 @@ fn threads_do_not_show_in_plain_integration() {
     let strobe = Strobe::new(&driven(0.1, 1.0, 2.0), 12, simd());
     let states = spread(3000, 3.1, 3.0);
     let [a, b] = [1, 2].map(|threads| {
-        let (mut theta, mut velocity) = columns(&states);
-        let turns = advance(&strobe, &mut theta, &mut velocity, 100, threads, &Control::default());
-        (bits(&theta), bits(&velocity), turns.expect("turns"))
+        let ends = advance(&strobe, &states, 100, threads, &Control::default());
+        let (ends, turns) = ends.expect("ends");
+        (bits(ends.theta()), bits(ends.velocity()), turns)
     });
     assert_eq!(a, b);
+}
+
+/// The threads of a pool.
+fn workers(pool: &rayon::ThreadPool) -> HashSet<ThreadId> {
+    pool.broadcast(|_| thread::current().id()).into_iter().collect()
+}
+
+#[test]
+fn a_call_has_as_many_workers_as_requested() {
+    for threads in [1, 2, 7, 7, 2, 1] {
+        let pool = pool(threads).expect("a pool");
+        assert_eq!(workers(&pool).len(), threads);
+        assert_eq!(pool.install(rayon::current_num_threads), threads);
+    }
+    assert!(pool(257).is_err());
+}
+
+#[test]
+fn workers_are_kept_for_the_next_call() {
+    // Of a number that no other test requests, as tests run at the same time.
+    let first = workers(&pool(11).expect("a pool"));
+    let second = workers(&pool(11).expect("a pool"));
+    assert_eq!(first, second);
+    // After a panic too.
+    let panicked = thread::spawn(|| pool(11).expect("a pool").install(|| panic!("of a test")));
+    assert!(panicked.join().is_err());
+    assert_eq!(workers(&pool(11).expect("a pool")).len(), 11);
+}
+
+#[test]
+fn calls_at_the_same_time_have_their_own_workers() {
+    let [one, other] = [(); 2].map(|()| pool(13).expect("a pool"));
+    assert!(workers(&one).is_disjoint(&workers(&other)));
 }
 
 #[test]
@@ -79,15 +114,13 @@ fn a_cancelled_map_stops() {
     let strobe = Strobe::new(&driven(0.0, 1.0, 2.0), 12, simd());
     let layers = finite_time(&strobe, &plane(40), 10, &pool(1).expect("a pool"), &control);
     assert_eq!(layers.err(), Some(Error::Interrupted));
-    let mut theta = vec![0.0; 10];
-    let mut velocity = vec![1.0; 10];
-    let ends = advance(&strobe, &mut theta, &mut velocity, 10, 1, &control);
+    let ends = advance(&strobe, &[[0.0, 1.0]; 10], 10, 1, &control);
     assert_eq!(ends.err(), Some(Error::Interrupted));
 }
 
 #[test]
 fn cancelling_works_while_a_map_is_made() {
-    // Stages of seconds each: the search, the watched starts, labels, layers.
+    // Stages of seconds each: the search, the observed starts, labels, layers.
     for (p, omega, size, milliseconds) in [
         (1.8, 2.0, 2000, 100),
         (1.8, 2.0, 2000, 400),
@@ -96,12 +129,12 @@ fn cancelling_works_while_a_map_is_made() {
         (1.0, 2.0, 4000, 300),
     ] {
         let control = Control::default();
-        let (result, late) = std::thread::scope(|scope| {
+        let (result, late) = thread::scope(|scope| {
             let work = scope.spawn(|| {
                 let made = basins(&driven(0.1, p, omega), &plane(size), &unchecked(), &control);
                 (made.map(|_| ()), Instant::now())
             });
-            std::thread::sleep(Duration::from_millis(milliseconds));
+            thread::sleep(Duration::from_millis(milliseconds));
             let asked = Instant::now();
             control.cancel();
             let (result, ended) = work.join().expect("no panic");

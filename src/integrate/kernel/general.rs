@@ -120,13 +120,13 @@ impl<R: Real, K: Clock<R>> Work for Stepping<'_, R, K> {
         while i < part.end {
             macro_rules! row {
                 ($i:literal: $($j:literal)*) => {{
-                    let way = velocities[0].scale(A[$i][0]);
+                    let change = velocities[0].scale(A[$i][0]);
                     let gain = accelerations[0].scale(A[$i][0]);
                     $(
-                        let way = velocities[$j].scale_add(A[$i][$j], way);
+                        let change = velocities[$j].scale_add(A[$i][$j], change);
                         let gain = accelerations[$j].scale_add(A[$i][$j], gain);
                     )*
-                    theta = way.mul_add(h, theta0);
+                    theta = change.mul_add(h, theta0);
                     velocity = gain.mul_add(h, velocity0);
                 }};
             }

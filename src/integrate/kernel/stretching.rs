@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use super::step::Moving;
-use super::stroboscopic::{Strobe, same_length};
-use crate::error::Error;
+use super::stroboscopic::Strobe;
 use crate::integrate::tangent::Tangent;
+use crate::integrate::{States, TangentStates};
 use crate::lanes::sine::Fine;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::pendulum::Route;
@@ -16,71 +16,46 @@ const SHADOW: f64 = 1e-7;
 impl Strobe {
     /// [`Strobe::advance`] with one tangent vector for each state.
     ///
-    /// Adds to `growth` the natural logarithm of the factor by which the vector has grown: over the
+    /// Adds the natural logarithm of the factor by which a vector has grown to its growth: over the
     /// time it is the finite-time Lyapunov exponent. The vectors come back with length 1.
-    ///
-    /// # Errors
-    /// [`Error::Lengths`] if the slices differ in length.
-    pub fn stretch(
-        &self,
-        mut states: (&mut [f64], &mut [f64]),
-        turns: &mut [f64],
-        mut tangents: (&mut [f64], &mut [f64]),
-        growth: &mut [f64],
-        periods: usize,
-    ) -> Result<(), Error> {
-        let count = states.0.len();
-        same_length(("theta", count), ("velocity", states.1.len()))?;
-        same_length(("theta", count), ("turns", turns.len()))?;
-        same_length(("theta", count), ("tangent theta", tangents.0.len()))?;
-        same_length(("theta", count), ("tangent velocity", tangents.1.len()))?;
-        same_length(("theta", count), ("growth", growth.len()))?;
+    pub fn stretch(&self, all: &mut TangentStates, periods: usize) {
         if self.route != Route::Smooth || self.extra {
-            let (states, tangents) = (&mut states, &mut tangents);
-            return self.stretch_by_shadows(states, turns, tangents, growth, periods);
+            self.stretch_by_shadows(all, periods);
+        } else {
+            dispatch::run(self.simd, Stretch { strobe: self, all, periods });
         }
-        dispatch::run(
-            self.simd,
-            Stretch { strobe: self, states, turns, tangents, growth, periods },
-        );
-        Ok(())
     }
 
     /// Each state and a second one at the distance [`SHADOW`] along its tangent: their distance grows as
     /// the tangent does, through turns and sticks too.
-    fn stretch_by_shadows(
-        &self,
-        states: &mut (&mut [f64], &mut [f64]),
-        turns: &mut [f64],
-        tangents: &mut (&mut [f64], &mut [f64]),
-        growth: &mut [f64],
-        periods: usize,
-    ) -> Result<(), Error> {
-        let count = states.0.len();
-        let (mut theta, mut velocity) = (vec![0.0; 2 * count], vec![0.0; 2 * count]);
+    fn stretch_by_shadows(&self, all: &mut TangentStates, periods: usize) {
+        let TangentStates { states, tangents: [along, across], growth } = all;
+        let count = states.len();
+        let mut both: States = [[0.0; 2]].into_iter().cycle().take(2 * count).collect();
         for _ in 0..periods {
-            let mut net = vec![0.0; 2 * count];
+            let States { theta, velocity, turns } = &mut both;
+            turns.fill(0.0);
             for i in 0..count {
-                (theta[i], velocity[i]) = (states.0[i], states.1[i]);
-                theta[count + i] = states.0[i] + SHADOW * tangents.0[i];
-                velocity[count + i] = states.1[i] + SHADOW * tangents.1[i];
+                (theta[i], velocity[i]) = (states.theta[i], states.velocity[i]);
+                theta[count + i] = states.theta[i] + SHADOW * along[i];
+                velocity[count + i] = states.velocity[i] + SHADOW * across[i];
             }
-            self.advance(&mut theta, &mut velocity, &mut net, 1)?;
+            self.advance(&mut both, 1);
+            let States { theta, velocity, turns } = &both;
             for i in 0..count {
-                (states.0[i], states.1[i]) = (theta[i], velocity[i]);
-                turns[i] += net[i];
-                let way = theta[count + i] - theta[i] + TAU * (net[count + i] - net[i]);
+                (states.theta[i], states.velocity[i]) = (theta[i], velocity[i]);
+                states.turns[i] += turns[i];
+                let apart = theta[count + i] - theta[i] + TAU * (turns[count + i] - turns[i]);
                 let gain = velocity[count + i] - velocity[i];
-                let length = way.hypot(gain) / SHADOW;
+                let length = apart.hypot(gain) / SHADOW;
                 growth[i] += length.ln();
                 // If friction has brought both to one state the growth is zero from then on.
                 if length > 0.0 {
-                    tangents.0[i] = way / (SHADOW * length);
-                    tangents.1[i] = gain / (SHADOW * length);
+                    along[i] = apart / (SHADOW * length);
+                    across[i] = gain / (SHADOW * length);
                 }
             }
         }
-        Ok(())
     }
 }
 
@@ -104,10 +79,7 @@ impl Buffer {
 
 struct Stretch<'a> {
     strobe: &'a Strobe,
-    states: (&'a mut [f64], &'a mut [f64]),
-    turns: &'a mut [f64],
-    tangents: (&'a mut [f64], &'a mut [f64]),
-    growth: &'a mut [f64],
+    all: &'a mut TangentStates,
     periods: usize,
 }
 
@@ -115,7 +87,7 @@ impl Job for Stretch<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
-        if self.turns.len() <= S::Few::WIDTH {
+        if self.all.states.len() <= S::Few::WIDTH {
             self.of::<S::Few>(isa);
         } else {
             self.of::<S::Narrow>(isa);
@@ -127,16 +99,20 @@ impl Stretch<'_> {
     #[inline(always)]
     fn of<L: Lane>(self, token: L::Token) {
         let schedule = &self.strobe.schedule;
+        let TangentStates { states, tangents, growth } = self.all;
+        let States { theta, velocity, turns } = states;
+        let mut columns = {
+            let [along, across] = tangents;
+            [theta, velocity, turns, along, across].map(Vec::as_mut_slice)
+        };
         let width = L::WIDTH;
         let mut buffers: [Buffer; 5] = std::array::from_fn(|_| Buffer::default());
         let mut start = 0;
-        while start < self.turns.len() {
-            let part = start..(start + width).min(self.turns.len());
-            buffers[0].fill(&self.states.0[part.clone()]);
-            buffers[1].fill(&self.states.1[part.clone()]);
-            buffers[2].fill(&self.turns[part.clone()]);
-            buffers[3].fill(&self.tangents.0[part.clone()]);
-            buffers[4].fill(&self.tangents.1[part.clone()]);
+        while start < growth.len() {
+            let part = start..(start + width).min(growth.len());
+            for (buffer, column) in buffers.iter_mut().zip(&columns) {
+                buffer.fill(&column[part.clone()]);
+            }
             let mut product = [1.0; MAX_WIDTH];
             for _ in 0..self.periods {
                 let theta = Tangent {
@@ -165,22 +141,17 @@ impl Stretch<'_> {
                     *product *= length;
                     // A logarithm a period would cost as much as the step itself.
                     if !(1e-100..1e100).contains(product) {
-                        self.growth[start + lane] += product.ln();
+                        growth[start + lane] += product.ln();
                         *product = 1.0;
                     }
                 }
             }
-            for (growth, product) in self.growth[part.clone()].iter_mut().zip(product) {
+            for (growth, product) in growth[part.clone()].iter_mut().zip(product) {
                 *growth += product.ln();
             }
-            let copy = |target: &mut [f64], i: usize| {
-                target[part.clone()].copy_from_slice(&buffers[i].0[..part.len()]);
-            };
-            copy(self.states.0, 0);
-            copy(self.states.1, 1);
-            copy(self.turns, 2);
-            copy(self.tangents.0, 3);
-            copy(self.tangents.1, 4);
+            for (buffer, column) in buffers.iter().zip(&mut columns) {
+                column[part.clone()].copy_from_slice(&buffer.0[..part.len()]);
+            }
             start = part.end;
         }
     }

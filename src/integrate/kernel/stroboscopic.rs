@@ -6,13 +6,10 @@ use std::f64::consts::PI;
 use super::block::Block;
 use super::general::Timetable;
 use super::schedule::Schedule;
-use crate::error::Error;
+use crate::integrate::States;
 use crate::lanes::InstructionSet;
 use crate::model::pendulum::Route;
 use crate::model::{Angle, Equation, Pendulum};
-
-/// Angle and velocity, `[theta, th']`.
-pub type State = [f64; 2];
 
 /// Length of steps, in units of `1/sqrt(1 + |p|)`, above which the method's error is at least about
 /// that of the coarse sine: measured from p = 0 to 30, where both grow with the stretching.
@@ -89,62 +86,36 @@ impl Strobe {
         self.schedule.steps().len()
     }
 
-    /// Advances every state by `periods` forcing periods, in place.
+    /// Advances every state by `periods` forcing periods.
     ///
-    /// Angles on the circle are returned in [-pi, pi]; the whole turns removed are added to
-    /// `turns`.
-    ///
-    /// # Errors
-    /// [`Error::Lengths`] if the three slices differ in length.
-    pub fn advance(
-        &self,
-        theta: &mut [f64],
-        velocity: &mut [f64],
-        turns: &mut [f64],
-        periods: usize,
-    ) -> Result<(), Error> {
-        let width = self.block_width(theta.len());
-        self.advance_blocks(theta, velocity, turns, width, |block| {
+    /// Angles on the circle are in [-pi, pi] afterwards; the whole turns removed are added to those of
+    /// the states.
+    pub fn advance(&self, states: &mut States, periods: usize) {
+        let width = self.block_width(states.len());
+        self.advance_blocks(states, width, |block| {
             for _ in 0..periods {
                 self.period(block);
                 block.wrap(self.angle);
             }
-        })
+        });
     }
 
     /// [`Strobe::advance`], one trajectory at a time with the arithmetic of a lane.
-    ///
-    /// # Errors
-    /// Those of [`Strobe::advance`].
     // Compiled where it is called: in tests alone.
     #[inline]
-    pub fn advance_singly(
-        &self,
-        theta: &mut [f64],
-        velocity: &mut [f64],
-        turns: &mut [f64],
-        periods: usize,
-    ) -> Result<(), Error> {
-        self.advance_blocks(theta, velocity, turns, 1, |block| {
+    pub fn advance_singly(&self, states: &mut States, periods: usize) {
+        self.advance_blocks(states, 1, |block| {
             for _ in 0..periods {
                 self.period_singly(block);
                 block.wrap(self.angle);
             }
-        })
+        });
     }
 
-    fn advance_blocks(
-        &self,
-        theta: &mut [f64],
-        velocity: &mut [f64],
-        turns: &mut [f64],
-        width: usize,
-        run: impl Fn(&mut Block),
-    ) -> Result<(), Error> {
-        same_length(("theta", theta.len()), ("velocity", velocity.len()))?;
-        same_length(("theta", theta.len()), ("turns", turns.len()))?;
+    fn advance_blocks(&self, states: &mut States, width: usize, run: impl Fn(&mut Block)) {
         let kick = self.schedule.kick;
         let mut block = Block::new(width);
+        let States { theta, velocity, turns } = states;
         let chunks = theta.chunks_mut(width).zip(velocity.chunks_mut(width));
         for ((theta, velocity), turns) in chunks.zip(turns.chunks_mut(width)) {
             block.fill(theta, velocity, kick);
@@ -155,13 +126,5 @@ impl Strobe {
                 turns[i] += block.turns[i];
             }
         }
-        Ok(())
     }
-}
-
-pub(super) fn same_length(a: (&'static str, usize), b: (&'static str, usize)) -> Result<(), Error> {
-    if a.1 == b.1 {
-        return Ok(());
-    }
-    Err(Error::Lengths { given: (a.1, b.1), names: (a.0, b.0) })
 }

@@ -216,7 +216,7 @@ impl<'a, N: Number> Driver<'a, N> {
                 continue;
             }
             let turning =
-                if ode.watches() { turning::first(ode, &self.dense) } else { Turning::None };
+                if ode.finds_turns() { turning::first(ode, &self.dense) } else { Turning::None };
             if matches!(turning, Turning::Unclear) && length > FINE * ode.longest_step() {
                 (self.step, growth) = (0.5 * length, 1.0);
                 continue;

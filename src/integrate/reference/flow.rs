@@ -2,7 +2,7 @@
 
 use super::driver::Driver;
 use super::problem::OdeProblem;
-use crate::integrate::kernel::stroboscopic::State;
+use crate::integrate::State;
 use crate::integrate::tangent::Tangent;
 use crate::model::Pendulum;
 use crate::model::pendulum::Route;

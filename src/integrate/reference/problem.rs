@@ -8,7 +8,7 @@ use crate::lanes::Work;
 use crate::model::effects::Point;
 use crate::model::equation::Forcing;
 use crate::model::recorded::Recorded;
-use crate::model::{Equation, Pendulum};
+use crate::model::{Equation, Parameter, Pendulum};
 
 /// The longest step is this times a power of the tolerance, over the greatest rate of small motions
 /// or of the drive. At fine tolerances it is that allowed by the error of a linear oscillator:
@@ -43,7 +43,7 @@ pub struct OdeProblem<N> {
     /// The field over plain numbers, for times of events: where the velocity passes zero, when a stuck
     /// pendulum is released.
     plain: Field<f64>,
-    watches: bool,
+    finds_turns: bool,
     jumps: bool,
     harmonic: bool,
     period: Option<f64>,
@@ -63,7 +63,7 @@ impl<N: Number> OdeProblem<N> {
         pendulum: &Pendulum,
         ages: bool,
         tolerance: f64,
-        number: impl FnMut(usize, f64) -> N,
+        number: impl FnMut(Parameter, f64) -> N,
     ) -> Self {
         Self::with_rate(pendulum, greatest_rate(pendulum), ages, tolerance, number)
     }
@@ -75,7 +75,7 @@ impl<N: Number> OdeProblem<N> {
         rate: f64,
         ages: bool,
         tolerance: f64,
-        number: impl FnMut(usize, f64) -> N,
+        number: impl FnMut(Parameter, f64) -> N,
     ) -> Self {
         let mut equation = Equation::lift(pendulum, number);
         equation.ages = ages;
@@ -87,7 +87,7 @@ impl<N: Number> OdeProblem<N> {
         let tolerance = tolerance.max(FINEST);
         let harmonic = plain.has_closed_release() && !plain.keeps()[0];
         Self {
-            watches: jumps || pendulum.has_events() || plain.keeps()[1],
+            finds_turns: jumps || pendulum.has_events() || plain.keeps()[1],
             field: Field { equation, recorded: None },
             plain: Field { equation: plain, recorded: None },
             jumps,
@@ -124,8 +124,8 @@ impl<N: Number> OdeProblem<N> {
     /// This problem with every turn found, also where nothing changes there: derivatives by the
     /// strength of a friction that is 0 need them.
     #[must_use]
-    pub fn watched(mut self) -> Self {
-        self.watches = true;
+    pub fn finding_turns(mut self) -> Self {
+        self.finds_turns = true;
         self
     }
 
@@ -203,8 +203,8 @@ impl<N: Number> OdeProblem<N> {
 
     /// Whether the equation changes at zeros of the velocity, or turns are requested anyway.
     #[must_use]
-    pub fn watches(&self) -> bool {
-        self.watches
+    pub fn finds_turns(&self) -> bool {
+        self.finds_turns
     }
 
     /// Whether friction makes the acceleration jump with the sense of the motion; where it is

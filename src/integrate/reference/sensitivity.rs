@@ -8,9 +8,9 @@ use std::sync::Arc;
 use super::event::Event;
 use super::problem::OdeProblem;
 use super::sample::{Sampled, sample};
-use crate::integrate::kernel::stroboscopic::State;
+use crate::integrate::State;
 use crate::integrate::tangent::Tangent;
-use crate::model::{Pendulum, Recorded};
+use crate::model::{Parameter, Pendulum, Recorded};
 
 /// Largest number of derivatives in one pass.
 const WIDEST: usize = 16;
@@ -44,7 +44,8 @@ pub fn sensitivities(
     times: &[f64],
     tolerance: f64,
 ) -> Sensitivities {
-    let mut names: Vec<String> = pendulum.parameters().into_iter().map(|(name, _)| name).collect();
+    let parameters = pendulum.parameters();
+    let mut names: Vec<String> = parameters.iter().map(|one| pendulum.name_of(*one)).collect();
     names.extend(["theta0", "v0"].map(String::from));
     let mut all = Sensitivities {
         slopes: vec![Vec::with_capacity(names.len()); times.len()],
@@ -52,7 +53,7 @@ pub fn sensitivities(
         states: Vec::new(),
         events: Vec::new(),
     };
-    let pass = Pass { pendulum, recorded, start, tau, times, tolerance };
+    let pass = Pass { pendulum, parameters, recorded, start, tau, times, tolerance };
     let count = all.names.len();
     let mut first = 0;
     while first < count {
@@ -67,6 +68,7 @@ pub fn sensitivities(
 
 struct Pass<'a> {
     pendulum: &'a Pendulum,
+    parameters: Vec<Parameter>,
     recorded: Option<&'a Arc<Recorded>>,
     start: State,
     tau: f64,
@@ -77,15 +79,19 @@ struct Pass<'a> {
 impl Pass<'_> {
     /// The derivatives by `N` names from `first` on; returns their number.
     fn run<const N: usize>(&self, first: usize, all: &mut Sensitivities) -> usize {
-        let parameters = all.names.len() - 2;
         // A name of another pass has no direction in this one.
-        let number =
+        let seeded =
             |index: usize, value: f64| Tangent::<f64, N>::seeded(value, index.wrapping_sub(first));
-        let mut ode = OdeProblem::new(self.pendulum, true, self.tolerance, number).watched();
+        let number = |parameter: Parameter, value: f64| {
+            let index = self.parameters.iter().position(|one| *one == parameter);
+            seeded(index.unwrap_or(usize::MAX), value)
+        };
+        let mut ode = OdeProblem::new(self.pendulum, true, self.tolerance, number).finding_turns();
         if let Some(recorded) = self.recorded {
             ode = ode.driven_by(Arc::clone(recorded));
         }
-        let start = [number(parameters, self.start[0]), number(parameters + 1, self.start[1])];
+        let count = self.parameters.len();
+        let start = [seeded(count, self.start[0]), seeded(count + 1, self.start[1])];
         let Sampled { states, events, .. } = sample(&ode, self.tau, start, self.times, |_, _| true);
         let filled = N.min(all.names.len() - first);
         for (slopes, state) in all.slopes.iter_mut().zip(&states) {

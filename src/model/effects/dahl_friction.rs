@@ -67,6 +67,6 @@ impl Law for DahlFriction {
 #[inline(always)]
 fn built_up<R: Real>(stiffness: R, at: &Point<R>) -> R {
     let [turned, before] = at.past;
-    let way = (at.theta - turned) * at.sense;
-    at.sense - (at.sense - before) * (-(way * stiffness)).exponential()
+    let path = (at.theta - turned) * at.sense;
+    at.sense - (at.sense - before) * (-(path * stiffness)).exponential()
 }

@@ -303,10 +303,16 @@ impl Effect {
         &self.parameters[..self.kind.definition().parameters.count()]
     }
 
-    /// Its parameters as its formulas take them, in numbers of another kind: `number` converts each
-    /// value.
-    pub fn lift<R: Real>(&self, number: impl FnMut(f64) -> R) -> [R; MOST_PARAMETERS] {
-        let values: Vec<R> = self.values().iter().copied().map(number).collect();
+    /// Its parameters as its formulas take them, in numbers of another kind, as effect number `effect` of a
+    /// pendulum: `number` makes a number of a parameter and its value.
+    pub fn lift<R: Real>(
+        &self,
+        effect: usize,
+        mut number: impl FnMut(crate::model::Parameter, f64) -> R,
+    ) -> [R; MOST_PARAMETERS] {
+        let of = |place| crate::model::Parameter::OfEffect { effect, place };
+        let values = self.values().iter().enumerate();
+        let values: Vec<R> = values.map(|(place, value)| number(of(place), *value)).collect();
         let none = values[0].like(0.0);
         self.kind.ready(std::array::from_fn(|i| values.get(i).map_or(none, |value| *value)))
     }
