@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import json
 import os
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import hidden
+from commands import Commands
 from pendmap import cli
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
+CURRENT = "PYTEST_CURRENT_TEST"
+AT_START = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY", CURRENT}}
+"""The environment of this process before any test has changed it."""
 
 # The load of the machine fails no test; files of one example are overwritten by the next.
 settings.register_profile(
@@ -29,6 +34,14 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("steady")
+
+
+@functools.cache
+def _commands() -> Commands:
+    """Return the process that runs commands, one of each process of this test run."""
+    commands = Commands()
+    atexit.register(commands.close)
+    return commands
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -61,8 +74,14 @@ class Run(Protocol):
 def run_command(
     folder: Path, *words: object, env: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run `pendmap` with the given words in a folder, without a display."""
+    """Run `pendmap` with the given words in a folder, without a display.
+
+    A command with an environment of its own is a process of its own; others are children of one.
+    """
     clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
+    own = env is not None or {k: v for k, v in clean.items() if k != CURRENT} != AT_START
+    if not own and hasattr(os, "fork"):
+        return _commands().run([*map(str, words)], folder, clean)
     return subprocess.run(
         [str(COMMAND), *map(str, words)],
         capture_output=True,
