@@ -62,7 +62,8 @@ class Commands:
                 "environment": environment,
                 "outputs": [str(path) for path in outputs],
             }
-            print(json.dumps(request), file=self._process.stdin, flush=True)
+            self._process.stdin.write(f"{json.dumps(request)}\n")
+            self._process.stdin.flush()
             child = int(self._process.stdout.readline())
             if not select.select([self._process.stdout], [], [], LIMIT)[0]:
                 os.kill(child, 9)
@@ -90,9 +91,14 @@ def _command(words: list[str], folder: str, environment: dict[str, str], outputs
     except SystemExit as end:
         code = end.code
         if isinstance(code, str):
-            print(code, file=sys.stderr)
+            sys.stderr.write(f"{code}\n")
         return code if isinstance(code, int) else int(code is not None)
     return 0
+
+
+def _answer(number: int) -> None:
+    sys.stdout.write(f"{number}\n")
+    sys.stdout.flush()
 
 
 def _serve() -> None:
@@ -115,9 +121,9 @@ def _serve() -> None:
                 traceback.print_exc()
             # What the end of a process does: atexit, threads, buffers.
             sys.exit(code)
-        print(child, flush=True)
+        _answer(child)
         _, status = os.waitpid(child, 0)
-        print(os.waitstatus_to_exitcode(status), flush=True)
+        _answer(os.waitstatus_to_exitcode(status))
 
 
 if __name__ == "__main__":
