@@ -11,7 +11,7 @@ import numpy as np
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
 from pendmap.charts.chart import Chart, Panel
-from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Image, Mark, Points
+from pendmap.charts.marks import INK, NONE, QUIET, Colours, Image, Mark, Points
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
@@ -37,7 +37,6 @@ VARIABLES = {
 }
 """Layers by the name a user types, and the variable of each."""
 
-SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to the leading ones
 FLAT: Final = 0.55  # Height over width of panels below which they are stacked
 _COLOUR_MAPS: Final = {
     "settle": "viridis",
@@ -60,27 +59,27 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         listed = [entry for entry in listed if entry.id < 1 or (entry.chaotic and own)]
     panels = []
     for one in shown:
-        small = len(shown) > 1 and one == "labels" and not reliable(dataset)
-        alarm = [(warning(dataset), ALARM), (transients(dataset), QUIET)]
-        marks = _layer(dataset, one, cells, (theta, velocity), listed)
+        marks = _layer(dataset, one, cells, (theta, velocity))
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
-        alone = shown == ("labels",) and not reliable(dataset)
         sides = names.phase_plane(theta, velocity, units)
-        share = SMALL if small else 1.0
-        look: dict[str, Any] = {"share": share, "note": alarm if small else ()}
-        look["warning"] = warning(dataset) if alone else ""
-        panels.append(Panel(one, what(dataset, one), *sides, marks, **look))
+        doubt = warning(dataset) if one == "labels" and not reliable(dataset) else ""
+        panels.append(Panel(one, what(dataset, one), *sides, marks, warning=doubt))
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
     low, high = (units.bare(bound, VELOCITY) for bound in velocity)
     ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
     rows, columns = dataset["label"].shape
+    said = [names.parameters(facts(dataset)), f"{columns} × {rows} cells"]
+    if layer is None and finite_time(dataset):
+        said.append(exponents(dataset))
+    elif layer is None and not reliable(dataset):
+        said.append(transients(dataset))
     return Chart(
         _title(dataset, shown),
-        f"{names.parameters(facts(dataset))};   {columns} × {rows} cells",
+        ";   ".join(filter(None, said)),
         [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )
@@ -132,7 +131,6 @@ def _layer(
     layer: str,
     cells: int,
     window: tuple[tuple[float, float], ...],
-    listed: list[legend.Entry],
 ) -> list[Mark]:
     """Return one layer; cells without a value have the colour of their label, or are grey."""
     label = plane.pixels(dataset, dataset["label"], cells)
@@ -141,14 +139,9 @@ def _layer(
     shown = label.astype(np.int16) + 1
     if layer != "labels" and has_filled(dataset):
         shown[filled(dataset, cells)] = len(colours)
-    if layer == "labels":
-        texts = [("", "")] * len(classes)
-        for entry in listed:
-            if not entry.chaotic:
-                short = f"{legend.typeset(entry.name)}\n{legend.percent(entry.fraction)}"
-                texts[entry.id + 1] = (short, entry.text)
-        return [Image(shown, *window, classes=classes, labels=texts)]
     labels = Image(shown, *window, classes=classes)
+    if layer == "labels":
+        return [labels]
     own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
     absent, values = missing(dataset, layer, own) | (label < 0), own.astype(np.float32)
     if layer == "settle":
@@ -214,9 +207,7 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
     pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
     speeds = float(points[:, 1].min()) - pad, float(points[:, 1].max()) + pad
     sides = names.phase_plane(plane.angles(dataset, points[:, 0]), speeds, units)
-    note = [(exponents(dataset), QUIET)]
-    title = "its attractor, once a period"
-    return Panel("section", title, *sides, dots, share=SMALL, note=note)
+    return Panel("section", "its attractor, once a period", *sides, dots)
 
 
 def missing(dataset: xr.Dataset, layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

@@ -184,8 +184,7 @@ def _image(
     if name == "kinds":
         classes = [(kind.text, kind.colour) for kind in kinds(dataset)]
         picture = striped(dataset, cells, max(2, cells // _STRIPES))
-        texts = [(kind.name, kind.text) for kind in kinds(dataset)]
-        return Image(picture, across, up, classes=classes, labels=texts, path="kinds")
+        return Image(picture, across, up, classes=classes, path="kinds")
     of_kind = name.removeprefix("share ")
     layer = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
     values = np.asarray(plane.pixels(dataset, layer, cells), dtype=np.float64)
