@@ -42,7 +42,7 @@ def figure_of(  # noqa: PLR0913 (all of these a user may choose)
     colormap: str | Colormap | None = None,
 ) -> Figure:
     """Return the figure of a result, or of a chart; arguments are those of :func:`draw`."""
-    if width is not None and (size is not None or width <= 0):
+    if width is not None and not (size is None and 0 < width < math.inf):
         raise InputError(f"width must be positive, in mm, and no size given, got {width!r}")
     if isinstance(result, Chart | Sheet):
         made = result
@@ -138,7 +138,7 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         look: dict[str, Any] = {"size": size, "width": width, "title": title, "colormap": colormap}
         return figure_of(result, layer=layer, dpi=dpi, **look)
 
-    return style.written(path, make, size=size, dpi=dpi)
+    return style.written(path, make, dpi=dpi)
 
 
 def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:

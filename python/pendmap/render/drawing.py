@@ -17,9 +17,7 @@ from pendmap.errors import InputError
 from pendmap.render import marks, style, ticks
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
@@ -36,17 +34,6 @@ BESIDE, BAR, BELOW, HEAD, ROW = 0.75, 0.75, 0.75, 0.7, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a title, a row of a legend."""
 LEFT, LEAST = 0.1, 0.15  # Left margin of titles, and least height of a panel, inches
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
-
-
-def save(
-    chart: Chart | Sheet,
-    path: str | os.PathLike[str],
-    *,
-    size: Ends | None = None,
-    dpi: float | None = None,
-) -> Path:
-    """Write the figure of a chart, or of a sheet of charts, into a file; return its path."""
-    return style.written(path, lambda dpi: draw(chart, size=size, dpi=dpi), size=size, dpi=dpi)
 
 
 def draw(
@@ -66,6 +53,10 @@ def draw(
     if width is not None:
         chart = _in_width(chart, width)
     own = _size(chart)
+    if not all(1 <= side * dpi <= style.PIXELS for side in size or own):
+        raise InputError(
+            f"size {size or own} at {dpi:g} dpi: sides must be 1 to {style.PIXELS} pixels"
+        )
     figure = _made(chart, size or own, dpi)
     if not _fits(figure) and size is not None:
         share = min(size[0] / own[0], size[1] / own[1], 1.0)

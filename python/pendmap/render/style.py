@@ -148,19 +148,15 @@ def written(
     path: str | os.PathLike[str],
     make: Callable[[float], Figure],
     *,
-    size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> Path:
     """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-    ``size``, inches, and ``dpi`` are the requested values; InputError is raised for impossible
-    ones. Files are undated, so that equal figures give equal files.
+    Files are undated, so that equal figures give equal files.
     """
     pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
     if not low <= pixels <= high:
         raise InputError(f"dpi {pixels:g} is not between {low} and {high}")
-    if size is not None and not all(1 <= side * pixels <= PIXELS for side in size):
-        raise InputError(f"size {size} at {pixels:g} dpi: sides must be 1 to {PIXELS} pixels")
     with DRAWING, whole_file(path, SUFFIXES) as part, mpl.rc_context(RC), quiet():
         figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
