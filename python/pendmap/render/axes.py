@@ -101,6 +101,7 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
         _fit(ax)
         if legend is not False:
             _legend(ax, panel, always=bool(legend))
+        _fit(ax)
     return ax
 
 
@@ -146,7 +147,6 @@ def _legend(axes: Axes, panel: Panel, *, always: bool) -> None:
     )
     if not always and legend.get_window_extent().height > axes.bbox.height / 2:
         legend.remove()
-    _fit(axes)
 
 
 def _fit(axes: Axes) -> None:
@@ -160,7 +160,8 @@ def _fit(axes: Axes) -> None:
         return
     drawn = [*axes.images, *axes.collections]
     group: list[Any] = [axes, *(one.colorbar.ax for one in drawn if one.colorbar)]
-    boxes = [one.get_window_extent() for one in group]
+    across = axes.figure.transSubfigure
+    boxes = [one.get_position(original=True).transformed(across) for one in group]
     old, place = Bbox.union(boxes), np.asarray(_place(axes).extents)
     box = Bbox.union([one.get_tightbbox() for one in group])
     lack = np.maximum((place - box.extents) * (1, 1, -1, -1), 0.0) * (1, 1, -1, -1)
@@ -168,8 +169,7 @@ def _fit(axes: Axes) -> None:
     if new.width > 0 and new.height > 0:
         move = BboxTransformFrom(old) + BboxTransformTo(new)
         for one, extent in zip(group, boxes, strict=True):
-            moved = extent.transformed(move).transformed(one.figure.transSubfigure.inverted())
-            one.set_position(moved)
+            one.set_position(extent.transformed(move).transformed(across.inverted()))
             one.set_in_layout(True)  # it is still moved by layouts of the user
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -32,7 +33,8 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 """Panel width in inches: several side by side, a single one, several stacked."""
 BESIDE, BAR, BELOW, HEAD, ROW = 0.75, 0.75, 0.75, 0.7, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a title, a row of a legend."""
-LEFT, LEAST = 0.1, 0.15  # Left margin of titles, and least height of a panel, inches
+LEFT: Final = 0.1  # Left margin of titles, inches
+LEAST: Final = (0.7, 0.15)  # Least width and height of a panel, inches
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 
 
@@ -46,7 +48,7 @@ def draw(
 ) -> Figure:
     """Return the figure of a chart or sheet, of any ``size`` or ``width`` in inches.
 
-    Where its texts leave no room for the panels, fonts are smaller, in proportion to the figure.
+    Where texts leave no room for the panels, they are smaller, in proportion to the figure.
     """
     if not title:
         chart = replace(chart, title="", subtitle="")
@@ -60,7 +62,7 @@ def draw(
     figure = _made(chart, size or own, dpi)
     if not _fits(figure) and size is not None:
         share = min(size[0] / own[0], size[1] / own[1], 1.0)
-        with mpl.rc_context({name: share * style.points(name) for name in style.IN_COLUMN}):
+        with mpl.rc_context(style.smaller(share)):
             figure = _made(chart, size, dpi)
             _fits(figure)
     return figure
@@ -92,10 +94,9 @@ def _fits(figure: Figure) -> bool:
         ticks.turn(axes)
         if not axes.axison:
             _shrink(axes)
-    high = [axes.bbox.height / figure.dpi for axes in figure.axes if axes.axison]
-    return min(high, default=1.0) > LEAST and not any(
-        "collapsed" in str(one.message) for one in caught
-    )
+    panels = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+    small = any(np.any(axes.bbox.size < np.array(LEAST) * figure.dpi) for axes in panels)
+    return not small and not any("collapsed" in str(one.message) for one in caught)
 
 
 def _head(figure: FigureBase, text: str, **look: Any) -> None:  # noqa: ANN401 (of any text)
@@ -245,6 +246,7 @@ def panel_into(axes: Axes, panel: Panel) -> None:
         ticks.scale(axes, which, replace(side, ticks=()) if panel.bare else side)
     names = [image.colorbar.ax.yaxis.label for image in axes.images if image.colorbar]
     style.wrap([axes.yaxis.label, *names], lambda: axes.bbox.height)
+    style.wrap([axes.xaxis.label], lambda: axes.bbox.width)
     if panel.bare:
         axes.set_axis_off()
 

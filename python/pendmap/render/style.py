@@ -97,6 +97,16 @@ def points(name: str) -> float:
     return float(FontProperties(size=settings[name]).get_size_in_points())
 
 
+def smaller(share: float) -> dict[Any, Any]:
+    """Return settings with smaller fonts, and smaller distances around texts."""
+    settings: Any = mpl.rcParams
+    sides = [f"{side}tick.major.{what}" for side in "xy" for what in ("size", "pad")]
+    pads = [f"figure.constrained_layout.{side}_pad" for side in "wh"]
+    lengths = [*sides, *pads, "axes.titlepad", "axes.labelpad"]
+    fonts = {name: share * points(name) for name in IN_COLUMN}
+    return fonts | {name: share * settings[name] for name in lengths}
+
+
 def inches(text: str, size: float) -> float:
     """Return the width of the widest line of a text in inches."""
     family = tuple(mpl.rcParams["font.family"])

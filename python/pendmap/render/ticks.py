@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from matplotlib.ticker import (
     FixedLocator,
     FuncFormatter,
@@ -62,7 +63,25 @@ class Powers(LogLocator):
         axis: Any = self.axis
         room = axis.get_tick_space() / max(abs(math.log10(vmax / vmin)), 1.0)
         self.set_params(subs=next((some for some in STEPS if len(some) <= room), STEPS[-1]))
-        return super().tick_values(vmin, vmax)
+        ticks: Any = super().tick_values(vmin, vmax)
+        return ticks[(ticks >= vmin) & (ticks <= vmax)]
+
+
+class Signed(SymmetricalLogLocator):
+    """Locator of an axis logarithmic on both sides of 0: 0, and powers of ten with room."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:  # noqa: ANN401 (as inherited)
+        """Return the tick places between two ends."""
+        axis: Any = self.axis
+        bent = axis.get_transform().transform
+        first, last = bent(np.array([vmin, vmax]))
+        least = (last - first) / max(axis.get_tick_space(), 1)
+        places: list[float] = []
+        ticks = [float(at) for at in super().tick_values(vmin, vmax) if vmin <= at <= vmax]
+        for at in sorted(ticks, key=lambda at: (at != 0.0, -abs(at))):
+            if all(abs(bent(at) - bent(other)) >= least for other in places):
+                places.append(at)
+        return np.array(places)
 
 
 def scale(axes: Axes, which: str, side: charts.Axis) -> None:
@@ -84,9 +103,7 @@ def scale(axes: Axes, which: str, side: charts.Axis) -> None:
         axis.set_major_locator(Powers())
         axis.set_major_formatter(FuncFormatter(lambda at, _: plane.power(float(at))))
     elif side.scale == "signed":
-        locator = SymmetricalLogLocator(axis.get_transform())
-        locator.set_params(numticks=5)
-        axis.set_major_locator(locator)
+        axis.set_major_locator(Signed(axis.get_transform()))
         axis.set_major_formatter(FuncFormatter(lambda at, _: plane.power(float(at))))
     else:
         angle = side.scale == "angle"

@@ -312,7 +312,7 @@ def test_a_figure_has_the_width_of_a_column(given: Any, width: float, tmp_path: 
     file = render.draw(given, tmp_path / "a.png", width=width, title=False, dpi=254)
     wide, high = struct.unpack(">II", file.read_bytes()[16:24])
     assert wide == 10 * width
-    assert high < 30 * width
+    assert high < 32 * width
     figure = render.figure_of(given, width=width, title=False)
     assert not figure.get_suptitle()
     figure.canvas.draw()
