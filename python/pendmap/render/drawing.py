@@ -230,7 +230,7 @@ def _legend(figure: FigureBase, chart: Chart | Sheet) -> None:
 
 def write_title(axes: Axes, title: str) -> None:
     """Write the title of a panel, in lines as wide as the panel."""
-    style.wrap([axes.set_title(title)], lambda: axes.bbox.width)
+    style.wrap([axes.set_title(title)], axes)
 
 
 def panel_into(axes: Axes, panel: Panel) -> None:
@@ -245,8 +245,8 @@ def panel_into(axes: Axes, panel: Panel) -> None:
     for which, side in (("x", panel.x), ("y", panel.y)):
         ticks.scale(axes, which, replace(side, ticks=()) if panel.bare else side)
     names = [image.colorbar.ax.yaxis.label for image in axes.images if image.colorbar]
-    style.wrap([axes.yaxis.label, *names], lambda: axes.bbox.height)
-    style.wrap([axes.xaxis.label], lambda: axes.bbox.width)
+    style.wrap([axes.yaxis.label, *names], axes, "height")
+    style.wrap([axes.xaxis.label], axes)
     if panel.bare:
         axes.set_axis_off()
 
@@ -258,7 +258,7 @@ def _warn(axes: Axes, warning: str) -> None:
     look["bbox"] = {"boxstyle": "square,pad=0.25", "fc": "white", "ec": ALARM, "alpha": 0.85}
     where: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
     words = axes.annotate(warning, (0.0, 1.0), (4.0, -4.0), va="top", **where, **look)
-    style.wrap([words], lambda: 0.9 * axes.bbox.width)
+    style.wrap([words], axes, share=0.9)
     words.set_in_layout(False)
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable, Iterator
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
@@ -129,11 +130,17 @@ def broken(text: str, room: float, size: float) -> str:
     return textwrap.fill(text, letters, break_long_words=False, break_on_hyphens=False)
 
 
-def wrap(texts: Iterable[Any], width: Callable[[], float]) -> None:
-    """Break the lines of texts between words, at each drawing, at a width in pixels."""
+def wrap(texts: Iterable[Any], axes: Axes, side: str = "width", share: float = 1.0) -> None:
+    """Break the lines of texts between words, at each drawing, at a share of a side of axes."""
     for text in texts:
         text.set_wrap(True)
-        text._get_wrap_line_width = width  # noqa: SLF001 (else the width of the figure)
+        # Else the side is that of the figure. A partial function can be pickled with it.
+        text._get_wrap_line_width = functools.partial(_length, axes, side, share)  # noqa: SLF001
+
+
+def _length(axes: Axes, side: str, share: float) -> float:
+    """Return a share of the width or height of axes in pixels."""
+    return share * float(getattr(axes.bbox, side))
 
 
 @contextlib.contextmanager

@@ -84,6 +84,10 @@ class Signed(SymmetricalLogLocator):
         return np.array(places)
 
 
+def _power(at: float, _: int) -> str:
+    return plane.power(float(at))
+
+
 def scale(axes: Axes, which: str, side: charts.Axis) -> None:
     """Set scale, limits, labels and name of a side of a panel."""
     axis: Axis = getattr(axes, f"{which}axis")
@@ -101,10 +105,10 @@ def scale(axes: Axes, which: str, side: charts.Axis) -> None:
         axis.set_ticks([at for at, _ in side.ticks], [text for _, text in side.ticks])
     elif side.scale == "log":
         axis.set_major_locator(Powers())
-        axis.set_major_formatter(FuncFormatter(lambda at, _: plane.power(float(at))))
+        axis.set_major_formatter(FuncFormatter(_power))
     elif side.scale == "signed":
         axis.set_major_locator(Signed(axis.get_transform()))
-        axis.set_major_formatter(FuncFormatter(lambda at, _: plane.power(float(at))))
+        axis.set_major_formatter(FuncFormatter(_power))
     else:
         angle = side.scale == "angle"
         shift, _ = plane.short_ticks(low * side.factor, high * side.factor, angle=angle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -119,6 +120,15 @@ def test_no_text_or_legend_is_cut_off_by_a_figure_without_a_layout(name: str) ->
             assert -1.5 < box.y0 < box.y1 < figure.bbox.height + 1.5, (layer, box)
         plt.close(figure)
     assert drawn
+
+
+def test_a_figure_can_be_pickled() -> None:
+    figure, every = plt.subplots(1, 2, layout="constrained")
+    plot(MAP, every[0], legend=True)
+    plot(pendmap.tongues(Pendulum(), np.linspace(1.5, 2.5, 9)), every[1])
+    again = pickle.loads(pickle.dumps(figure))  # noqa: S301 (our own bytes)
+    again.canvas.draw()
+    assert [axes.get_title() for axes in again.axes] == [axes.get_title() for axes in figure.axes]
 
 
 def test_other_axes_of_a_figure_stay_where_they_are() -> None:
