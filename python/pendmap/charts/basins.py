@@ -72,14 +72,14 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     low, high = (units.bare(bound, VELOCITY) for bound in velocity)
     ratio = min(max((high - low) / (theta[1] - theta[0]), 0.3), 1.3)
     rows, columns = dataset["label"].shape
-    said = [names.parameters(facts(dataset)), f"{columns} × {rows} cells"]
+    subtitle = [names.parameters(facts(dataset)), f"{columns} × {rows} cells"]
     if layer is None and finite_time(dataset):
-        said.append(exponents(dataset))
+        subtitle.append(exponents(dataset))
     elif layer is None and not reliable(dataset):
-        said.append(transients(dataset))
+        subtitle.append(transients(dataset))
     return Chart(
         _title(dataset, shown),
-        ";   ".join(filter(None, said)),
+        ";   ".join(filter(None, subtitle)),
         [[panel] for panel in panels] if ratio < FLAT else [panels],
         ratio=ratio,
     )

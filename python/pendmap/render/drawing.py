@@ -54,14 +54,14 @@ def draw(
         chart = replace(chart, title="", subtitle="")
     if width is not None:
         chart = _in_width(chart, width)
-    own = _size(chart)
-    if not all(1 <= side * dpi <= style.PIXELS for side in size or own):
+    usual = _size(chart)
+    if not all(1 <= side * dpi <= style.PIXELS for side in size or usual):
         raise InputError(
-            f"size {size or own} at {dpi:g} dpi: sides must be 1 to {style.PIXELS} pixels"
+            f"size {size or usual} at {dpi:g} dpi: sides must be 1 to {style.PIXELS} pixels"
         )
-    figure = _made(chart, size or own, dpi)
+    figure = _made(chart, size or usual, dpi)
     if not _fits(figure) and size is not None:
-        share = min(size[0] / own[0], size[1] / own[1], 1.0)
+        share = min(size[0] / usual[0], size[1] / usual[1], 1.0)
         with mpl.rc_context(style.smaller(share)):
             figure = _made(chart, size, dpi)
             _fits(figure)
