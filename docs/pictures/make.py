@@ -30,7 +30,6 @@ from pendmap.diagnosis import diagnose
 from pendmap.paper import figures as paper_figures
 from pendmap.paper import motions as paper_motions
 from pendmap.render import style
-from pendmap.render.drawing import save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -151,7 +150,7 @@ def forced() -> None:
         "Tumbling until it settles",
         "virtual rig, and the model that was identified from its free decay",
     )
-    save(sheet, HERE / "tumbling.png", dpi=110)
+    render.draw(sheet, HERE / "tumbling.png", dpi=110)
 
 
 if __name__ == "__main__":

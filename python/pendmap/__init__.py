@@ -13,7 +13,6 @@ TYPE_CHECKING = False  # importing typing would take most of this file's import 
 if TYPE_CHECKING:
     from typing import Any
 
-    from pendmap import plot as plot
     from pendmap.analysis.basin_sweep import sweep as sweep
     from pendmap.analysis.basins import basins as basins
     from pendmap.analysis.basins import basins_of as basins_of
@@ -59,6 +58,7 @@ if TYPE_CHECKING:
     from pendmap.records import Segment as Segment
     from pendmap.records import noise_floor as noise_floor
     from pendmap.records import read_experiment as read_experiment
+    from pendmap.render.axes import plot as plot
     from pendmap.viewer import view as view
 
     __version__: str
@@ -150,13 +150,14 @@ _OTHERS = {
         "noise_floor",
         "read_experiment",
     ],
+    "render.axes": ["plot"],
     "viewer": ["view"],
 }
 _HOMES = {
     **{name: home for home, names in _OTHERS.items() for name in names},
     **{name: f"analysis.{kind}" for kind, (_, names, _) in ANALYSES.items() for name in names},
 }
-__all__ = sorted([*_HOMES, "__version__", "plot"])  # noqa: PLE0605 (a list)
+__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
@@ -165,10 +166,6 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
         from importlib.metadata import version
 
         return version("pendmap")
-    if name == "plot":
-        import pendmap.plot
-
-        return pendmap.plot
     if name in _HOMES:
         import importlib
 

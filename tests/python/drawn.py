@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from matplotlib import rc_context
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from pendmap import render
@@ -37,12 +38,13 @@ def titles(figure: Figure) -> list[str]:
 
 
 def named(figure: Figure) -> list[str]:
-    return [plain(text.get_text()) for box in figure.legends for text in box.get_texts()]
+    """Return the texts of the legends, each on one line."""
+    boxes = [box for box in figure.findobj(Legend) if isinstance(box, Legend)]
+    return [plain(text.get_text()).replace("\n", " ") for box in boxes for text in box.get_texts()]
 
 
-def regions(figure: Figure) -> list[str]:
-    """Return the texts in the regions of images."""
-    return [plain(text.get_text()) for axes in figure.axes for text in axes.texts]
+def subtitle(figure: Figure) -> str:
+    return plain(figure.subfigs[0].get_suptitle())
 
 
 def written(figure: Figure) -> str:

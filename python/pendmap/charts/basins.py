@@ -12,7 +12,7 @@ import numpy as np
 from pendmap import _core
 from pendmap.charts import legend, names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import ALARM, INK, NONE, QUIET, Colours, Ends, Image, Mark, Points, Text
+from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points, Text
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
@@ -38,7 +38,6 @@ VARIABLES = {
 }
 """Layers by the name a user types, and the variable of each."""
 
-SMALL: Final = 0.64  # Size of the panel of unreliable labels, relative to the leading ones
 FLAT: Final = 0.55  # Height over width of panels below which they are stacked
 _PATHS: Final = {"settle": "steps"}  # Paths in a recording that are not the name of the layer
 _COLOUR_MAPS: Final = {
@@ -64,27 +63,27 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     sides = names.phase_plane(theta, velocity, units)
     panels = []
     for one in shown:
-        small = len(shown) > 1 and one == "labels" and not reliable(dataset)
-        alarm = [(warning(dataset), ALARM), (transients(dataset), QUIET)]
         marks = _layer(dataset, one, cells, window, listed)
         if one == "labels":
             marks += _attractors(dataset, listed, theta, velocity)
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
-        alone = shown == ("labels",) and not reliable(dataset)
-        share = SMALL if small else 1.0
-        look: dict[str, Any] = {"share": share, "note": alarm if small else ()}
-        look["warning"] = warning(dataset) if alone else ""
-        panels.append(Panel(one, what(dataset, one), *sides, marks, **look))
+        doubt = warning(dataset) if one == "labels" and not reliable(dataset) else ""
+        panels.append(Panel(one, what(dataset, one), *sides, marks, warning=doubt))
     recorded = [] if layer else _recorded(dataset, cells, window, sides)
     if finite_time(dataset) and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
         recorded.append(dataclasses.replace(panels[-1], root="basin"))
     ratio = names.proportion(theta, velocity, units)
     rows, columns = dataset["label"].shape
+    subtitle = [names.parameters(facts(dataset)), f"{columns} × {rows} cells"]
+    if layer is None and finite_time(dataset):
+        subtitle.append(exponents(dataset))
+    elif layer is None and not reliable(dataset):
+        subtitle.append(transients(dataset))
     return Chart(
         _title(dataset, shown),
-        f"{names.parameters(facts(dataset))};   {columns} × {rows} cells",
+        ";   ".join(filter(None, subtitle)),
         [[panel] for panel in panels] if ratio < FLAT else [panels],
         recorded=recorded,
         ratio=ratio,
@@ -185,12 +184,7 @@ def _layer(  # noqa: PLR0913 (parts of an image)
         classes[entry.id + 1] = (text, classes[entry.id + 1][1])
     shown = label.astype(np.int16) + 1
     if layer == "labels":
-        texts = [("", "")] * len(classes)
-        for entry in listed:
-            if not entry.chaotic:
-                short = f"{legend.typeset(entry.name)}\n{legend.percent(entry.fraction)}"
-                texts[entry.id + 1] = (short, entry.text)
-        return [Image(shown, *window, classes=classes, labels=texts, path="labels")]
+        return [Image(shown, *window, classes=classes, path="labels")]
     labels = Image(shown, *window, classes=classes, path="without")
     own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
     absent, values = missing(layer, own) | (label < 0), own.astype(np.float32)
@@ -264,9 +258,7 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
     pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
     speeds = float(points[:, 1].min()) - pad, float(points[:, 1].max()) + pad
     sides = names.phase_plane(plane.angles(dataset, points[:, 0]), speeds, units)
-    note = [(exponents(dataset), QUIET)]
-    title = "its attractor, once a period"
-    return Panel("section", title, *sides, dots, share=SMALL, note=note)
+    return Panel("section", "its attractor, once a period", *sides, dots)
 
 
 def missing(layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

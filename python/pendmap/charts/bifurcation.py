@@ -124,9 +124,8 @@ def _sweeps(
         classes.append((_said(every, k), one.colour))
     if (strip == 0).any():
         classes[0] = ("sweep on none", "#ffffff")
-    texts = [("" if name == "sweep on none" else name, name) for name, _ in classes]
     shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), cells)]
-    image = Image(shown, ends, (-1.0, 1.0), classes=classes, labels=texts, path="attractors")
+    image = Image(shown, ends, (-1.0, 1.0), classes=classes, path="attractors")
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
 
 

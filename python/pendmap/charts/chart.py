@@ -45,9 +45,8 @@ class Axis:
 class Panel:
     """Two axes with the marks between them.
 
-    ``name`` is the name a user types; ``root`` is the path in a recording, by default the name.
-    ``share`` is the size relative to the others of its row; a ``note``, pairs of text and colour,
-    is written below a smaller one, a ``warning`` in the panel. ``bare`` panels have no frame.
+    ``name`` is the name a user types; ``root`` is the path in a recording, by default the name. A
+    ``warning`` is written into the panel. ``bare`` panels have no frame.
     """
 
     name: str
@@ -57,8 +56,6 @@ class Panel:
     marks: Sequence[Mark]
     _: dataclasses.KW_ONLY
     root: str = ""
-    share: float = 1.0
-    note: Sequence[tuple[str, str]] = ()
     warning: str = ""
     bare: bool = False
 
@@ -113,28 +110,22 @@ class Chart:
     def in_width(self, width: float) -> Chart:
         """Return the chart with its rows broken where ``width``, inches, is too narrow for them.
 
-        Heights are in inches: those of the figure, smaller by at most 40 percent. A note is in the
-        title of its panel.
+        Heights are in inches: those of the figure, smaller by at most 40 percent.
         """
         fit = max(1, int(width // NARROWEST))
-        parts = self.heights or [max(panel.share for panel in row) for row in self.rows]
+        parts = self.heights or [1.0] * len(self.rows)
         if self.size is None:
             high = [self.ratio * (width / min(fit, len(row)) - 0.75) for row in self.rows]
-            inches = [part * one for part, one in zip(parts, high, strict=True)]
+            inches = [part * one + 0.75 for part, one in zip(parts, high, strict=True)]
         else:
             scale = self.size[1] / sum(parts) * min(1.0, max(width / self.size[0], 0.6))
             inches = [scale * part for part in parts]
         rows, heights = [], []
         for row, tall in zip(self.rows, inches, strict=True):
             for k in range(0, len(row), fit):
-                rows.append([_narrow(panel) for panel in row[k : k + fit]])
+                rows.append(row[k : k + fit])
                 heights.append(tall)
         return dataclasses.replace(self, rows=rows, heights=heights, columns=0, size=None)
-
-
-def _narrow(panel: Panel) -> Panel:
-    title = "; ".join([panel.title, *(text for text, _ in panel.note[:1])])
-    return dataclasses.replace(panel, title=title, share=1.0, note=())
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,8 +124,7 @@ class Image(Mark):
     """Cells between the ends of both axes, row 0 lowest.
 
     ``values`` are numbers, shape (rows, columns), nan where missing, coloured by ``colours``; or
-    they are indices into ``classes``, pairs of name and colour. A region large enough for the text
-    of its class in ``labels`` contains it, in place of the entry of the legend named beside it.
+    they are indices into ``classes``, pairs of name and colour.
     """
 
     values: npt.NDArray[Any]
@@ -134,7 +133,6 @@ class Image(Mark):
     _: dataclasses.KW_ONLY
     colours: Colours | None = None
     classes: Sequence[tuple[str, str]] = ()
-    labels: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True, eq=False)

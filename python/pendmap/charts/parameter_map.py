@@ -63,7 +63,7 @@ class Kind:
     @property
     def text(self) -> str:
         """Line of the legend."""
-        return f"{self.name}: {_percent(self.presence)} of the cells"
+        return f"{self.name}, {_percent(self.presence)}"
 
 
 def _percent(share: float) -> str:
@@ -160,7 +160,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     lines = _curves(dataset)
     panels = []
     for one in shown:
-        title = LAYERS.get(one, one) + ("; stripes: they coexist" if one == "kinds" else "")
+        title = LAYERS.get(one, one) + (
+            " and shares; stripes: coexisting" if one == "kinds" else ""
+        )
         image = _image(dataset, one, across, up, cells)
         panels.append(Panel(one, title, *sides, [image, *lines]))
     fixed = names.parameters(facts(dataset), varied)
@@ -184,8 +186,7 @@ def _image(
     if name == "kinds":
         classes = [(kind.text, kind.colour) for kind in kinds(dataset)]
         picture = striped(dataset, cells, max(2, cells // _STRIPES))
-        texts = [(kind.name, kind.text) for kind in kinds(dataset)]
-        return Image(picture, across, up, classes=classes, labels=texts, path="kinds")
+        return Image(picture, across, up, classes=classes, path="kinds")
     of_kind = name.removeprefix("share ")
     layer = dataset[name] if of_kind == name else dataset["share"].sel(kind=of_kind)
     values = np.asarray(plane.pixels(dataset, layer, cells), dtype=np.float64)

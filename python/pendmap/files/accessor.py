@@ -22,16 +22,12 @@ class Accessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, ax: Any = None, **look: Any) -> Any:  # noqa: ANN401 (as plot.draw)
-        """Draw one part of the result into Axes; arguments are those of ``pendmap.plot.draw``."""
-        return pendmap.plot.draw(self._dataset, ax, **look)
+    def plot(self, ax: Any = None, **look: Any) -> Any:  # noqa: ANN401 (as pendmap.plot)
+        """Draw one part of the result into Axes; arguments are those of ``pendmap.plot``."""
+        return pendmap.plot(self._dataset, ax, **look)
 
     def to_dataframe(self) -> Any:  # noqa: ANN401 (a pandas.DataFrame)
         """Return the first variable with values, and all of its dimensions, as a table."""
         whole = self._dataset.reset_coords(drop=True)
         dims = next(one.dims for one in whole.data_vars.values() if one.dims and one.size)
         return whole[[name for name in whole.data_vars if whole[name].dims == dims]].to_dataframe()
-
-    def figure(self, **look: Any) -> Any:  # noqa: ANN401 (as plot.figure)
-        """Return the figure of the result; arguments are those of ``pendmap.plot.figure``."""
-        return pendmap.plot.figure(self._dataset, **look)

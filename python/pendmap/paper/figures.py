@@ -94,11 +94,11 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
+    from pendmap import render  # noqa: PLC0415
     from pendmap.charts import comparison, identification, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import motions, pendulum  # noqa: PLC0415
     from pendmap.paper import tumbling as chaos  # noqa: PLC0415
-    from pendmap.render.drawing import save  # noqa: PLC0415
 
     (key,) = wanted(key) if key != "all" else ("all",)
     if key not in FIGURES:
@@ -107,25 +107,24 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
-        return save(tongues.chart(_critical(), title=title, marks=marks), path)
+        return render.draw(tongues.chart(_critical(), title=title, marks=marks), path)
     if key == "2":
-        return save(chaos.chart(tumbling(), title), path)
+        return render.draw(chaos.chart(tumbling(), title), path)
     if key == "3":
-        return save(pendulum.chart(title=title), path)
+        return render.draw(pendulum.chart(title=title), path)
     if key in ("8", "9"):
         make = motions.steady_states if key == "8" else motions.tumbling
         runs = make(report(seed).methods["combined_repaired"].rig, seed)
         subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
         chart = comparison.steady if key == "8" else comparison.tumbling
-        return save(chart(runs, title, subtitle), path)
+        return render.draw(chart(runs, title, subtitle), path)
     subtitle = (
         f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°, "
         f"seed {seed}"
     )
     parts = (_PARTS[key],)
-    return save(
-        identification.sheet(report(seed), parts=parts, title=title, subtitle=subtitle), path
-    )
+    sheet = identification.sheet(report(seed), parts=parts, title=title, subtitle=subtitle)
+    return render.draw(sheet, path)
 
 
 def _critical() -> xr.Dataset:

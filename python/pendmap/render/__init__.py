@@ -1,7 +1,7 @@
 """Matplotlib figures for papers; the only package that imports matplotlib.
 
-:mod:`pendmap.plot` draws into Axes and figures of one's own, ``draw`` into files. No display is
-needed.
+:func:`pendmap.plot` draws one part into Axes of one's own, ``draw`` a whole figure into a file. No
+display is needed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["SUFFIXES", "draw", "figure_of", "write_report"]
 
 _INCH = 25.4  # mm
-MOST_NARROW, MOST_WIDE = 40.0, 500.0  # Least and greatest width of a figure, mm
 
 
 def figure_of(  # noqa: PLR0913 (all of these a user may choose)
@@ -43,15 +42,13 @@ def figure_of(  # noqa: PLR0913 (all of these a user may choose)
     colormap: str | Colormap | None = None,
 ) -> Figure:
     """Return the figure of a result, or of a chart; arguments are those of :func:`draw`."""
-    if width is not None and not (size is None and MOST_NARROW <= width <= MOST_WIDE):
-        raise InputError(
-            f"width must be {MOST_NARROW:g} to {MOST_WIDE:g} mm, and no size given, got {width!r}"
-        )
+    if width is not None and not (size is None and 0 < width < math.inf):
+        raise InputError(f"width must be positive, in mm, and no size given, got {width!r}")
     if isinstance(result, Chart | Sheet):
         made = result
     else:
         wide = width / _INCH if width else max(size or (0.0,))
-        cells = max(drawing.CELLS, math.ceil(wide * dpi))
+        cells = max(drawing.CELLS, math.ceil(min(style.PIXELS, wide * dpi)))
         made = registry.of_result(result, layer=layer, cells=cells)
     if colormap is not None:
         made = drawing.in_colours(made, colormap)
@@ -125,8 +122,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     Raises
     ------
     InputError
-        For an unknown kind of result, suffix, layer or colour map, and for an impossible size or
-        resolution.
+        For an unknown kind of result, suffix, layer or colour map, and for a resolution or a number
+        of pixels that no file can have.
     MemoryError
         If the dataset is too large.
     OSError
@@ -134,14 +131,14 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 
     Examples
     --------
-    >>> pendmap.plot.save(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
+    >>> render.draw(pendmap.load("basins.nc"), "settle.pdf", layer="settle")  # doctest: +SKIP
     """
 
     def make(dpi: float) -> Figure:
         look: dict[str, Any] = {"size": size, "width": width, "title": title, "colormap": colormap}
         return figure_of(result, layer=layer, dpi=dpi, **look)
 
-    return style.written(path, make, size=size, dpi=dpi)
+    return style.written(path, make, dpi=dpi)
 
 
 def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:

@@ -1,124 +1,178 @@
-"""One panel of a chart in Axes of one's own."""
+"""One part of a result in Axes of one's own."""
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.transforms import Bbox, BboxTransformFrom, BboxTransformTo, ScaledTranslation
 
-from pendmap.charts.chart import Chart, Sheet
-from pendmap.charts.marks import Image
-from pendmap.render import drawing, marks, regions, style
+from pendmap.charts import registry
+from pendmap.errors import check_type
+from pendmap.render import drawing, marks, style, ticks
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
 
     from pendmap.charts.chart import Panel
-    from pendmap.charts.marks import Ends
+
+_FIRST = {
+    "Experiment": "history",
+    "Run": "history",
+    "IdentificationReport": "peaks",
+    "Comparison": "record",
+    "Discrepancy": "ranking",
+}
+"""Part of a result that is drawn if none is asked for, where it is not the first."""
 
 
-def into(
-    axes: Axes, chart: Chart | Sheet, *, title: bool = True, legend: bool | None = None
-) -> None:
-    """Draw the first panel of a chart into given axes, in their fonts.
+def plot(  # noqa: PLR0913 (all of these a user may choose)
+    result: Any,  # noqa: ANN401 (a dataset, records, or what was found in records)
+    ax: Axes | None = None,
+    *,
+    layer: str | None = None,
+    title: bool | str = True,
+    legend: bool | None = None,
+    colormap: str | Colormap | None = None,
+) -> Axes:
+    """Draw one part of any result into Axes, in the fonts and sizes of the user's style.
 
-    The legend is below the panel; without ``legend`` one higher than half the panel is left out.
-    Axes that show something already keep their title and their names; limits and legend grow.
+    Parameters
+    ----------
+    result : xarray.Dataset or other result
+        Result of an analysis, of ``load``, ``read_experiment``, ``identify``, ``compare`` or
+        ``diagnose``. A selection of a dataset is drawn with its own cells and shares; one map of a
+        sweep, like ``swept.sel(p=0.6)``, as a basin map.
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure of pyplot, which a notebook shows. Axes that show something
+        already keep their title and their names; limits and legend grow.
+    layer : str, optional
+        The part; an unknown one is answered with those of the result.
+    title : bool or str
+        False for none, or a text.
+    legend : bool, optional
+        Whether to write a legend below the panel. By default one higher than half the panel is left
+        out.
+    colormap : str or Colormap, optional
+        Colour map of matplotlib, or its name, for layers of numbers.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        ``ax``, with marks, limits, ticks and labels. In a figure without a layout it is made
+        smaller where its texts would be cut off.
+
+    Raises
+    ------
+    InputError
+        For what has no figure, and for an unknown layer or colour map.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import pendmap
+    >>> fig, (left, right) = plt.subplots(1, 2, layout="constrained")
+    >>> map_ = pendmap.basins(pendmap.Pendulum(p=0.6), pendmap.Grid.square(40))
+    >>> ax = pendmap.plot(map_, left)
+    >>> ax = pendmap.plot(map_, right, layer="settle", title=False)
+    >>> plt.close(fig)
     """
+    panel = _panel(result, layer, colormap)
+    if legend is not None:
+        check_type("legend", legend, bool, "False")
+    with style.DRAWING:
+        if ax is None:
+            from matplotlib import pyplot as plt  # noqa: PLC0415 (a display, only if needed)
+
+            ax = plt.figure(layout="constrained").add_subplot()
+        check_type("ax", ax, Axes, "plt.gca()")
+        with _growing(ax):
+            drawing.panel_into(ax, panel)
+        if isinstance(title, str):
+            drawing.write_title(ax, title)
+        elif title and panel.title and not ax.get_title():
+            drawing.write_title(ax, style.typeset(panel.title))
+        ticks.turn(ax)
+        _fit(ax)
+        if legend is not False:
+            _legend(ax, panel, always=bool(legend))
+        _fit(ax)
+    return ax
+
+
+def _panel(result: Any, layer: str | None, colormap: str | Colormap | None) -> Panel:  # noqa: ANN401
+    """Return one part of a result, by default the leading one."""
+    if layer is None:
+        layer = _FIRST.get(type(result).__name__)
+        if layer == "history" and len(getattr(result, "runs", [])) > 1:
+            layer = "0"
+    # Alone a part has no names that the other parts explain.
+    layer = layer or registry.of_result(result).panels[0].name
+    chart = registry.of_result(result, layer=layer)
+    if colormap is not None:
+        chart = drawing.in_colours(chart, colormap)
+    return chart.panels[0]
+
+
+def _legend(axes: Axes, panel: Panel, *, always: bool) -> None:
+    """Write the legend below the names of the axes, as wide as the axes."""
     figure: Any = axes.figure
-    panel, before = first(chart), _named(axes)
-    with _growing(axes):
-        drawing.panel_into(axes, panel)
-    wide, high = _fitted(axes)
-    if title and panel.title and not axes.get_title():
-        long = style.width_of(panel.title) > wide
-        axes.set_title(style.typeset(style.folded(panel.title, wide) if long else panel.title))
-    drawing.turned(axes, panel)
-    wide, high = _fitted(axes)
-    if legend is not False:
-        lines = 0.0
-        for _ in range(2):  # the legend takes its height from the panel
-            room = (wide, high - lines)
-            inside = regions.labelled(Chart("", "", [[panel]]), {panel: room}.__getitem__)
-            handles, texts = entries(inside.panels[0])
-            named = before | dict(zip(texts, handles, strict=True))
-            texts, columns, lines = _broken([*named], wide)
-        for mark in inside.panels[0].marks[len(panel.marks) :]:
-            marks.draw(axes, mark)
-            axes.texts[-1].set_in_layout(False)
-    box: Any = axes.get_tightbbox()
-    around = box.height - axes.bbox.height
-    half = (_place(axes).height - around) / figure.dpi / 2
-    if legend is False or not texts or (legend is None and lines > half):
+    dpi = figure.get_figure(root=True).dpi
+    before = axes.get_legend()
+    texts = [text.get_text().replace("\n", " ") for text in before.get_texts()] if before else []
+    handles: list[Any] = before.legend_handles if before else []
+    named = dict(zip(texts, handles, strict=True)) | marks.legend(panel.marks)
+    if not named:
         return
-    down = -3.4 * style.points("font.size") / 72
-    below = axes.legend(
-        [*named.values()],
-        texts,
+    texts, columns = marks.shape([*named], axes.bbox.width / dpi)
+    names = axes.xaxis.get_tightbbox()
+    down = (axes.bbox.y0 - names.y0 if names else 0.0) / dpi + 0.05
+    look: dict[str, Any] = marks.LEGEND
+    legend = axes.legend(
+        handles=[*named.values()],
+        labels=texts,
         ncols=columns,
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
-        bbox_transform=axes.transAxes + ScaledTranslation(0.0, down, figure.dpi_scale_trans),
+        bbox_transform=axes.transAxes + ScaledTranslation(0.0, -down, figure.dpi_scale_trans),
         borderaxespad=0.0,
         frameon=False,
-        handlelength=1.2,
+        **look,
     )
-    whole: Any = below.get_tightbbox
-
-    def as_wide_as_the_panel(renderer: Any = None) -> Bbox:  # noqa: ANN401 (of any backend)
-        # A layout leaves room below the panel, and does not narrow it.
-        box, panel = whole(renderer), axes.bbox
-        return Bbox.from_extents(panel.x0, box.y0, panel.x1, box.y1)
-
-    below.get_tightbbox = as_wide_as_the_panel  # type: ignore[method-assign]
-    _fitted(axes)
+    if not always and legend.get_window_extent().height > axes.bbox.height / 2:
+        legend.remove()
 
 
-def _broken(texts: list[str], wide: float) -> tuple[list[str], int, float]:
-    """Return texts of a legend in lines that fit, the number of its columns, and its height."""
-    size = style.points("legend.fontsize")
-    texts = [style.broken(text, wide - drawing.HANDLE, size) for text in texts]
-    columns = drawing.columns(texts, wide)
-    return texts, columns, drawing.ROW * sum(t.count("\n") + 1 for t in texts[::columns])
+def _fit(axes: Axes) -> None:
+    """Lay out a figure; without a layout make axes smaller whose texts leave their place.
 
-
-def _fitted(axes: Axes) -> Ends:
-    """Lay out a figure, make axes smaller whose texts leave their place; return their inches.
-
-    Their place is the figure, or the part of a grid up to the middle of the gaps around it. Their
-    colour bar is made smaller with them; upright names longer than it are broken.
+    Colour bars are made smaller with their axes.
     """
-    figure: Any = axes.figure
+    figure: Any = axes.get_figure(root=True)
     if figure.get_layout_engine() is not None:
         figure.get_layout_engine().execute(figure)
+        return
     drawn = [*axes.images, *axes.collections]
     group: list[Any] = [axes, *(one.colorbar.ax for one in drawn if one.colorbar)]
-    place, least = np.asarray(_place(axes).extents), drawing.LEAST * figure.dpi
-    for _ in range(3):
-        for one in group:
-            name, high = one.yaxis.label, drawing.inches_of(one)[1]
-            name.set_text(style.broken(name.get_text(), high, name.get_fontsize()))
-        box = Bbox.union([one.get_tightbbox() for one in group]).extents
-        lack = np.maximum((box - place) * (-1, -1, 1, 1), 0.0) * (1, 1, -1, -1)
-        boxes = [one.get_position(original=True) for one in group]
-        old = Bbox.union(boxes).transformed(figure.transSubfigure)
-        new = Bbox(np.reshape(old.extents + lack, (2, 2)))
-        if np.abs(lack).max() < 1 or min(new.width, new.height) < least:
-            break
+    across = axes.figure.transSubfigure
+    boxes = [one.get_position(original=True).transformed(across) for one in group]
+    old, place = Bbox.union(boxes), np.asarray(_place(axes).extents)
+    box = Bbox.union([one.get_tightbbox() for one in group])
+    lack = np.maximum((place - box.extents) * (1, 1, -1, -1), 0.0) * (1, 1, -1, -1)
+    new = Bbox(np.reshape(old.extents + lack, (2, 2)))
+    if new.width > 0 and new.height > 0:
         move = BboxTransformFrom(old) + BboxTransformTo(new)
-        for one, own in zip(group, boxes, strict=True):
-            moved = own.transformed(figure.transSubfigure).transformed(move)
-            one._set_position(moved.transformed(figure.transSubfigure.inverted()))  # noqa: SLF001
-    return drawing.inches_of(axes)
+        for one, extent in zip(group, boxes, strict=True):
+            one.set_position(extent.transformed(move).transformed(across.inverted()))
+            one.set_in_layout(True)  # it is still moved by layouts of the user
 
 
 def _place(axes: Axes) -> Bbox:
-    """Return the part of a figure that axes may fill with their texts, in pixels."""
+    """Return the figure, or the part of a grid up to the middle of the gaps around, in pixels."""
     figure: Any = axes.figure
     spec = axes.get_subplotspec()
     if spec is None:
@@ -130,29 +184,6 @@ def _place(axes: Axes) -> Bbox:
     rows, columns = spec.rowspan, spec.colspan
     corners = [[across[columns.start], up[rows.stop]], [across[columns.stop], up[rows.start]]]
     return Bbox(corners).transformed(figure.transSubfigure)
-
-
-def first(chart: Chart | Sheet) -> Panel:
-    """Return the first panel of a chart, with its own labels."""
-    panel = chart.panels[0]
-    return replace(chart.whole(panel) if isinstance(chart, Chart) else panel, note=())
-
-
-def entries(panel: Panel) -> tuple[list[Any], list[str]]:
-    """Return the handles of a panel's legend, and their texts."""
-    handles, texts = marks.legend(panel.marks)
-    images = [mark for mark in panel.marks if isinstance(mark, Image)]
-    short = {style.typeset(long): text for image in images for text, long in image.labels if text}
-    return handles, [short.get(text, text).replace("\n", ", ") for text in texts]
-
-
-def _named(axes: Axes) -> dict[str, Any]:
-    """Return the entries of the legend that axes have."""
-    there = axes.get_legend()
-    if there is None:
-        return {}
-    texts = [text.get_text().replace("\n", " ") for text in there.get_texts()]
-    return dict(zip(texts, there.legend_handles, strict=True))
 
 
 @contextlib.contextmanager

@@ -23,6 +23,15 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Mark
 
 TABLE, APART = 8.0, 0.14  # Font size of a table; least distance between its columns, inches
+HANDLE: Final = 0.6  # Width of the handle of a legend's entry with its distances, inches
+LEGEND: Final[dict[str, Any]] = {
+    "handlelength": 1.7,
+    "handleheight": 1.0,
+    "handletextpad": 0.6,
+    "columnspacing": 1.6,
+    "borderpad": 0.1,
+}
+"""Distances in legends, in font sizes."""
 _CELLS: Final = 1200  # Greatest number of columns of a density, and three times that of rows
 _PALEST: Final = 0.2  # Opacity of a single point in a density
 MANY: Final = 2000  # Number of points from which they are rasterised in vector files
@@ -135,27 +144,20 @@ def _text(axes: Axes, mark: charts.Text) -> None:
 
 
 def _table(axes: Axes, mark: charts.Table) -> None:
-    edges = np.cumsum(_columns(mark))
-    look: dict[str, Any] = {"va": "bottom", "fontsize": TABLE, "linespacing": 1.15}
+    """Write a table as wide as the figure, in a smaller font if the figure is too narrow."""
+    columns = zip(mark.head, *mark.rows, strict=True)
+    texts = ([line for cell in column for line in cell.split("\n")] for column in columns)
+    wide = [APART + max(style.inches(line, TABLE) for line in lines) for lines in texts]
+    edges = np.cumsum(wide)
+    figure: Any = axes.figure
+    room = figure.bbox.width / figure.get_figure(root=True).dpi - 0.2
+    look: dict[str, Any] = {"va": "bottom", "linespacing": 1.15}
+    look["fontsize"] = TABLE * min(room / float(edges[-1]), 1.0)
     for down, row in enumerate([mark.head, *mark.rows]):
         look["color"] = charts.INK if down else charts.QUIET
         axes.text(0.0, down + 1.4, style.typeset(row[0]), ha="left", **look)
         for edge, text in zip(edges[1:], row[1:], strict=True):
             axes.text(edge / edges[-1], down + 1.4, style.typeset(text), ha="right", **look)
-
-
-def _columns(mark: charts.Table) -> list[float]:
-    """Return the width of each column in inches, with the distance to the previous one."""
-    columns = zip(mark.head, *mark.rows, strict=True)
-    texts = ([line for cell in column for line in cell.split("\n")] for column in columns)
-    return [APART + max(style.inches(line, TABLE) for line in each) for each in texts]
-
-
-def across(mark: Mark) -> float:
-    """Return the width that text needs in a panel without a frame, in inches."""
-    if isinstance(mark, charts.Table):
-        return sum(_columns(mark))
-    return style.inches(mark.text, mark.size) if isinstance(mark, charts.Text) else 0.0
 
 
 def _image(axes: Axes, mark: charts.Image) -> None:
@@ -202,8 +204,8 @@ _DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
 }
 
 
-def legend(marks: Sequence[Mark]) -> tuple[list[Any], list[str]]:
-    """Return handles and texts of the named marks; marks of equal name share one entry."""
+def legend(marks: Sequence[Mark]) -> dict[str, Any]:
+    """Return the handles of the named marks by their texts; equal names share one entry."""
     named: dict[str, list[Any]] = {}
     for mark in marks:
         if isinstance(mark, charts.Image):
@@ -212,9 +214,18 @@ def legend(marks: Sequence[Mark]) -> tuple[list[Any], list[str]]:
                 named.setdefault(name, []).append(patch)
         elif mark.name:
             named.setdefault(mark.name, []).append(_handle(mark))
-    kept = {name: handles[:3] for name, handles in named.items() if name}
-    texts = [style.typeset(name) for name in kept]
-    return [tuple(each) if len(each) > 1 else each[0] for each in kept.values()], texts
+    every = {style.typeset(name): handles[:3] for name, handles in named.items() if name}
+    return {name: tuple(some) if len(some) > 1 else some[0] for name, some in every.items()}
+
+
+def shape(texts: Sequence[str], room: float) -> tuple[list[str], int]:
+    """Return texts of a legend in lines that fit into ``room`` inches, and its columns."""
+    size = style.points("legend.fontsize")
+    lines = [style.broken(text, room - HANDLE, size) for text in texts]
+    widest = max((style.inches(text, size) for text in lines), default=0.0) + HANDLE
+    most = min(max(int((room - 0.2) // widest), 1), max(len(lines), 1))
+    rows = max(-(-len(lines) // most), 1)
+    return lines, max(-(-len(lines) // rows), 1)
 
 
 def _handle(mark: Mark) -> Any:  # noqa: ANN401 (an artist)

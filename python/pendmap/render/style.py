@@ -1,11 +1,13 @@
-"""Style of all figures: fonts, ticks, colour maps, text widths, and writing to files."""
+"""Style of all figures: fonts, symbols, colour maps, text widths, and writing to files."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import re
 import textwrap
 import threading
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,8 +21,9 @@ from pendmap.files import whole_file
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")  # File suffixes that can be drawn
@@ -36,9 +39,8 @@ IN_COLUMN: Final[dict[Any, Any]] = {
     "legend.fontsize": 7.5,
 }
 
-MOST, PIXELS = 100.0, 20000  # Largest side of a figure, inches and pixels
-
-FEWEST = 12  # Letters of a line below which a text is not broken
+PIXELS = 20000  # Largest side of a figure, pixels
+FEWEST = 12  # Letters of a line that is not broken
 
 DPI = (20, 1200)  # Least and greatest pixels per inch
 
@@ -96,56 +98,57 @@ def points(name: str) -> float:
     return float(FontProperties(size=settings[name]).get_size_in_points())
 
 
-def inches(text: str, size: float | None = None, *, bold: bool = False) -> float:
-    """Return the width of the widest line in inches, by default in the font size of ticks."""
-    family, size = tuple(mpl.rcParams["font.family"]), size or points("xtick.labelsize")
+def smaller(share: float) -> dict[Any, Any]:
+    """Return settings with smaller fonts, and smaller distances around texts."""
+    settings: Any = mpl.rcParams
+    sides = [f"{side}tick.major.{what}" for side in "xy" for what in ("size", "pad")]
+    pads = [f"figure.constrained_layout.{side}_pad" for side in "wh"]
+    lengths = [*sides, *pads, "axes.titlepad", "axes.labelpad"]
+    fonts = {name: share * points(name) for name in IN_COLUMN}
+    return fonts | {name: share * settings[name] for name in lengths}
+
+
+def inches(text: str, size: float) -> float:
+    """Return the width of the widest line of a text in inches."""
+    family = tuple(mpl.rcParams["font.family"])
     lines = (typeset(line) for line in text.split("\n") if line.strip())
-    return max((_width(line, size, family, bold=bold) for line in lines), default=0.0)
+    return max((_width(line, size, family) for line in lines), default=0.0)
 
 
 @functools.lru_cache(maxsize=4096)
-def _width(text: str, size: float, family: tuple[str, ...], *, bold: bool) -> float:
-    font = FontProperties(family=list(family), weight="bold" if bold else "normal")
-    path = TextPath((0, 0), text, size=size, prop=font)
+def _width(text: str, size: float, family: tuple[str, ...]) -> float:
+    path = TextPath((0, 0), text, size=size, prop=FontProperties(family=list(family)))
     return float(path.get_extents().width) / 72
 
 
-def width_of(title: str) -> float:
-    """Return the width of the longest line of a panel's title, in inches."""
-    return inches(title, points("axes.titlesize"))
+def broken(text: str, room: float, size: float) -> str:
+    """Return a text in lines of about ``room`` inches at most, broken between words."""
+    wide = inches(text, size)
+    if wide <= room:
+        return text
+    letters = max(int(0.95 * len(text) * room / wide), FEWEST)
+    return textwrap.fill(text, letters, break_long_words=False, break_on_hyphens=False)
 
 
-def folded(title: str, room: float) -> str:
-    """Return a title on two lines of nearly equal length, or on three if there is less room."""
-    letters = max(len(line) for line in title.split("\n")) or 1
-    size = width_of(title) / letters
-    lines = title
-    for count in range(2, 4):
-        lines = textwrap.fill(title, max(-(-len(title) // count) + 3, 8))
-        if room == 0.0 or width_of(lines) <= room + 0.15 or size == 0:
-            break
-    return lines
+def wrap(texts: Iterable[Any], axes: Axes, side: str = "width", share: float = 1.0) -> None:
+    """Break the lines of texts between words, at each drawing, at a share of a side of axes."""
+    for text in texts:
+        text.set_wrap(True)
+        # Else the side is that of the figure. A partial function can be pickled with it.
+        text._get_wrap_line_width = functools.partial(_length, axes, side, share)  # noqa: SLF001
 
 
-def broken(text: str, room: float, size: float, *, bold: bool = False) -> str:
-    """Return a text in lines of at most ``room`` inches, broken between words."""
-    letters, lines = len(text), text
-    while inches(lines, size, bold=bold) > room and letters > FEWEST:
-        letters -= 1
-        lines = textwrap.fill(text, letters)
-    return lines
+def _length(axes: Axes, side: str, share: float) -> float:
+    """Return a share of the width or height of axes in pixels."""
+    return share * float(getattr(axes.bbox, side))
 
 
-def halves(text: str) -> list[str]:
-    """Return a text on two lines as equal as possible, broken at one of its semicolons."""
-    parts = text.split(";   ")
-    both = [[";   ".join(parts[:k]), ";   ".join(parts[k:])] for k in range(1, len(parts))]
-    return min(both, key=longest, default=[text])
-
-
-def longest(lines: Sequence[str]) -> float:
-    """Return the width of the longest line, in inches."""
-    return max(inches(line, points("font.size")) for line in lines)
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Draw without the warning of matplotlib that a figure is too small for its texts."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")
+        yield
 
 
 def colour_map(name: str | Colormap) -> Colormap:
@@ -162,23 +165,16 @@ def written(
     path: str | os.PathLike[str],
     make: Callable[[float], Figure],
     *,
-    size: tuple[float, float] | None = None,
     dpi: float | None = None,
 ) -> Path:
     """Write the figure that ``make`` returns for a resolution into a file; return its path.
 
-    ``size``, inches, and ``dpi`` are the requested values; InputError is raised for impossible
-    ones. Files are undated, so that equal figures give equal files.
+    Files are undated, so that equal figures give equal files.
     """
     pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
     if not low <= pixels <= high:
         raise InputError(f"dpi {pixels:g} is not between {low} and {high}")
-    if size is not None and not all(0 < side <= MOST for side in size):
-        raise InputError(f"size {size}: width and height are positive, at most {MOST:g} inches")
-    if size is not None and max(size) * pixels > PIXELS:
-        said = f"at most {PIXELS} pixels a side are possible"
-        raise InputError(f"size {size} at {pixels:g} dpi: {said}")
-    with DRAWING, whole_file(path, SUFFIXES) as part, mpl.rc_context(RC):
+    with DRAWING, whole_file(path, SUFFIXES) as part, mpl.rc_context(RC), quiet():
         figure, suffix = make(pixels), part.suffix.lower().lstrip(".")
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(suffix, {})
         figure.savefig(part, format=suffix, dpi=figure.dpi, metadata=metadata)

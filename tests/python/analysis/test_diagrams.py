@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from drawn import made, named, regions
+from drawn import made, named
 from pendmap import Pendulum, Rig, render
 from pendmap.charts import bifurcation as drawn
 from pendmap.charts import palette
@@ -107,7 +107,7 @@ def test_results_in_si_agree() -> None:
 
 def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
     figure = made(diagram)
-    texts = named(figure) + regions(figure)
+    texts = named(figure)
     assert "rotation 1:+1" in texts
     assert "tumbling chaos" in texts
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]

@@ -309,7 +309,7 @@ def test_the_figure_in_both_planes(whole: xr.Dataset, plane: str) -> None:
     figure = made(whole.assign_attrs(plane=plane))
     axes = figure.axes[0]
     assert ("e = p" in plain(axes.get_ylabel())) == (plane == "e-alpha2")
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    texts = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
     for name in ("multiplier", "hanging rest is stable", "inverted rest is stable"):
         assert any(name in text for text in texts)
 

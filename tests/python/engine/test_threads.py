@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import pendmap
 from decays import decay, record
-from pendmap import Grid, Pendulum
+from pendmap import Grid, Pendulum, render
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +33,7 @@ def swing() -> tuple[np.ndarray, np.ndarray]:
 def own_axes() -> bytes:
     figure = Figure(figsize=(3.0, 3.0), dpi=50)
     FigureCanvasAgg(figure)
-    pendmap.plot.basins(MAP, figure.add_subplot(), layer="labels")
+    pendmap.plot(MAP, figure.add_subplot(), layer="labels")
     return b""
 
 
@@ -54,7 +54,7 @@ def calls(folder: Path) -> dict[str, Callable[[], Any]]:
         "map": lambda: pendmap.parameter_map(
             Pendulum(), {"p": (0.5, 0.9, 2), "omega": (1.8, 2.2, 2)}, starts=3
         ),
-        "plot": lambda: pendmap.plot.save(MAP, file(".png"), dpi=40).read_bytes(),
+        "plot": lambda: render.draw(MAP, file(".png"), dpi=40).read_bytes(),
         "sweep": lambda: pendmap.sweep(MODEL, {"p": [0.5, 0.6]}, grid=8),
         "bifurcation": lambda: pendmap.bifurcation(Pendulum(), {"p": (0.5, 0.7, 3)}, starts=2),
         "orbit": lambda: pendmap.orbit(MODEL, 1, 1, Grid.square(12)),

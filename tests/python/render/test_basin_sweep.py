@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from pendmap import InputError, Pendulum
+from pendmap import InputError, Pendulum, render
 from pendmap.charts import basin_sweep
 from pendmap.charts.marks import Band, Image
 from pendmap.charts.selection import shown
@@ -79,7 +79,7 @@ def test_an_unknown_layer_is_refused() -> None:
 
 def test_one_map_of_a_sweep_is_drawn_as_a_basin_map(tmp_path: Path) -> None:
     one = PLANE.sel(p=0.6, omega=2.2, method="nearest")
-    axes = pendmap.plot.basins(one)
+    axes = pendmap.plot(one)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$θ$ (rad)", "$dθ/dτ$")
     shades = axes.images[0].get_array()
     for label in np.unique(one.label):
@@ -87,7 +87,7 @@ def test_one_map_of_a_sweep_is_drawn_as_a_basin_map(tmp_path: Path) -> None:
     assert len(np.unique(shades.reshape(-1, 3), axis=0)) == len(np.unique(one.label))
     back = recorded(one, tmp_path)
     assert "One map of a sweep, p = 0.6, omega = 2.2." in back.one("/summary", "TextDocument:text")
-    pendmap.plot.save(LINE.isel(p=3), tmp_path / "one.png")
+    render.draw(LINE.isel(p=3), tmp_path / "one.png")
 
 
 @pytest.mark.usefixtures("strict_recordings")

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 import motions
 import pendmap
 import synthetic
-from drawn import made, named, plain, regions, titles, written
+from drawn import made, named, plain, subtitle, titles, written
 from pendmap.charts import legend, palette
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def test_labels_come_first_and_settle_time_second() -> None:
     assert titles(figure) == ["basins of attraction", "settle time"]
     assert "periods to settle" in written(figure)
     assert "\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 1,  \N{GREEK SMALL LETTER OMEGA} = 2" in (
-        plain(figure.texts[1].get_text())
+        subtitle(figure)
     )
     settle = figure.axes[1].images[-1]
     assert isinstance(settle.norm, LogNorm)
@@ -39,7 +39,7 @@ def test_labels_come_first_and_settle_time_second() -> None:
 
 def test_without_drive_there_is_no_frequency() -> None:
     figure = made(synthetic.painted(synthetic.USUAL[:2], p=0.0, torque=0.5, phase=0.3))
-    said = plain(figure.texts[1].get_text())
+    said = subtitle(figure)
     assert said.startswith("\N{GREEK SMALL LETTER GAMMA} = 0.1,  p = 0,  torque = 0.5;")
     assert "periods of 2\N{GREEK SMALL LETTER PI} to settle" in written(figure)
 
@@ -56,24 +56,14 @@ def test_legend_names_share_error_and_twin() -> None:
     assert "twin" not in texts[0]
 
 
-def test_large_regions_have_their_names_small_ones_are_in_the_legend() -> None:
-    dataset = synthetic.painted(synthetic.USUAL[:3], (30, 40))
-    shares = [f"{100 * float(share):.3g} %" for share in dataset["fraction"].values]
-    called = ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1")
-    figure = made(dataset)
-    assert regions(figure) == [f"{name}\n{one}" for name, one in zip(called, shares, strict=True)]
-    assert named(figure) == []
-    for text in figure.axes[0].texts:
-        box, panel = text.get_window_extent(), figure.axes[0].get_window_extent()
-        assert panel.x0 < box.x0 < box.x1 < panel.x1
-    many = made(synthetic.painted(synthetic.USUAL[:10], (30, 40)))
-    assert len(regions(many)) + len(named(many)) == 10
+def test_the_legend_names_every_attractor() -> None:
+    dataset = synthetic.painted(synthetic.USUAL[:10], (30, 40))
+    assert named(made(dataset)) == [entry.text for entry in legend.entries(dataset)]
 
 
 def test_undecided_and_failed_are_in_the_legend_only_if_present() -> None:
     figure = made(synthetic.painted(shape=(10, 10), undecided=7, failed=3))
-    both = [*named(figure), *(text.replace("\n", ", ") for text in regions(figure))]
-    assert {"undecided, 7 %", "failed, 3 %"} < set(both)
+    assert {"undecided, 7 %", "failed, 3 %"} < set(named(figure))
     assert not [t for t in named(made(synthetic.painted())) if t.startswith(("undec", "fail"))]
 
 
@@ -111,14 +101,11 @@ def test_values_of_settle_time_and_cells_without_one() -> None:
     assert (drawn[expected >= 0] == np.maximum(expected, 1)[expected >= 0]).all()
 
 
-def test_unreliable_labels_come_last_small_and_marked() -> None:
+def test_unreliable_labels_come_last_and_marked() -> None:
     figure = made(synthetic.painted(**synthetic.UNRELIABLE))
     assert titles(figure) == ["settle time", "net turns until settled", "basins of attraction"]
     warning = "labels unreliable: 20.7 % change under half the step or mirroring"
     assert warning in written(figure)
-    boxes = [axes.get_window_extent() for axes in figure.axes if axes.get_title(loc="left")]
-    assert boxes[2].width < 0.7 * boxes[0].width
-    assert boxes[0].width == pytest.approx(boxes[1].width)
     assert warning in written(made(synthetic.painted(**synthetic.UNRELIABLE), "labels"))
     assert "unreliable" not in written(made(synthetic.painted()))
 

@@ -36,9 +36,10 @@ def test_files_are_complete_and_reproducible(tmp_path: Path, suffix: str, magic:
     assert sorted(p.name for p in tmp_path.iterdir()) == [f"a.{suffix}", f"b.{suffix}"]
 
 
-def test_size_and_resolution_are_as_requested(tmp_path: Path) -> None:
-    file = render.draw(synthetic.painted(), tmp_path / "a.png", size=(7.5, 5.0), dpi=80)
-    assert struct.unpack(">II", file.read_bytes()[16:24]) == (600, 400)
+@pytest.mark.parametrize("size", [(7.5, 5.0), (1.0, 1.0), (200.0, 5.0), (0.5, 20.0)])
+def test_size_and_resolution_are_as_requested(tmp_path: Path, size: tuple[float, float]) -> None:
+    file = render.draw(synthetic.painted(), tmp_path / "a.png", size=size, dpi=80)
+    assert struct.unpack(">II", file.read_bytes()[16:24]) == (80 * size[0], 80 * size[1])
 
 
 @pytest.mark.parametrize("layer", ["labels", "label", "settle", "net_turns", "turns"])
@@ -64,9 +65,8 @@ def test_the_colour_map_is_used(tmp_path: Path) -> None:
         ("a.png", {"layer": "colour"}, "'colour'"),
         ("a.png", {"colormap": "rainbowish"}, "'rainbowish'.*viridis"),
         ("a.png", {"layer": "labels", "colormap": "viridis"}, "attractor"),
-        ("a.png", {"size": (1.0, 1.0)}, r"\(1\.0, 1\.0\).*at least"),
         ("a.png", {"size": (math.nan, 5.0)}, "nan"),
-        ("a.png", {"size": (200.0, 5.0)}, "at most"),
+        ("a.png", {"size": (0.0, 5.0)}, "1 to 20000 pixels"),
         ("a.png", {"size": (30.0, 5.0), "dpi": 1000}, "20000 pixels"),
         ("a.png", {"dpi": 5}, "dpi 5"),
         ("a.png", {"dpi": math.nan}, "dpi nan"),

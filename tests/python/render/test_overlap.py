@@ -50,7 +50,7 @@ def test_no_text_is_cut_or_covers_a_panel(variant: str) -> None:
         assert inside, (text.get_text(), box)
         assert whole.y0 - 1 <= box.y0, (text.get_text(), box)
         assert box.y1 <= whole.y1 + 1, (text.get_text(), box)
-        if not any(text in axes.texts for axes in figure.axes):  # a text in a region
+        if not any(text in axes.texts for axes in figure.axes):  # a warning
             assert not any(overlap(box, panel) for panel in panels), text.get_text()
     others = [text.get_window_extent() for text in figure.findobj(Text) if shown(text)]
     for one, other in itertools.combinations(others, 2):

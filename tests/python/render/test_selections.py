@@ -210,7 +210,7 @@ def test_a_selection_of_a_bifurcation_diagram_is_drawn(
 def test_sweeps_over_uneven_values_are_drawn_where_these_are() -> None:
     values = np.r_[np.linspace(0.1, 0.3, 9), 0.6, 1.0]
     found = pendmap.bifurcation(Pendulum(), {"p": values})
-    strip = pendmap.plot.bifurcation(found, layer="sweeps").images[0]
+    strip = pendmap.plot(found, layer="sweeps").images[0]
     families = bifurcation.families(found)
     for k, x in enumerate(values):
         for row, sweep in ((0.5, "up"), (-0.5, "down")):
