@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import Bbox, BboxTransformFrom, BboxTransformTo, ScaledTranslation
 
 from pendmap.charts import registry
+from pendmap.charts.chart import Chart
 from pendmap.errors import check_type
 from pendmap.render import drawing, marks, style, ticks
 
@@ -115,7 +116,7 @@ def _panel(result: Any, layer: str | None, colormap: str | Colormap | None) -> P
     chart = registry.of_result(result, layer=layer)
     if colormap is not None:
         chart = drawing.in_colours(chart, colormap)
-    return chart.panels[0]
+    return chart.whole(chart.panels[0]) if isinstance(chart, Chart) else chart.panels[0]
 
 
 def _legend(axes: Axes, panel: Panel, *, always: bool) -> None:

@@ -160,7 +160,7 @@ def test_a_selection_of_a_parameter_map_is_drawn(
             drawn = at(np.asarray(kinds.get_array()), kinds.get_extent(), x, y)
             (kind,) = (k for c, k in listed.items() if np.allclose(to_rgb(c), drawn / 255))
             assert any(member in own for member in kind.members)
-            assert names[int(at(image, extent, x, y))].rpartition(": ")[0] in {
+            assert names[int(at(image, extent, x, y))].rpartition(", ")[0] in {
                 k.name for k in listed.values() if any(m in own for m in k.members)
             }
             value = at(np.ma.filled(exponent.get_array(), np.nan), exponent.get_extent(), x, y)
