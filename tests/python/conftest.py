@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import hidden
-from commands import Commands
+from command_children import Commands
 from pendmap import cli
 
 if TYPE_CHECKING:

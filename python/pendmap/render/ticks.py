@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts import chart as charts
 
+CLOSER: Final = 6  # Labels at the left of a panel where matplotlib would have four
 STEPS: Final = ((1, 2, 5), (1, 3), (1,))  # Labels of a decade, as many as there is room for
 
 
@@ -45,7 +46,7 @@ class Ticks(Locator):
         factor, angle = self._side.factor, self._side.scale == "angle"
         shift, ticks = plane.short_ticks(vmin * factor, vmax * factor, angle=angle)
         zero = next((k for k, tick in enumerate(ticks) if tick[1] == "0"), 0)
-        every = -(-len(ticks) // max(self.axis.get_tick_space(), 2))
+        every = -(-len(ticks) // max(_room(self.axis), 2))
         shown = ticks[zero % every :: every]
         self.labels = {(shift + at) / factor: text for at, text in shown}
         return [*self.labels]
@@ -61,7 +62,7 @@ class Powers(LogLocator):
     def tick_values(self, vmin: float, vmax: float) -> Any:  # noqa: ANN401 (as inherited)
         """Return the tick places between two ends."""
         axis: Any = self.axis
-        room = axis.get_tick_space() / max(abs(math.log10(vmax / vmin)), 1.0)
+        room = _room(axis) / max(abs(math.log10(vmax / vmin)), 1.0)
         self.set_params(subs=next((some for some in STEPS if len(some) <= room), STEPS[-1]))
         ticks: Any = super().tick_values(vmin, vmax)
         return ticks[(ticks >= vmin) & (ticks <= vmax)]
@@ -75,13 +76,19 @@ class Signed(SymmetricalLogLocator):
         axis: Any = self.axis
         bent = axis.get_transform().transform
         first, last = bent(np.array([vmin, vmax]))
-        least = (last - first) / max(axis.get_tick_space(), 1)
+        least = (last - first) / max(_room(axis), 1)
         places: list[float] = []
         ticks = [float(at) for at in super().tick_values(vmin, vmax) if vmin <= at <= vmax]
         for at in sorted(ticks, key=lambda at: (at != 0.0, -abs(at))):
             if all(abs(bent(at) - bent(other)) >= least for other in places):
                 places.append(at)
         return np.array(places)
+
+
+def _room(axis: Any) -> int:  # noqa: ANN401 (an axis of matplotlib)
+    """Return how many labels an axis has room for; on the left they may be half a line apart."""
+    space = int(axis.get_tick_space())
+    return CLOSER * space // 4 if axis.axis_name == "y" else space
 
 
 def _power(at: float, _: int) -> str:

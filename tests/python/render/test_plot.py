@@ -223,7 +223,7 @@ def test_a_legend_does_not_narrow_its_column() -> None:
     found = pendmap.orbit(Pendulum(p=0.6), 2)
     figure, (left, right) = plt.subplots(1, 2, figsize=(5.0, 2.6), layout="constrained")
     for axes in (left, right):
-        plot(found, axes)
+        plot(found, axes, legend=True)
     figure.draw_without_rendering()
     for axes in (left, right):
         legend = axes.get_legend()
