@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.analysis.numerics import in_rounds
@@ -13,7 +12,7 @@ from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
-from pendmap.diagnosis.fitted_model import LITTLE
+from pendmap.diagnosis.fitted_model import settles
 from pendmap.diagnosis.named import name_effects
 from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
 from pendmap.diagnosis.scores import Scores
@@ -135,7 +134,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
             weakest = next(c for c in reversed(last.chosen) if c.name in doubtful)
             last = state.leave_out(last, weakest)
     best = nearest if claimed else begin
-    if best.fitted.distance > math.sqrt(LITTLE):
+    if not settles(state.data, best.fitted):
         raise InputError(
             f"{experiment.path}: the fit of the best model must converge, got one that ends "
             f"{best.fitted.distance:.2g} standard errors from its minimum"

@@ -183,6 +183,15 @@ def converge(data: DataSplit, fitted: FittedModel, level: float) -> FittedModel 
     return fit_again(data, fitted, zeroed=fitted.zeroed, least_gain=EXACT * level)
 
 
+def settles(data: DataSplit, fitted: FittedModel) -> bool:
+    """Return whether a further search lowers the sum of squares by less than a reading's share.
+
+    In a curved valley steps gain far less than they promise.
+    """
+    again = converge(data, fitted, fitted.level)
+    return again is not None and fitted.chi2 - again.chi2 <= LITTLE * fitted.level
+
+
 @none_if_diverged
 def fit_with_candidates(  # noqa: PLR0913 (what to fit, and from where)
     data: DataSplit,

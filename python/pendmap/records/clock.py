@@ -1,8 +1,4 @@
-"""Clock errors: missing, repeated, decreasing or jittering time stamps, and clock slips.
-
-At a slip, readings are lost while the stamps continue: the reading jumps by the velocity times the
-lost time. The slip ``d`` is estimated with a local polynomial plus a term ``d v`` from a sample on.
-"""
+"""Clock errors: missing, repeated, decreasing, coarse or jittering time stamps."""
 
 from __future__ import annotations
 
@@ -16,10 +12,9 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
-from pendmap.records.noise import fastest
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
-from pendmap.signal.local_polynomial import even_weights
-from pendmap.signal.robust import intervals_of, normal_scale
+from pendmap.records.slips import slips_of
+from pendmap.signal.robust import intervals_of
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -34,18 +29,8 @@ COARSE_STAMPS: Final = 0.2  # Least share of repeated stamps of a coarse clock
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
 # Overflow times of 16- and 32-bit counters in us, ms or s, in seconds
 COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
-SLIP_DEGREE: Final = 7  # Degree of the polynomials with which slips are detected
-SLIP_PHASE: Final = 2.0  # Half-width of the polynomials, rad of phase; their error is below 6e-3
-SHORTEST_SIDE: Final = 8  # Fewest samples on either side of a slip, for both velocities
-LONGEST_SIDE: Final = 150  # Most samples on either side of a slip
-FEWEST_SLIPS: Final = 3  # Fewest slips by whole intervals for which the clock is corrected
-CERTAIN_SLIP: Final = (7.0, 7.0, 6.0, 6.0, 6.0)  # Least slip in each pass, standard errors
-MOST_INTERVALS: Final = 4  # Longest slip, intervals
-SLOW_POWER: Final = 1e-3  # Power over its median below which motion is too slow to detect a slip
-OFF_INTERVAL: Final = 0.25  # Relative tolerance for slips by whole intervals
-MOST_OTHER_JUMPS: Final = 0.2  # Greatest share of jumps that are not slips
+AROUND: Final = 101  # Readings around one whose second differences are usual there
 EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
-_BLOCK: Final = 4000  # Windows that are solved at a time
 
 
 def mend(work: Work) -> None:
@@ -165,17 +150,11 @@ def _coarse(work: Work) -> None:
     again = np.all(np.diff(channels, axis=1)[:, steps == 0] == 0, axis=0)  # samples and stamps
     if not rise.size or (same and np.mean(again) > 0.9):
         return
-    rise = rise[rise < 1.5 * rise.min()]
-    # Written digits round the ticks.
-    tick = 2 * rise.max() - rise.min() + 4 * float(np.spacing(np.max(np.abs(work.time))))
+    ticks = _ticks(work.time, rise, steps, channels, same=same)
+    if ticks is None:
+        return
+    tick, even = ticks
     place = np.arange(work.time.size)
-    even = _even(work.time, place, tick)
-    if same < COARSE_STAMPS:
-        other = np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * tick) + 1
-        smooth = any(_smoother(values, other) for values in channels)
-        rival = even.missed > EXACT * tick or tick > 1.5 * usual
-        if rival or steps.size < FEWEST_EDGES or not smooth:
-            return
     slips = slips_of(even.times, work.theta, fewest=1)
     if slips is not None:  # readings are lost where the others jump, if the stamps allow it
         lost = np.round((slips.time - even.times) / even.interval).astype(np.intp)
@@ -195,6 +174,33 @@ def _coarse(work: Work) -> None:
     few = np.repeat(number < np.median(number) - 1, number)
     work.time = spread_stamps(work.time)
     work.leave_out(few, "time-coarse", "reading", "in ticks that lack readings left out")
+
+
+def _ticks(
+    time: Floats, rise: Floats, steps: Floats, channels: Floats, *, same: float
+) -> tuple[float, _Even] | None:
+    """Return the tick of coarse stamps and their even times; None for stamps that are not coarse.
+
+    The least changes of the steps are ticks, or the rounding of the written digits of longer ones.
+    """
+    place, least = np.arange(time.size), float(rise.min())
+    usual = float(np.median(steps[steps > 0]))
+    rounded = not np.any((rise > 2 * least) & (rise <= 4 * least))
+    for some in (rise, rise[rise > 4 * least] if rounded else rise[:0]):
+        if not some.size:
+            break
+        near = some[some < 1.5 * some.min()]
+        spread = 2 * least if some is not rise else near.max() - near.min()
+        tick = float(near.max() + spread) + 4 * float(np.spacing(np.max(np.abs(time))))
+        even = _even(time, place, tick)
+        if same >= COARSE_STAMPS:
+            return tick, even
+        other = np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * tick) + 1
+        smooth = any(_smoother(values, other) for values in channels)
+        rival = even.missed > EXACT * tick or tick > 1.5 * usual
+        if not (rival or steps.size < FEWEST_EDGES or not smooth):
+            return tick, even
+    return None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -275,10 +281,13 @@ def _smoother(theta: Floats, at: Indices) -> bool:
     if theta.size < 5 or not np.all(np.isfinite(theta)):
         return False
     bend = np.abs(np.diff(theta, 2))
-    usual = float(np.quantile(bend, 0.9)) if at.size < theta.size / 4 else 0.0
-    if not usual:  # most were moved: a motion has second differences small against its range
+    if at.size >= theta.size / 4 or not np.quantile(bend, 0.9):
+        # Most were moved: a motion has second differences small against its range.
         return bool(np.median(bend) < 0.1 * np.ptp(theta))
-    return bool(np.all(bend[np.clip(at - 1, 0, bend.size - 1)] <= 3 * usual))
+    from scipy.ndimage import percentile_filter
+
+    place = np.clip(at - 1, 0, bend.size - 1)
+    return bool(np.all(bend[place] <= 3 * percentile_filter(bend, 90, size=AROUND)[place]))
 
 
 def _longest_rising(time: Floats) -> Indices:
@@ -324,82 +333,3 @@ def _spacing(work: Work) -> None:
         share = 100 * spread / usual
         text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
         work.report("time-jitter", text)
-
-
-@dataclasses.dataclass(frozen=True)
-class Slips:
-    """Slips of a clock: corrected times, positions, and mean slip per interval."""
-
-    time: Floats  # corrected, s
-    places: Indices  # first sample after each slip
-    slip: float  # mean size per interval, s
-    stderr: float  # standard error of the mean size, s
-
-
-def slips_of(time: Floats, theta: Floats, fewest: int = FEWEST_SLIPS) -> Slips | None:
-    """Return the slips of a clock by whole intervals; None if the readings show none."""
-    from scipy.interpolate import CubicSpline
-
-    if not np.all(np.isfinite(theta)):
-        return None
-    interval = float(np.median(np.diff(time)))
-    reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
-    if reach < SHORTEST_SIDE or time.size < 20 * reach:
-        return None
-    # Apparent sizes of slips of 1, 2, ... intervals, biased since a jump perturbs the velocity.
-    place = np.arange(-3 * reach, 3 * reach + 1)
-    tried = [_tried(place + k * (place >= 0.0), reach) for k in range(1, MOST_INTERVALS + 1)]
-    shown = np.array([gain[3 * reach] / power[3 * reach] for gain, power in tried])
-    mended, places = time.copy(), list[int]()
-    slip = stderr = 0.0
-    for limit in CERTAIN_SLIP:
-        grid = np.arange(mended[0], mended[-1] + interval / 2, interval)
-        at, lag = _found(CubicSpline(mended, theta)(grid), reach, limit)
-        number = 1 + np.argmin(np.abs(lag[:, None] - shown), axis=1)
-        each = lag / shown[number - 1]
-        good = np.abs(each - 1) < OFF_INTERVAL
-        if not places:
-            if np.count_nonzero(good) < fewest or np.mean(~good) > MOST_OTHER_JUMPS:
-                return None
-            slip = interval * float(np.mean(each[good]))
-            stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))
-        if not good.any():
-            break
-        starts = np.searchsorted(mended, grid[at[good]] - interval / 2).tolist()
-        for k, count in zip(starts, number[good].tolist(), strict=True):
-            mended[k:] += count * interval
-        places += starts
-    return Slips(mended, np.unique(places), slip, stderr)
-
-
-def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
-    """Return the first samples after slips, and the apparent sizes in intervals."""
-    from scipy.ndimage import maximum_filter1d
-
-    gain, power = _tried(values, reach)
-    inside = slice(2 * reach, -2 * reach)
-    resolved = power > SLOW_POWER * float(np.median(power[inside]))
-    resolved[: 2 * reach] = resolved[-2 * reach :] = False
-    score = np.where(resolved, np.abs(gain) / np.sqrt(np.maximum(power, 1e-300)), 0.0)
-    noise = normal_scale(gain[resolved] / np.sqrt(power[resolved]))
-    highest = maximum_filter1d(score, 2 * reach + 1, mode="nearest")
-    at = np.flatnonzero((score > limit * noise) & (score >= highest) & resolved)
-    return at, gain[at] / power[at]
-
-
-def _tried(values: Floats, reach: int) -> tuple[Floats, Floats]:
-    """Return numerator and denominator of the least-squares slip before each sample."""
-    _, weights = even_weights(SLIP_DEGREE, 2 * reach + 1)
-    speed = np.zeros(values.size)
-    speed[reach:-reach] = np.correlate(values, weights, "valid")
-    gain, power = np.zeros(values.size), np.ones(values.size)
-    offset = np.arange(-reach, reach + 1)
-    basis = np.linalg.qr(np.vander(offset / reach, SLIP_DEGREE + 1))[0]
-    for low in range(2 * reach, values.size - 2 * reach, _BLOCK):
-        rows = np.arange(low, min(low + _BLOCK, values.size - 2 * reach))
-        around = rows[:, None] + offset
-        late = speed[around] * (offset >= 0)
-        late -= (late @ basis) @ basis.T
-        gain[rows] = np.einsum("kj,kj->k", late, values[around] - values[rows, None])
-        power[rows] = np.einsum("kj,kj->k", late, late)
-    return gain, power

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, moment
-from pendmap.records.clock import slips_of
 from pendmap.records.noise import DEGREES
+from pendmap.records.slips import slips_of
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
 

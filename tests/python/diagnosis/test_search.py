@@ -255,9 +255,12 @@ def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
     data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
 
     def stopped(*given: Any, **named: Any) -> TrajectoryFit:  # noqa: ANN401 (of fit_runs)
-        fit = fit_runs(*given, **named)
-        return dataclasses.replace(fit, converged=False, promised=9 * fit.chi2 / fit.degrees)
+        # Each search lowers the sum of squares by a half, and stops.
+        fit, before = fit_runs(*given, **named), chi2[0]
+        chi2[0] = before / 2
+        return dataclasses.replace(fit, converged=False, promised=9 * before, chi2=before)
 
+    chi2 = [1e9]
     monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_runs", stopped)
     with pytest.raises(InputError, match=r"must converge, got one that ends \d.*standard errors"):
         diagnose(data.experiment, max_effects=0)

@@ -37,6 +37,22 @@ def test_the_error_of_the_rate_is_a_standard_error(cut: str) -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
 
 
+@pytest.mark.parametrize("rate", [30, 60, 120])
+def test_written_digits_round_the_ticks(rate: int) -> None:
+    # Of a clock of `rate` ticks a second nearly each has one reading; stamps are in ms.
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        interval = rng.uniform(1.001, 1.006) / rate
+        time = interval * np.arange(int(30 / interval))
+        theta = decay().angle(time) + rng.normal(0, 2e-3, time.size)
+        stamps = np.round(np.floor((time + rng.uniform(0, 1)) * rate) / rate, 3)
+        frame = pd.DataFrame({"t_s": stamps, "theta_rad": theta})
+        run = pendmap.read_experiment(frame).runs[0]
+        assert run.clock_stderr > 0
+        mean = float(run.time[-1] - run.time[0]) / (run.time.size - 1)
+        assert abs(mean / interval - 1) < 3.5 * run.clock_stderr
+
+
 @pytest.mark.parametrize(("tick", "lost"), [(0.03, 5), (0.1, 5), (1.0, 1)])
 def test_lost_readings_do_not_change_the_frequency(tick: float, lost: int) -> None:
     for seed in range(2):
