@@ -153,11 +153,12 @@ _OTHERS = {
     "render.axes": ["plot"],
     "viewer": ["view"],
 }
-_HOMES = {
+HOMES = {
     **{name: home for home, names in _OTHERS.items() for name in names},
     **{name: f"analysis.{kind}" for kind, (_, names, _) in ANALYSES.items() for name in names},
 }
-__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
+"""Module of each public name."""
+__all__ = sorted([*HOMES, "__version__"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
@@ -166,10 +167,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
         from importlib.metadata import version
 
         return version("pendmap")
-    if name in _HOMES:
+    if name in HOMES:
         import importlib
 
-        return getattr(importlib.import_module(f"pendmap.{_HOMES[name]}"), name)
+        return getattr(importlib.import_module(f"pendmap.{HOMES[name]}"), name)
     raise AttributeError(f"module 'pendmap' has no attribute {name!r}")
 
 

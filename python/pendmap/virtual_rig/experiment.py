@@ -41,26 +41,42 @@ class Request:
     seed : int
         Seed of all draws; 0 or more.
     effects : tuple of str
-        Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
-        ``quadratic_drag,q=0.01``; or ``none`` alone.
+        Effects to hide, with parameters if wanted (``magnet:dipole,amplitude=0.1,d=0.2``), ``any``,
+        which the seed chooses, or ``none`` alone; by default none, hidden: any.
     size : float
         Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
-    w0, c_over_m, friction : float
-        The rig in SI, rad/s, 1/s, rad/s^2.
+    w0 : float
+        Natural frequency, rad/s; by default 6.0 to 6.4.
+    c_over_m : float
+        Viscous damping, 1/s; by default about 0.05, forced and hidden: 0.05 to 0.1.
+    friction : float
+        Coulomb friction Tr, rad/s^2; by default about 0.08, forced and hidden: 0.05 to 0.1.
     theta_r : float
-        The friction without dimensions, ``friction / w0**2``, in its place.
-    free, forced : int
-        Numbers of runs of each kind, at most 99 together.
+        The friction without dimensions, ``Tr / w0**2``, in its place.
+    free : int
+        Number of free decays; by default 1, forced: 0, hidden: 5.
+    forced : int
+        Number of runs under drive, at most 99 of both kinds; by default 0, forced and hidden: 4.
     duration : float
-        Length of every run, s, at most 3600.
+        Length of every run, s, at most 3600; by default until rest, forced: 30 to 40, hidden: 15 to
+        30.
     noise : float
-        Noise of the sensor, degrees.
-    rate, counts, jitter : float, int, float
-        Samples a second, Hz; counts a turn, 0 without steps; rms of the sampling instants, s.
-    correlation, dropouts, outliers : float
-        AR(1) coefficient of the noise; shares of the samples that are lost, and that are false.
+        Noise of the sensor, degrees; by default 0.1, hidden: 0.05 to 0.5.
+    rate : float
+        Samples a second, Hz.
+    counts : int
+        Counts a turn; 0: no steps.
+    correlation : float
+        AR(1) coefficient of the noise.
+    dropouts : float
+        Share of the samples that are lost.
+    outliers : float
+        Share of the samples that are false.
+    jitter : float
+        Rms deviation of the sampling instants, s.
     mess : float
-        Size of weak disturbances that no effect describes, in multiples of the noise, at most 100.
+        Size of weak disturbances beside the effects (texture of the bearing, drifting zero, slow
+        noise), in multiples of the noise, at most 100.
     plans : tuple of RunPlan
         The runs, instead of those that the preset draws, their number and their duration.
 
