@@ -140,7 +140,7 @@ class Request:
 
     def _refuse_idle(self) -> None:
         """Refuse settings without effect."""
-        asked = self.effects or PRESETS[self.preset].effects
+        asked = self.effects or (PRESETS[self.preset].effect,)
         if self.size != 1 and not any(draws_size(text) for text in asked):
             raise InputError(
                 f"size must be 1 where no size of an effect is drawn, got {self.size:g}: it must "
@@ -183,28 +183,14 @@ class Request:
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One run: its plan, its noise-free motion and its record.
-
-    Parameters
-    ----------
-    plan : RunPlan
-        The planned run.
-    path : Path
-        Noise-free motion.
-    time, angle : array, shape (N,)
-        The record: s and rad.
-    lost : int
-        Number of samples lost from the record.
-    gap : float
-        Rms change of the reading by the effects within a second, rad, without refitted parameters.
-    """
+    """One run: its plan, its noise-free motion and its record."""
 
     plan: RunPlan
-    path: Path
-    time: Floats
-    angle: Floats
-    lost: int
-    gap: float
+    path: Path  # Noise-free motion
+    time: Floats  # The record, s, shape (N,)
+    angle: Floats  # rad, shape (N,)
+    lost: int  # Number of samples lost from the record
+    gap: float  # Rms change of the reading by the effects within a second, rad, without a refit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -256,7 +242,7 @@ def make(request: Request) -> Experiment:
     if request.duration is not None:
         plans = _lasting(plans, request.duration)
     kinds = {plan.kind for plan in plans}
-    asked = list(request.effects or preset.effects)
+    asked = list(request.effects or (preset.effect,))
     effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
     readings = [effect for effect in effects if effect.group == "reading"]
     others = [effect for effect in effects if effect.group != "reading"]
