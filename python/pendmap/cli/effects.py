@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, new_command
+from pendmap.cli.parse.groups import OUTPUT, argument, new_command
 from pendmap.cli.parse.options import flag, option
 from pendmap.cli.parse.types import EFFECT, FILE
 from pendmap.cli.text import say, write_json
@@ -36,10 +36,10 @@ _MAPS = {"yes": "include it", "frozen": "evaluate it at lab_time", "no": "refuse
     "--effects path",
     FILE,
     "Show those of a file instead, its [[formula]]; they are checked.",
-    group=PRINTED,
+    group=OUTPUT,
 )
-@flag("--verbose", "Also parameters and which data reveal each.", group=PRINTED)
-@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
+@flag("--verbose", "Also parameters and which data reveal each.", group=OUTPUT)
+@flag("--json as_json", "One JSON object on stdout.", group=OUTPUT)
 def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 

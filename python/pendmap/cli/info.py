@@ -9,14 +9,14 @@ import platform
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, new_command
+from pendmap.cli.parse.groups import OUTPUT, new_command
 from pendmap.cli.parse.options import flag
 
 _DEPENDENCIES = "numpy scipy xarray pandas netcdf4 matplotlib rerun-sdk click cloup tqdm"
 
 
 @new_command("info", "pendmap info --json")
-@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
+@flag("--json as_json", "One JSON object on stdout.", group=OUTPUT)
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""
     from pendmap import _core

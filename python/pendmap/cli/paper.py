@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, new_command
+from pendmap.cli.parse.groups import OUTPUT, argument, new_command
 from pendmap.cli.parse.options import option, overwrite_option, printed_options, simd_option
 from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import FOLDER, PICTURES, default_file, output_file
@@ -29,16 +29,16 @@ _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
     "--out",
     FOLDER,
     "Folder for the files, made if it is not there.  [default: the current one]",
-    group=PRINTED,
+    group=OUTPUT,
 )
 @option(
     "--plot",
     output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
-    group=PRINTED,
+    group=OUTPUT,
 )
-@overwrite_option(PRINTED)
-@printed_options(PRINTED)
+@overwrite_option
+@printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, group, new_command
-from pendmap.cli.parse.options import flag, option, printed_options
+from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.parse.options import flag, option, overwrite_option, printed_options
 from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import EFFECT, FOLDER, PICTURES, output_file
 from pendmap.cli.show import keep_files, write_all
@@ -43,14 +43,10 @@ _HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
     "noise correlation counts rate jitter dropouts outliers",
     group("Sensor", "--noise 0.2 --counts 1024"),
 )
-@option("--out", FOLDER, "Folder to write.", group=PRINTED)
-@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=PRINTED)
-@flag(
-    "--overwrite --replace overwrite",
-    "Replace an experiment or a figure that is there.",
-    group=PRINTED,
-)
-@printed_options(PRINTED)
+@option("--out", FOLDER, "Folder to write.", group=OUTPUT)
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=OUTPUT)
+@overwrite_option
+@printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,

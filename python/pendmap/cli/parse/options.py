@@ -94,21 +94,19 @@ simd_option = option(
 )
 
 
-def overwrite_option(group: cloup.OptionGroup) -> Decorator:
-    """Return the option --overwrite."""
-    text = (
-        "Replace files that exist. Without it a default name gets a number, and a name that is"
-        " given is refused."
-    )
-    return flag("--overwrite", text, group=group)
+overwrite_option = flag(
+    "--overwrite",
+    "Replace files that exist. Without it a default name gets a number, and a name that is given is"
+    " refused.",
+    group=OUTPUT,
+)
 
 
-def printed_options(group: cloup.OptionGroup, further: str = "") -> Decorator:
+def printed_options(further: str = "") -> Decorator:
     """Return --json, whose help ends with ``further``, and --quiet."""
-    text = f"One JSON object on stdout{further}."
     return added(
-        flag("--json as_json", text, group=group),
-        flag("--quiet", "No progress, no summary.", group=group),
+        flag("--json as_json", f"One JSON object on stdout{further}.", group=OUTPUT),
+        flag("--quiet", "No progress, no summary.", group=OUTPUT),
     )
 
 
@@ -175,6 +173,6 @@ def output_options(
         option("--out", kind, text, multiple=True, group=OUTPUT),
         option("--plot", output_file(*PICTURES), "Figure: .png .svg .pdf.", group=OUTPUT),
         *(viewed if recording else ()),
-        overwrite_option(OUTPUT),
-        printed_options(OUTPUT, json),
+        overwrite_option,
+        printed_options(json),
     )
