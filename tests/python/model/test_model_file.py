@@ -213,13 +213,8 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
             "[pendulum]\ngamma = 2024-05-01\n",
             "gamma must be a number, got datetime.date(2024, 5, 1)",
         ),
-        ("[pendulum]\ngamma = -1\n", "gamma must be 0 or more, got -1"),
-        ("[pendulum]\nomega = 0\n", "omega must be a number above 0, got 0"),
         ("[pendulum]\np = 1\n", "p without omega: a drive needs a frequency above 0"),
-        ("[pendulum]\np = 'x'\n", "p must be a number, got 'x'"),
         ("[pendulum]\nw0 = '6.2 rad/s'\n", "w0 must be a number, got '6.2 rad/s'"),
-        ("[pendulum]\nw0 = nan\n", "w0 must be a finite number, got nan"),
-        ("[pendulum]\nw0 = 6\nTr = inf\n", "Tr must be a finite number, got inf"),
         ("[pendulum]\nw0 = 6\nY = [1]\n", "Y must be a number, got [1]"),
         ("[pendulum]\nc_over_m = 1\n", "w0 is missing: a model in SI needs w0 in rad/s, or length"),
         ("[pendulum]\nzeta = '1'\n", "zeta must be a number, got '1'"),
@@ -227,14 +222,6 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
         (
             "[pendulum]\ngamma = 0.1\nzeta = 0.1\n",
             "gamma is 0.1, but 0.2 by 2 zeta of zeta = 0.1: they contradict, one of them must be",
-        ),
-        (
-            "[pendulum]\nw0 = 6\nc_over_m = 0.6\nzeta = 0.1\n",
-            "c_over_m is 0.6, but 1.2 by 2 zeta w0 of zeta = 0.1: they contradict",
-        ),
-        (
-            "[pendulum]\nw0 = 6\np = 0.5\nOmega = 12\nY = 0.02\n",
-            "p is 0.5, but 0.293578 by Y Omega^2/g of Y = 0.02, Omega = 12 and gravity = 9.81: ",
         ),
         # effects
         ("[pendulum]\n[effect]\n", "effect must be [[effect]], one table each, got {}"),
@@ -245,17 +232,7 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
             EFFECT + "q = 0.1\n",
             "[[effect]] 1: q is not known: it must be one of name, parameters, ci95",
         ),
-        (EFFECT + "parameters = 1\n", "quadratic_drag: parameters must be a mapping of q, got 1"),
-        (EFFECT + "parameters = {}\n", "quadratic_drag: q is missing: it needs q (1/rad)"),
-        (
-            EFFECT + "parameters = { q = nan }\n",
-            "quadratic_drag: q must be a finite number, got nan",
-        ),
         (EFFECT + "parameters = { k = 1 }\n", "parameters: k is not known: it must be one of q"),
-        (
-            EFFECT + "parameters = { q = 1 }\nci95 = { q = 1 }\n",
-            "ci95 of q must be [low, high], got 1",
-        ),
         (
             EFFECT + "parameters = { q = 1 }\n" + EFFECT[11:] + "parameters = { q = 2 }\n",
             "quadratic_drag and quadratic_drag are the same effect: one of them must be left out",
