@@ -15,6 +15,7 @@ use proptest::prelude::*;
 
 use crate::effects::{Draws, derivatives, evaluated, has};
 use crate::effects_as_formulas::{formula, rewritten, term};
+use crate::lanes::result;
 use crate::support::{
     advanced, basins_on_plane, bits, cell_names, driven, instruction_sets, simd, spread, undriven,
 };
@@ -182,17 +183,9 @@ fn one_at_a_time_gives_a_formula_s_bits() {
             let pendulum = has(base, of(term, &[0.1, 0.4]));
             for simd in instruction_sets() {
                 let strobe = Strobe::new(&pendulum, 30, simd);
-                let states = spread(100, PI, 3.0);
-                let run = |singly: bool| {
-                    let mut all = States::from(states.as_slice());
-                    if singly {
-                        strobe.advance_singly(&mut all, 2);
-                    } else {
-                        strobe.advance(&mut all, 2);
-                    }
-                    [all.theta(), all.velocity(), all.turns()].map(bits)
-                };
-                assert_eq!(run(false), run(true), "{simd}, {}", term.0);
+                let [all, each] =
+                    [false, true].map(|singly| result(&strobe, &spread(100, PI, 3.0), 1, singly));
+                assert_eq!(all, each, "{simd}, {}", term.0);
             }
         }
     }

@@ -294,22 +294,6 @@ fn doublings_leave_an_orbit_of_twice_the_period() {
 }
 
 #[test]
-fn without_drive_the_orbits_are_the_rests() {
-    for (gamma, torque) in [(0.0_f64, 0.0_f64), (0.1, 0.0), (0.0, 0.3), (0.1, 0.3)] {
-        let found = all(&undriven(gamma, torque), 1, 0).closed;
-        let mut angles: Vec<f64> = found.iter().map(|o| o.points[0][0].abs()).collect();
-        angles.sort_by(f64::total_cmp);
-        let expected = [torque.asin(), PI - torque.asin()];
-        assert_eq!(angles.len(), 2, "{gamma} {torque}: {angles:?}");
-        for (angle, expected) in angles.iter().zip(expected) {
-            assert!((angle - expected).abs() < 1e-9);
-        }
-        assert!(found.iter().all(|o| o.points[0][1].abs() < 1e-12));
-    }
-    assert!(all(&undriven(0.1, 1.3), 1, 0).closed.is_empty());
-}
-
-#[test]
 fn held_states_are_no_orbits() {
     for (p, theta_r) in [(0.1, 0.5), (0.29, 0.013), (0.3, 3.0)] {
         let pendulum = driven(0.008, p, 2.0).with_friction(theta_r).expect("in range");
