@@ -3,8 +3,8 @@
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
 use pendmap::model::Pendulum;
+use pendmap::orbit::PoincareMap;
 use pendmap::orbit::newton::find;
-use pendmap::orbit::{PeriodicOrbit, PoincareMap};
 use serde_json::Value;
 
 use crate::support::driven;

@@ -2,15 +2,14 @@
 
 use std::f64::consts::PI;
 
-use pendmap::integrate::Schedule;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::kernel::tableau::{A, B, BP, C, ORDER, STAGES};
+use pendmap::integrate::kernel::tableau::ORDER;
 use pendmap::integrate::reference::dense::DenseStep;
 use pendmap::integrate::reference::driver::Driver;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, along, driven, fine_strobe, simd, spread};
+use crate::support::{advanced, driven, fine_strobe, simd, spread};
 
 /// Root mean square error over starts after one period, for each number of steps.
 fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {

@@ -7,7 +7,7 @@ use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
-use pendmap::integrate::{State, States, Strobe};
+use pendmap::integrate::{State, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::basins;
 use pendmap::maps::control::Control;
@@ -16,7 +16,7 @@ use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::effects::{Draws, has};
 use crate::lanes::result;
-use crate::support::{advanced, bits, driven, instruction_sets, plane, simd, spread, unchecked};
+use crate::support::{advanced, driven, instruction_sets, plane, simd, spread, unchecked};
 
 /// All effects that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {

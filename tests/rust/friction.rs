@@ -9,10 +9,10 @@ use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, States, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
-use pendmap::model::{Effect, Kind, Pendulum};
+use pendmap::model::Pendulum;
 
 use crate::support::{
-    advanced, basins_on_plane, bits, driven, instruction_sets, plane, simd, spread, unchecked,
+    advanced, basins_on_plane, driven, instruction_sets, plane, simd, spread, unchecked,
 };
 use crate::truths::{list, number, truths};
 

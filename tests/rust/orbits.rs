@@ -7,7 +7,7 @@ use pendmap::integrate::accuracy::distance;
 use pendmap::orbit::newton::{RESIDUAL, find};
 use pendmap::orbit::{PeriodicOrbit, PoincareMap};
 
-use crate::support::{driven, spread};
+use crate::support::driven;
 use crate::truths::{Known, attractors, attractors_at};
 
 fn polished(known: &Known, start: State, n: usize) -> PeriodicOrbit {

@@ -55,10 +55,6 @@ fn closed(cell: &Cell) -> Vec<(usize, i64)> {
     found
 }
 
-fn chaos(cell: &Cell) -> Vec<Kind> {
-    cell.found.iter().map(|f| f.attractor.kind).filter(|kind| kind.is_chaotic()).collect()
-}
-
 #[test]
 fn each_cell_has_the_reference_attractors() {
     for p in [0.5, 0.6, 1.0] {

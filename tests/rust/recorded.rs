@@ -7,7 +7,6 @@ use pendmap::integrate::reference::driver::Driver;
 use pendmap::integrate::reference::event::EventKind;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
-use pendmap::integrate::reference::sensitivity::sensitivities;
 use pendmap::model::Pendulum;
 use pendmap::model::recorded::{Quantity, Recorded, Samples};
 

@@ -2,17 +2,15 @@
 //! threads.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pendmap::error::Error;
 use pendmap::fit::replay::replay;
 use pendmap::maps::control::pool;
-use pendmap::model::recorded::{Quantity, Samples};
-use pendmap::model::{Kind, Recorded};
+use pendmap::model::Kind;
 
-use crate::fit_records::{every, record, with};
-use crate::support::{driven, spread, undriven};
+use crate::fit_records::{record, with};
+use crate::support::{driven, spread};
 
 #[test]
 fn members_read_what_one_trajectory_would() {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +18,6 @@ from pendmap import Effect, Grid, Pendulum, Rig
 from pendmap.charts import basins, names, registry
 from pendmap.files import facts
 from pendmap.render import drawing, style
-
-if TYPE_CHECKING:
-    pass
 
 
 def term(rig: Rig, t: float, theta: float, velocity: float) -> float:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-
 # The scheduler's status page listens even when it shows nothing: 8787 may be taken.
 ANY_PORT = "127.0.0.1:0"
 
