@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import pendmap
 from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, render, viewer
 from pendmap.files import facts
 
 if TYPE_CHECKING:
+    import xarray as xr
     from collections.abc import Callable
     from pathlib import Path
 
