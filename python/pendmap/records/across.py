@@ -15,7 +15,7 @@ import numpy as np
 
 from pendmap.formatting import counted
 from pendmap.records.experiment import Finding
-from pendmap.records.scale import small_period
+from pendmap.records.periods import small_period
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,10 +76,7 @@ class _Motion:
 
 
 def without_duplicates(runs: Sequence[Run]) -> list[Run]:
-    """Return runs without duplicated readings.
-
-    Of two runs that share readings, the held-out run loses them, else the shorter, else the later.
-    """
+    """Return runs without duplicates: held-out runs lose them, else shorter, else later ones."""
     made = list(runs)
     motions = [_Motion.of(run) for run in runs]
     order = sorted(range(len(runs)), key=lambda k: (runs[k].hold_out, -motions[k].theta.size, k))

@@ -76,6 +76,9 @@ def channels_of(  # noqa: C901 (a step each)
         values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
+    if plan.pivot and "unit" not in plan.pivot:
+        text = 'the pivot has no unit: assumed to be an acceleration, unit = "m/s2"'
+        findings.append(Finding("pivot-unit", text))
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
     sensor, missing = None, ""
@@ -85,7 +88,7 @@ def channels_of(  # noqa: C901 (a step each)
         sensor, missing = accelerometer_of(asked.get("acceleration", Column()), head, gravity)
     edges = asked.get("trigger", Column())
     time = values.pop("time")
-    work = Work(
+    return Work(
         where=where,
         plan=plan,
         known=known,
@@ -105,11 +108,6 @@ def channels_of(  # noqa: C901 (a step each)
         phase=edges.phase,
         pivot_unit=pivot_unit,
     )
-    if plan.pivot and "unit" not in plan.pivot:
-        work.report(
-            "pivot-unit", 'the pivot has no unit: assumed to be an acceleration, unit = "m/s2"'
-        )
-    return work
 
 
 def _place(name: str, table: Table, where: str) -> int:
@@ -237,10 +235,7 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns with common names for channels that have none.
-
-    Of several axes of a sensor, the one with the greatest variance; of other columns, the first.
-    """
+    """Return columns with common names for channels without; of axes, that which varies most."""
     guessed: dict[str, int] = {}
     for channel, kind in CHANNELS.items():
         taken = {*places.values(), *guessed.values()}
@@ -297,10 +292,7 @@ def _rises(values: Floats) -> bool:
 
 
 def position_of(table: Table, places: Mapping[str, int]) -> int | None:
-    """Return the column named position if it is the angle, or None.
-
-    It must correlate with the integrated velocity, if any, since a cart has a position, too.
-    """
+    """Return the column named position, unless it contradicts a velocity; else None."""
     from scipy.signal import detrend
 
     taken = places.values()

@@ -25,6 +25,7 @@ from pendmap.signal.robust import even_times
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
@@ -43,81 +44,75 @@ LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
 MOVING_SHARE: Final = 0.2  # Speed, over the largest, above which the pivot is moving
 
 
-def check(work: Work) -> None:
-    """Invert channels with the opposite sign of the angle; report inconsistent channels."""
-    if "velocity" in work.extra:
-        _velocity(work)
-    if "acceleration" in work.extra:
-        _acceleration(work)
-    if work.plan.kind != "forced":
-        return
-    for way, values in work.pivot.items():
-        good = values[np.isfinite(values)]
-        span = float(np.ptp(good)) if good.size else 0.0
-        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
-            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
-            work.report("pivot-unit", f"{text}: its unit is wrong")
-    _drive_sign(work)
-
-
-def _velocity(work: Work) -> None:
+def velocity(work: Work) -> Finding | None:
     """Compare a velocity with the angle's derivative: invert, rescale or remove it."""
-    velocity = work.extra["velocity"]
-    if missing := int(np.count_nonzero(~np.isfinite(velocity))):
-        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
-        work.report("velocity-missing", text)
+    if work.integrated or "velocity" not in work.extra:
+        return None  # nothing to compare it with
+    values = work.extra["velocity"]
+    if missing := int(np.count_nonzero(~np.isfinite(values))):
         del work.extra["velocity"]
-        return
-    if work.integrated:
-        return  # nothing to compare it with
+        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
+        return work.finding("velocity-missing", text)
     fit = local_fit(work.time, work.theta)
     which = work.trusted[fit.middle]
-    slope, seen = fit.slope[which], velocity[fit.middle][which]
+    slope, seen = fit.slope[which], values[fit.middle][which]
     scale = float(np.max(np.abs(seen), initial=0.0))
-    if slope.size < 10 or scale == 0 or float(np.std(slope)) == 0 or float(np.std(seen)) == 0:
-        return
-    seen = seen / scale  # squares of huge numbers overflow
-    alike = float(np.corrcoef(slope, seen)[0, 1])
+    alike = _alike(slope, seen / (scale or 1.0)) if slope.size >= 10 else 0.0
+    if not alike:
+        return None
     if abs(alike) < SAME_MOTION:
-        text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
-        work.report("velocity-unlike", text)
         del work.extra["velocity"]
-        return
-    gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
-    if alike < 0:
-        _turn(work, "velocity")
+        text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
+        return work.finding("velocity-unlike", text)
+    # Squares of huge numbers overflow: the readings are scaled before.
+    gain = abs(float(np.dot(slope, seen / scale) / np.dot(slope, slope)) * scale)
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
-        work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
+        work.extra["velocity"] = values * math.pi / 180
         text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
-        work.report("velocity-unit", text, mended=True)
+        work.doubt = work.finding("velocity-unit", text, mended=True)
     elif abs(gain - 1) > GAIN_OFF:
-        work.report("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+        text = f"the velocity is {gain:.3g} times the angle's derivative"
+        work.doubt = work.finding("velocity-scale", text)
+    return _turn(work, "velocity") if alike < 0 else None
 
 
-def _turn(work: Work, channel: str) -> None:
-    """Invert a channel with the opposite sign of the angle, and report it."""
+def _alike(one: Floats, other: Floats) -> float:
+    """Return the correlation of two channels; 0 if one is constant."""
+    if float(np.std(one)) == 0 or float(np.std(other)) == 0:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def _turn(work: Work, channel: str) -> Finding:
+    """Invert a channel with the opposite sign of the angle."""
     work.extra[channel] = -work.extra[channel]
     text = f"the {channel} has the opposite sign to the angle: inverted to agree with the angle"
-    work.report("sign-turned", text, mended=True)
+    return work.finding("sign-turned", text, mended=True)
 
 
-def _drive_sign(work: Work) -> None:
-    """Regress the second derivative of the angle on gravity and on the pivot's acceleration.
+def pivot_unit(work: Work) -> Finding | None:
+    """Report a pivot whose motion is implausible in its unit."""
+    for way, values in work.pivot.items():
+        span = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
+        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
+            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
+            return work.finding("pivot-unit", f"{text}: its unit is wrong")
+    return None
 
-    th'' = -w0^2 sin th - (a_vertical / l) sin th + (-a_lateral / l) cos th: both coefficients are
-    negative if upward and toward positive theta are positive.
-    """
+
+def drive_sign(work: Work) -> Finding | None:
+    """Report a drive or pivot whose sign the angle contradicts: its coefficient is negative."""
     from scipy.signal import savgol_filter
 
     interval, even = even_times(work.time)
     count, good = even.size, work.trusted
     if count < 100 or not good.any():
-        return
+        return None
     theta = np.interp(even, work.time[good], work.theta[good])
     w0 = work.known.get("w0") or 6.0
     window = max(round(DERIVATIVE_SPAN * 2 * math.pi / w0 / interval), 5) | 1
     if window > count // 4:
-        return
+        return None
 
     smooth = functools.partial(savgol_filter, window_length=window, polyorder=3, delta=interval)
     pushes = _pushes(work, even, smooth)
@@ -125,7 +120,7 @@ def _drive_sign(work: Work) -> None:
     columns = [smooth(push * arms[name](theta)) for name, push in pushes.items()]
     table = np.column_stack([smooth(np.sin(theta)), *columns])
     if not pushes or np.linalg.matrix_rank(table) < table.shape[1]:
-        return
+        return None
     target = smooth(theta, deriv=2)
     answer = np.linalg.lstsq(table, target, rcond=None)[0]
     rest = target - table @ answer
@@ -133,22 +128,23 @@ def _drive_sign(work: Work) -> None:
     variance = float(np.sum(rest**2)) / count * (count / worth)
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
     if answer[0] > 0:
-        return  # no oscillation about theta = 0: the sign is undetermined
+        return None  # no oscillation about theta = 0: the sign is undetermined
     for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
-            said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
-            text = f"by the angle, {said} acts with the opposite sign: turned by 180 degrees?"
+            what = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
+            text = f"by the angle, {what} acts with the opposite sign: turned by 180 degrees?"
             text += "" if name == "drive" else " sign = -1 in pivot reverses it"
-            work.report("sign-turned", text)
+            return work.finding("sign-turned", text)
+    return None
 
 
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
     """Return the accelerations of the pivot, or a(t) of the drive, at equally spaced times."""
-    found: dict[str, Floats] = {}
+    pushes: dict[str, Floats] = {}
     drive = work.plan.drive or {}
     p, phi = drive.get("p"), drive.get("phi")
     if p and phi is not None:
-        found["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
+        pushes["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     for way, values in work.pivot.items():
         good = np.isfinite(values)
@@ -156,8 +152,8 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
             continue
         if np.max(np.abs(values[good])) < 1e6:
             motion = np.interp(even, work.time[good], values[good])
-            found[way] = smooth(motion, deriv=order) if order else motion
-    return found
+            pushes[way] = smooth(motion, deriv=order) if order else motion
+    return pushes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,21 +174,19 @@ class _Motion:
         return np.asarray(r * self.acceleration + g * np.sin(self.theta))
 
 
-def _acceleration(work: Work) -> None:
+def acceleration(work: Work) -> Finding | None:
     """Compare an acceleration with the angle; invert it if it has the opposite sign."""
-    if work.angle_source is not None:
-        return
-    forced = work.plan.kind == "forced"
-    motion = None if forced else _motion(work)
+    if work.angle_source is not None or "acceleration" not in work.extra:
+        return None
+    motion = _motion(work) if work.free else None
     if motion is None:
         why = "too few samples have an angle to compare it with"
-        if forced:
+        if not work.free:
             why = "on a forced run it includes the pivot's"
-        work.report("acceleration-unused", f"the acceleration is not used: {why}")
-    elif work.accelerometer is None:
-        _unplaced(work, motion)
-    else:
-        _compared(work, motion, work.accelerometer)
+        return work.finding("acceleration-unused", f"the acceleration is not used: {why}")
+    if work.accelerometer is None:
+        return _unplaced(work, motion)
+    return _compared(work, motion, work.accelerometer)
 
 
 def _motion(work: Work) -> _Motion | None:
@@ -236,14 +230,7 @@ def _slope(x: Floats, y: Floats) -> float:
     return float(np.dot(x, y - np.mean(y))) / power if power else 0.0
 
 
-def _alike(one: Floats, other: Floats) -> float:
-    """Return the correlation of two channels; 0 if one is constant."""
-    if float(np.std(one)) == 0 or float(np.std(other)) == 0:
-        return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
-
-
-def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
+def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> Finding:
     """Report the agreement of an acceleration with the readings predicted at its position."""
     expected = motion.expected(sensor)
     alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
@@ -254,22 +241,24 @@ def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
             f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
             f"{where}): direction or column is wrong, or its noise hides the swing"
         )
-        work.report("acceleration-unlike", text)
-        return
-    if gain < 0:
-        _turn(work, "acceleration")
-    text = f"the acceleration is {abs(gain):.3g} times that computed from the angle{where}"
+        return work.finding("acceleration-unlike", text)
+    what, text = "agrees", f"the acceleration is {abs(gain):.3g} times that computed from the angle"
+    text += where
     if abs(abs(gain) - 1) <= GAIN_OFF:
-        work.report("acceleration-agrees", f"{text}: {CHECK_ONLY}")
-        return
-    other = "its unit, or a distance"
-    if not angular:
+        text += f": {CHECK_ONLY}"
+    elif angular:
+        what, text = "scale", f"{text}: its unit, or a distance is wrong; not used"
+    else:
         distance = _distance(motion, math.copysign(1.0, alike), sensor)
         other = (
             f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
         )
-        other += " or gravity_removed is wrong"
-    work.report("acceleration-scale", f"{text}: {other}; not used")
+        what, text = "scale", f"{text}: {other} or gravity_removed is wrong; not used"
+    finding = work.finding(f"acceleration-{what}", text)
+    if gain > 0:
+        return finding
+    work.doubt = finding
+    return _turn(work, "acceleration")
 
 
 def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
@@ -280,42 +269,41 @@ def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
     return (sensor.gravity - _slope(np.sin(motion.theta), measured)) / motion.w0**2
 
 
-def _unplaced(work: Work, motion: _Motion) -> None:
+def _unplaced(work: Work, motion: _Motion) -> Finding:
     """Report the estimated direction and distance of an accelerometer of unknown position."""
     gravity = float(work.known.get("gravity", GRAVITY))
     sine = _alike(np.sin(motion.theta), motion.measured)
     radial = _alike(motion.velocity**2, motion.measured)
     if max(abs(sine), abs(radial)) < SAME_MOTION:
         text = "the acceleration is not used: it follows neither the angle nor the velocity squared"
-        work.report("acceleration-unlike", text)
-        return
+        return work.finding("acceleration-unlike", text)
     if abs(radial) > abs(sine):
         sign = math.copysign(1.0, radial)
         distance = _distance(motion, sign, Accelerometer("radial", 1.0, gravity))
         without = _distance(motion, sign, Accelerometer("radial", 1.0, 0.0))
-        said = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
+        place = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
     else:
         gain = abs(_slope(np.sin(motion.theta), motion.measured))
         near, far = (abs(gravity - s * gain) / motion.w0**2 for s in (1, -1))
         without = gain / motion.w0**2
         near_too = f"{near:.3g} or " if gain < gravity else ""
-        said = (
+        place = (
             f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
             f" {without:.3g} if gravity is removed"
         )
     use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
-    work.report("acceleration-unused", f"the acceleration looks {said}; {use}")
+    return work.finding("acceleration-unused", f"the acceleration looks {place}; {use}")
 
 
-def smooth_pivot(work: Work) -> None:
+def pivot_steps(work: Work) -> Finding | None:
     """Replace stepwise positions or velocities of the pivot by smooth accelerations."""
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     known = all(np.isfinite(values).all() for values in work.pivot.values())
     if not order or work.time.size < 20 or not known:
-        return
+        return None
     interval, even = even_times(work.time)
     if not even.size:
-        return
+        return None
     places = {way: np.interp(even, work.time, values) for way, values in work.pivot.items()}
     windows = [
         _cubic_window(places[way], step_of(values), order, interval)
@@ -323,7 +311,7 @@ def smooth_pivot(work: Work) -> None:
         if np.ptp(values) > 0
     ]
     if not windows or max(windows) < 7:
-        return
+        return None
     from scipy.signal import savgol_filter
 
     for way, values in places.items():
@@ -334,8 +322,8 @@ def smooth_pivot(work: Work) -> None:
         f"the pivot's {what} come in steps: its acceleration is that of cubics through"
         f" {max(windows)} readings, {max(windows) * interval:.3g} s"
     )
-    work.report("pivot-smoothed", text, mended=True)
     work.pivot_unit = "m/s2"
+    return work.finding("pivot-smoothed", text, mended=True)
 
 
 def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:

@@ -14,10 +14,7 @@ _LEAST: Final = 0.5  # Least share of lines that begin with a date
 
 
 def without_dates(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], bool]:
-    """Return lines with the dates at their beginning in seconds since the first of them.
-
-    The lines, with their numbers, are returned unchanged, and False, unless most begin with a date.
-    """
+    """Return lines whose dates, if most begin with one, are s since the first, and whether."""
     found = [_DATE.match(line) for _, line in lines]
     if sum(one is not None for one in found) <= _LEAST * len(lines):
         return lines, False

@@ -53,11 +53,7 @@ DECAYED: Final = 0.05  # Amplitude, over the largest, below which a motion has d
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:
-    """Compute the angle from an acceleration; return a text on its uncertainty, or "".
-
-    Raises InputError if the readings are inconsistent with a swing at this position: too few half
-    swings, all on one side, too large, over the top, or at the centre of oscillation.
-    """
+    """Compute the angle from an acceleration; return a doubt; InputError if it is no swing."""
     time, reading, where = work.time, work.extra["acceleration"], work.where
     noise = noise_of(time, reading).sigma
     noise = noise if math.isfinite(noise) else 0.0
@@ -370,10 +366,7 @@ def release_after_hold(time: Floats, values: Floats, noise: float) -> int:
 
 
 def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
-    """Return the end (exclusive) of a free swing, at which a hand may take the pendulum.
-
-    ``more`` is true if a quiet stretch follows.
-    """
+    """Return the end (exclusive) of a free swing; ``more`` if a quiet stretch follows."""
     found = swings(time, values, least=least)
     halves, tops = np.diff(found.crossing), np.abs(found.peak)
     slack = least if math.isfinite(least) else 0.0  # the noise of few samples is not known

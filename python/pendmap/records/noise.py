@@ -32,6 +32,7 @@ from pendmap.signal.robust import broad_scale, widened
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
@@ -150,11 +151,7 @@ def noise_of(
     trusted: Mask | None = None,
     count: float = 0.0,
 ) -> NoiseFloor:
-    """Return the noise of readings, shape (N,), of any smooth motion.
-
-    Windows with untrusted samples are excluded unless too few remain. ``count`` is the resolution
-    of the readings, rad; 0 for none.
-    """
+    """Return the noise of readings of a smooth motion, of resolution ``count``, rad."""
     bad = np.zeros(time.size, bool) if trusted is None else ~trusted
     found = _noise(time, theta, bad, count)
     if found is None and bad.any():
@@ -210,10 +207,7 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
 
 
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
-    """Return the largest phase velocities, rad/s.
-
-    The first treats large swings as rotations, whose curvature is similar; the second does not.
-    """
+    """Return the largest phase velocities, rad/s: with large swings as rotations, and as swings."""
     interval = float(np.median(np.diff(time)))
     lag = 1
     while True:
@@ -252,15 +246,16 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     return found
 
 
-def check(work: Work) -> None:
+def grows(work: Work) -> Finding | None:
     """Report noise that grows with speed."""
     if work.integrated:
-        return  # the noise by jitter of a rate grows with the acceleration
+        return None  # the noise by jitter of a rate grows with the acceleration
     count = 0.0 if work.edges else work.count
     law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
-    if law is not None:
-        share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
-        work.report("noise-grows-with-speed", f"{law} ({share} of the interval)")
+    if law is None:
+        return None
+    share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
+    return work.finding("noise-grows-with-speed", f"{law} ({share} of the interval)")
 
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:

@@ -11,22 +11,12 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from pendmap.errors import InputError, check_number, short_repr
 from pendmap.formatting import counted, listed
-from pendmap.records import (
-    angle,
-    clock,
-    cross_checks,
-    motion,
-    noise,
-    resolution,
-    samples,
-    scale,
-    trigger,
-)
 from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
 from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of
 
 if TYPE_CHECKING:
@@ -233,7 +223,7 @@ def _names(plans: Sequence[RunPlan]) -> list[str]:
     return names
 
 
-def _runs(  # noqa: C901 (a step each)
+def _runs(
     path: Path,
     plan: RunPlan,
     description: Description,
@@ -245,45 +235,12 @@ def _runs(  # noqa: C901 (a step each)
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
     work = channels_of(table, description, plan, str(path))
-    if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
-        text = 'kind is "forced" but neither drive nor pivot is given'
-        work.report("drive-missing", text)
-    clock.mend(work)
-    work.cut(plan.from_s, plan.to_s)
-    if not work.peaks_only:
-        clock.cut_at_pauses(work)
-    angle.check_peaks(work)
-    angle.make(work)
-    if not work.peaks_only:
-        resolution.put_on_edges(work)
-    if work.peaks_only or work.edges:
-        # The intervals are those of turning points or encoder edges, not of a clock.
-        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
-    if work.peaks_only:
-        work.refuse_short()
-        return [_run(work, name, digest)], []
-    if not work.edges:
-        samples.keep_readings(work)
-    samples.check(work)
-    moves = motion.moves(work)
-    if moves and work.angle_source is None:
-        scale.check(work)
-    samples.say_steps(work)
-    if moves:
-        motion.check(work)
-        trigger.check_drive(work)
-        cross_checks.check(work)
-        resolution.check(work)
-    cross_checks.smooth_pivot(work)
-    work.refuse_short()
-    works, shared = work.split_by_release()
+    apply(RULES, work)
+    parts, shared = work.split_by_release()
     runs = []
-    for k, part in enumerate(works, 1):
-        if moves:
-            motion.check_zero(part)
-            noise.check(part)
-        own = f"{name} {k}/{len(works)}" if len(works) > 1 else name
-        runs.append(_run(part, own, digest))
+    for k, part in enumerate(parts, 1):
+        apply(OF_RELEASE, part)
+        runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
     return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
 
 

@@ -210,11 +210,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
 
 
 def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
-    """Return coefficients by least trimmed squares.
-
-    Concentration steps of Rousseeuw & Van Driessen (2006), Data Mining and Knowledge Discovery 12,
-    29, from a pendulum of approximately the right period.
-    """
+    """Return coefficients by least trimmed squares (Rousseeuw & Van Driessen, 2006)."""
     answer = np.array([gravity, *[0.0] * (columns.shape[1] - 1)])
     for _ in range(CONCENTRATIONS):
         away = np.abs(target - columns @ answer)

@@ -54,10 +54,7 @@ class Accelerometer:
 
 
 def accelerometer_of(column: Column, head: str, gravity: float) -> tuple[Accelerometer | None, str]:
-    """Return the accelerometer of a column, or None and the missing keys of its position.
-
-    A heading like "linear acceleration" means without gravity; ``gravity`` is in m/s^2.
-    """
+    """Return the accelerometer of a column, or None and the missing keys of its position."""
     heading, unit = name_and_unit(head)
     angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
     direction = column.direction or ("angular" if angular else None)
@@ -91,11 +88,7 @@ class Gyroscope:
 
 
 def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:
-    """Return the integral of a rate, rad, shape (N,); 0 is the middle of the swing.
-
-    The linear drift by the bias is removed. For a record with rotations the last angle is 0.
-    Readings that are not ``good`` are interpolated by a cubic spline.
-    """
+    """Return the integral of a rate about the middle of the swing, less the drift by the bias."""
     from scipy.interpolate import CubicSpline
 
     if good is None or np.count_nonzero(good) < 2:

@@ -26,11 +26,7 @@ SCALE_FINDING: Final = "angle-scale"  # Unit finding that an effect can cause, t
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
-    """Return the JSON object of ``pendmap look``.
-
-    The top level repeats the fields of a single run; for several runs, it has the median rate, the
-    largest noise, and all channels, segments and findings with their run.
-    """
+    """Return the JSON object of ``pendmap look``; its top level joins the fields of the runs."""
     runs = [_run(run) for run in experiment.runs]
     whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
     whole["unused"] = list(dict.fromkeys(name for run in runs for name in run["unused"]))

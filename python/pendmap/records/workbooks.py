@@ -24,10 +24,7 @@ _EPOCH: Final = dt.datetime(1970, 1, 1)  # noqa: DTZ001 (workbooks have no time 
 
 
 def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Finding]]:
-    """Return the sheet with the most numbers as text with tabs, its columns, and findings.
-
-    Raises InputError if no sheet has numbers, or if the file unpacks to more than ``most`` bytes.
-    """
+    """Return the sheet with the most numbers as text with tabs, its columns, and findings."""
     engine = WORKBOOKS[data[:4]]
     try:
         sheets = _bounded(_xlsx(data, where, most) if engine == "openpyxl" else _xls(data), where)
