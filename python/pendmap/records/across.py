@@ -38,7 +38,7 @@ MOST_THINNED: Final = 10  # Greatest decimation factor of a duplicate that is se
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs without duplicated readings, and the findings across runs."""
-    made, found = without_duplicates(runs), list[Finding]()
+    made, findings = without_duplicates(runs), list[Finding]()
     swings = {
         run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
         for run in made
@@ -48,10 +48,10 @@ def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Findin
     if known and known[-1][0] > (1 + ONE_RIG) * known[0][0]:
         short, long = (f"{period:.4g} s in {name}" for period, name in (known[0], known[-1]))
         text = f"small swings take {short} and {long}: these are not runs of one pendulum"
-        found.append(Finding("rigs-differ", text))
+        findings.append(Finding("rigs-differ", text))
     if runs and all(run.hold_out for run in runs):
-        found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
-    return tuple(made), tuple(found)
+        findings.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
+    return tuple(made), tuple(findings)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,11 +151,11 @@ def _lags(a: Floats, b: Floats, least: int) -> set[int]:
     count = np.maximum(count, 1.0)
     mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
     squares = product(one_a**2, there_b) + product(there_a, one_b**2)
-    own = squares / count - mean_a**2 - mean_b**2
+    apart = squares / count - mean_a**2 - mean_b**2
     both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
     # The variance of the difference, and of the sum.
-    found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
-    return {int(correlation_lags(a.size, b.size)[k]) for k in found}
+    closest = (np.argmin(np.where(enough, apart + sign * both, np.inf)) for sign in (-1, 1))
+    return {int(correlation_lags(a.size, b.size)[k]) for k in closest}
 
 
 def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
@@ -191,6 +191,6 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
         text += ": a held-out duplicate is no independent test" if run.hold_out else ""
     low, high = float(run.time[first]), float(run.time[first + count - 1])
-    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
-    findings = (*run.findings, found)
+    copy = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
+    findings = (*run.findings, copy)
     return dataclasses.replace(run, trusted=trusted, segments=segments, findings=findings)

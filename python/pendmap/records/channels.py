@@ -189,15 +189,15 @@ def _pivot(
         if way in plan.pivot
     }
     scale = plan.pivot_scale
-    found = {way: table.values[:, place] * factor * scale for way, place in places.items()}
-    return found, unit, list(places.values())
+    motion = {way: table.values[:, place] * factor * scale for way, place in places.items()}
+    return motion, unit, list(places.values())
 
 
 def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
     """Assign the pixel coordinates of a table whose angle column is constant."""
-    found = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
-    place = places.get("angle", found.get("angle"))
-    both = found | places
+    guessed = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
+    place = places.get("angle", guessed.get("angle"))
+    both = guessed | places
     pair: dict[str, int] = {c: both[c] for c in ("pixel_x", "pixel_y") if c in both}
     if place is None or "angle" in asked or len(pair) < 2:
         return []
@@ -230,8 +230,8 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
         free = [k for k in range(table.values.shape[1]) if k not in guessed.values()]
         guessed |= {"angle": free[0]} if len(free) == 1 else {}
     places.update(guessed)
-    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {said}")] if guessed else []
+    names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
+    return [Finding("columns-guessed", f"by their names {names}")] if guessed else []
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
@@ -262,7 +262,7 @@ def _fitting(table: Table, channel: str, names: str) -> list[int]:
 def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
     """Assign time and angle in a table without headings."""
     free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    said = []
+    guesses = []
     if not timed:  # the rate is known: ignore columns that number the readings
         free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
     if "time" not in places and free:
@@ -271,11 +271,13 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
         if k is not None:
             places["time"] = k
             free.remove(k)
-            said.append(f"column {k + 1} is the time in s")
+            guesses.append(f"column {k + 1} is the time in s")
     if free and not any(channel in places for channel in ANGLE_CHANNELS):
         places["angle"] = free[0]
-        said.append(f"column {free[0] + 1} is the angle")
-    return [Finding("columns-guessed", f"no line of names: {', '.join(said)}")] if said else []
+        guesses.append(f"column {free[0] + 1} is the angle")
+    return (
+        [Finding("columns-guessed", f"no line of names: {', '.join(guesses)}")] if guesses else []
+    )
 
 
 def _orders(values: Floats) -> bool:
@@ -296,16 +298,16 @@ def position_of(table: Table, places: Mapping[str, int]) -> int | None:
     from scipy.signal import detrend
 
     taken = places.values()
-    found = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
-    if len(found) != 1 or "velocity" not in places:
-        return found[0] if len(found) == 1 else None
-    both = table.values[:, [found[0], places["velocity"]]]
+    fitting = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
+    if len(fitting) != 1 or "velocity" not in places:
+        return fitting[0] if len(fitting) == 1 else None
+    both = table.values[:, [fitting[0], places["velocity"]]]
     both = both[np.isfinite(both).all(axis=1)]
     if both.shape[0] < 5:
         return None
     one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return found[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
+    return fitting[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
 
 
 def head_of(table: Table, place: int) -> str:
@@ -332,7 +334,7 @@ def _unused(
     for k in rest:
         if changes(table.values[:, k]):
             findings += _suggestion(head_of(table, k), channels, plan)
-    seen = {found.what: found for found in reversed(findings)}  # the first of each kind
+    seen = {finding.what: finding for finding in reversed(findings)}  # the first of each kind
     return names, list(reversed(seen.values()))
 
 
@@ -340,7 +342,7 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
     name, unit = name_and_unit(head)
     name, unit = plain(name), spelling(unit or "")
-    said = plain(head)
+    words = plain(head)
     if (MOTOR_NAMES.search(name) or unit in MOTOR_UNITS) and plan.kind == "free":
         text = f"{head!r} looks like a motor's: a driven record is no free decay"
         return [Finding("motor-column", text)]
@@ -348,8 +350,8 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
         text = f"{head!r} may be the angle itself: angle = {{ name = {head!r} }} in [columns]"
         return [Finding("angle-column", f"{text} of experiment.toml reads it")]
-    if PIVOT_NAMES.search(said) and plan.pivot is None:
-        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, said)), "m")
+    if PIVOT_NAMES.search(words) and plan.pivot is None:
+        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, words)), "m")
         unit = unit if unit in PIVOT_UNITS else kind
         text = (
             f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'

@@ -1,14 +1,11 @@
-"""Consistency checks of channels: velocity, acceleration and pivot against the angle.
+"""Rules of other channels: velocity, acceleration and pivot against the angle.
 
-A tangential accelerometer at distance ``r`` reads ``(g - r w0**2) sin(th)``, so a swing leaves its
-distance and the sense of its axis ambiguous. A step ``s`` of a pivot's position sampled every ``h``
-seconds is one of ``s / h^2`` in its acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions
-are smoothed by cubics.
+A step ``s`` of a pivot's position sampled every ``h`` seconds is one of ``s / h^2`` in its
+acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions are smoothed by cubics.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from typing import TYPE_CHECKING, Final
@@ -16,9 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.model.quantities import GRAVITY
 from pendmap.records.resolution import step_of
-from pendmap.records.rod_sensors import Accelerometer
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
@@ -35,8 +30,6 @@ GAIN_OFF: Final = 0.1  # Greatest relative error of a gain that a channel's filt
 CERTAIN_SIGN: Final = 8.0  # Standard errors above which a coefficient has the wrong sign
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
 DERIVATIVE_SPAN: Final = 0.12  # Window of the polynomials that give derivatives, periods
-# Text on the role of an acceleration recorded with an angle
-CHECK_ONLY: Final = "a check, not fitted: the angle is"
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
 NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
 STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
@@ -57,15 +50,15 @@ def velocity(work: Work) -> Finding | None:
     which = work.trusted[fit.middle]
     slope, seen = fit.slope[which], values[fit.middle][which]
     scale = float(np.max(np.abs(seen), initial=0.0))
-    alike = _alike(slope, seen / (scale or 1.0)) if slope.size >= 10 else 0.0
-    if not alike:
+    if slope.size < 10 or 0 in (scale, float(np.std(slope)), float(np.std(seen))):
         return None
+    seen = seen / scale  # squares of huge numbers overflow
+    alike = float(np.corrcoef(slope, seen)[0, 1])
     if abs(alike) < SAME_MOTION:
         del work.extra["velocity"]
         text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
         return work.finding("velocity-unlike", text)
-    # Squares of huge numbers overflow: the readings are scaled before.
-    gain = abs(float(np.dot(slope, seen / scale) / np.dot(slope, slope)) * scale)
+    gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = values * math.pi / 180
         text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
@@ -73,20 +66,10 @@ def velocity(work: Work) -> Finding | None:
     elif abs(gain - 1) > GAIN_OFF:
         text = f"the velocity is {gain:.3g} times the angle's derivative"
         work.doubt = work.finding("velocity-scale", text)
-    return _turn(work, "velocity") if alike < 0 else None
-
-
-def _alike(one: Floats, other: Floats) -> float:
-    """Return the correlation of two channels; 0 if one is constant."""
-    if float(np.std(one)) == 0 or float(np.std(other)) == 0:
-        return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
-
-
-def _turn(work: Work, channel: str) -> Finding:
-    """Invert a channel with the opposite sign of the angle."""
-    work.extra[channel] = -work.extra[channel]
-    text = f"the {channel} has the opposite sign to the angle: inverted to agree with the angle"
+    if alike > 0:
+        return None
+    work.extra["velocity"] = -work.extra["velocity"]
+    text = "the velocity has the opposite sign to the angle: inverted to agree with the angle"
     return work.finding("sign-turned", text, mended=True)
 
 
@@ -101,7 +84,7 @@ def pivot_unit(work: Work) -> Finding | None:
 
 
 def drive_sign(work: Work) -> Finding | None:
-    """Report a drive or pivot whose sign the angle contradicts: its coefficient is negative."""
+    """Report a drive or pivot whose coefficient the angle shows with the wrong sign."""
     from scipy.signal import savgol_filter
 
     interval, even = even_times(work.time)
@@ -156,143 +139,12 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
     return pushes
 
 
-@dataclasses.dataclass(frozen=True)
-class _Motion:
-    """Smoothed angle, derivatives and measured acceleration at the samples that have all."""
-
-    theta: Floats
-    velocity: Floats
-    acceleration: Floats
-    measured: Floats
-    w0: float
-
-    def expected(self, sensor: Accelerometer) -> Floats:
-        """Return the accelerometer readings predicted from the angle."""
-        r, g = sensor.distance_m, sensor.gravity
-        if sensor.direction == "radial":
-            return np.asarray(r * self.velocity**2 + g * np.cos(self.theta))
-        return np.asarray(r * self.acceleration + g * np.sin(self.theta))
-
-
 def acceleration(work: Work) -> Finding | None:
-    """Compare an acceleration with the angle; invert it if it has the opposite sign."""
+    """Report an acceleration that is not used, since there is an angle."""
     if work.angle_source is not None or "acceleration" not in work.extra:
         return None
-    motion = _motion(work) if work.free else None
-    if motion is None:
-        why = "too few samples have an angle to compare it with"
-        if not work.free:
-            why = "on a forced run it includes the pivot's"
-        return work.finding("acceleration-unused", f"the acceleration is not used: {why}")
-    if work.accelerometer is None:
-        return _unplaced(work, motion)
-    return _compared(work, motion, work.accelerometer)
-
-
-def _motion(work: Work) -> _Motion | None:
-    """Return derivatives of the angle from local polynomials; None if they are unreliable."""
-    from scipy.signal import savgol_filter
-
-    measured = work.extra["acceleration"]
-    good = work.trusted & np.isfinite(measured)
-    interval, even = even_times(work.time)
-    count = even.size
-    if np.count_nonzero(good) < 100 or not count:
-        return None
-    theta = np.interp(even, work.time[good], work.theta[good])
-    seen = np.interp(even, work.time[good], measured[good])
-    inside = np.interp(even, work.time, good.astype(float)) > 0.99
-    crossings = np.count_nonzero(np.diff(np.sign(theta[inside] - np.median(theta[inside]))))
-    if crossings < 4:
-        return None
-    # Noise adds crossings of the median: this is a lower bound of the period.
-    period = 2 * float(np.count_nonzero(inside)) * interval / crossings
-    window = max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
-    if window > count // 4:
-        return None
-    zeroth, first, second = (
-        np.asarray(savgol_filter(theta, window, 4, deriv=k, delta=interval)) for k in range(3)
-    )
-    smoothed = np.asarray(savgol_filter(seen, window, 4))
-    inside[: window // 2] = inside[count - window // 2 :] = False
-    sine = np.sin(zeroth[inside])
-    slope = _slope(sine, second[inside])
-    if slope >= 0:
-        return None
-    w0 = math.sqrt(-slope)
-    return _Motion(zeroth[inside], first[inside], second[inside], smoothed[inside], w0)
-
-
-def _slope(x: Floats, y: Floats) -> float:
-    """Return the slope of the least-squares line through points."""
-    x = x - np.mean(x)
-    power = float(np.dot(x, x))
-    return float(np.dot(x, y - np.mean(y))) / power if power else 0.0
-
-
-def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> Finding:
-    """Report the agreement of an acceleration with the readings predicted at its position."""
-    expected = motion.expected(sensor)
-    alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
-    angular = sensor.direction == "angular"
-    where = "" if angular else f", {sensor.direction} at {sensor.distance_m:g} m"
-    if abs(alike) < SAME_MOTION:
-        text = (
-            f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
-            f"{where}): direction or column is wrong, or its noise hides the swing"
-        )
-        return work.finding("acceleration-unlike", text)
-    what, text = "agrees", f"the acceleration is {abs(gain):.3g} times that computed from the angle"
-    text += where
-    if abs(abs(gain) - 1) <= GAIN_OFF:
-        text += f": {CHECK_ONLY}"
-    elif angular:
-        what, text = "scale", f"{text}: its unit, or a distance is wrong; not used"
-    else:
-        distance = _distance(motion, math.copysign(1.0, alike), sensor)
-        other = (
-            f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
-        )
-        what, text = "scale", f"{text}: {other} or gravity_removed is wrong; not used"
-    finding = work.finding(f"acceleration-{what}", text)
-    if gain > 0:
-        return finding
-    work.doubt = finding
-    return _turn(work, "acceleration")
-
-
-def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
-    """Return the estimated distance of a sensor from the pivot, m, of known direction."""
-    measured = sign * motion.measured
-    if sensor.direction == "radial":
-        return _slope(motion.velocity**2, measured - sensor.gravity * np.cos(motion.theta))
-    return (sensor.gravity - _slope(np.sin(motion.theta), measured)) / motion.w0**2
-
-
-def _unplaced(work: Work, motion: _Motion) -> Finding:
-    """Report the estimated direction and distance of an accelerometer of unknown position."""
-    gravity = float(work.known.get("gravity", GRAVITY))
-    sine = _alike(np.sin(motion.theta), motion.measured)
-    radial = _alike(motion.velocity**2, motion.measured)
-    if max(abs(sine), abs(radial)) < SAME_MOTION:
-        text = "the acceleration is not used: it follows neither the angle nor the velocity squared"
-        return work.finding("acceleration-unlike", text)
-    if abs(radial) > abs(sine):
-        sign = math.copysign(1.0, radial)
-        distance = _distance(motion, sign, Accelerometer("radial", 1.0, gravity))
-        without = _distance(motion, sign, Accelerometer("radial", 1.0, 0.0))
-        place = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
-    else:
-        gain = abs(_slope(np.sin(motion.theta), motion.measured))
-        near, far = (abs(gravity - s * gain) / motion.w0**2 for s in (1, -1))
-        without = gain / motion.w0**2
-        near_too = f"{near:.3g} or " if gain < gravity else ""
-        place = (
-            f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
-            f" {without:.3g} if gravity is removed"
-        )
-    use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
-    return work.finding("acceleration-unused", f"the acceleration looks {place}; {use}")
+    text = "the acceleration is not used: the angle is; without an angle it would be read"
+    return work.finding("acceleration-unused", text)
 
 
 def pivot_steps(work: Work) -> Finding | None:

@@ -107,12 +107,12 @@ def law_of(
     fit: LocalFit, square: Floats, *, fastest: float, count: float = 0.0, interval: float = 0.0
 ) -> SpeedLaw | None:
     """Return the growth of noise with squared speed, (rad/s)^2; None if not significant."""
-    found = _adapted(fit.residual, square, fit.sum_of_squares, count)
-    if found is not None and count and found[0] < DITHERED * count:
+    law = _adapted(fit.residual, square, fit.sum_of_squares, count)
+    if law is not None and count and law[0] < DITHERED * count:
         # Slow readings that share a count have a common error, absent from residuals.
         quick = square >= (count / interval) ** 2
-        found = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
-    return None if found is None else SpeedLaw(*found, fastest)
+        law = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
+    return None if law is None else SpeedLaw(*law, fastest)
 
 
 def _adapted(

@@ -49,8 +49,8 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     if not place.is_dir():
         return [place]
-    own = [place / NAME] if (place / NAME).is_file() else []
-    return own + [
+    description = [place / NAME] if (place / NAME).is_file() else []
+    return description + [
         place / file for file in dict.fromkeys(plan.file for plan in _planned(place).runs)
     ]
 
@@ -147,7 +147,7 @@ def experiment_of(
         name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
         runs.append(run if name == run.name else dataclasses.replace(run, name=name))
     checked, together = checked_together(runs)
-    findings = dict.fromkeys([*(found for part in parts for found in part.findings), *together])
+    findings = dict.fromkeys([*(finding for part in parts for finding in part.findings), *together])
     digests = {file: digest for part in parts for file, digest in part.sha256.items()}
     place = Path(listed([part.path.name for part in parts], _SHOWN))
     return Experiment(place, checked, known, tuple(findings), digests)
@@ -192,14 +192,14 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
         if described and not path.exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
         try:
-            found, shared = _runs(path, plan, description, tables if described else {}, name)
+            of_file, shared = _runs(path, plan, description, tables if described else {}, name)
         except InputError as error:
             if not plain:
                 raise
             refused.append(str(error))
             findings.append(Finding("file-left-out", f"left out: {error}"))
         else:
-            runs += found
+            runs += of_file
             findings += shared
     if not runs:
         first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
@@ -241,7 +241,7 @@ def _runs(
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)
         runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
-    return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
+    return runs, [dataclasses.replace(finding, where=finding.where or name) for finding in shared]
 
 
 def _run(work: Work, name: str, digest: str) -> Run:

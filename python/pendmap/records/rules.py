@@ -5,8 +5,8 @@ correct the record, leave samples out or mark them as not for fitting. It return
 says what is wrong, where, what was done and what it means for errors, or None; it raises InputError
 where no record is left. A new rule is one function, in the file of its subject, and one line here.
 
-What comes before a record has lists of its own: kinds of files in ``tables.py`` (``READERS``), names
-and units of columns in ``units.py`` (``CHANNELS``).
+What comes before a record has lists of its own: kinds of files in ``tables.py`` (``READERS``),
+names and units of columns in ``units.py`` (``CHANNELS``).
 """
 
 from __future__ import annotations
