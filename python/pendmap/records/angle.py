@@ -43,11 +43,7 @@ def undeclared_peaks(work: Work) -> Finding | None:
         return None
     work.peaks_only = True
     work.trusted[:] = False
-    text = (
-        f"{pattern}, ever smaller: if these are turning points only, one each half swing, "
-        f'give peaks = "{work.columns["angle"]}" in [columns] of experiment.toml'
-    )
-    return work.finding("peaks-undeclared", text)
+    return work.finding("peaks-undeclared", pattern=pattern, column=work.columns["angle"])
 
 
 def _pattern(time: Floats, theta: Floats) -> str:
@@ -77,11 +73,7 @@ def turning_points(work: Work) -> Finding | None:
     peaks = work.theta[np.isfinite(work.theta)]
     if not peaks.size or (np.any(peaks < 0) and np.any(peaks > 0)):
         return None
-    text = (
-        "the turning points have one sign: they are taken as one each half swing; if all"
-        " are of one side, w0 comes out half as large"
-    )
-    return work.finding("peaks-one-sign", text)
+    return work.finding("peaks-one-sign")
 
 
 def source_missing(work: Work) -> Finding | None:
@@ -101,8 +93,7 @@ def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
         raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
-    why = f"without a number for the {what} left out"
-    finding = work.leave_out(~good, "angle-missing", "row", why)
+    finding = work.leave_out(~good, "angle-missing", "row", channel=what)
     work.refuse_short()
     return finding
 
@@ -118,11 +109,7 @@ def derived(work: Work) -> Finding | None:
     rate = work.extra["velocity"]
     work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
     work.integrated = True
-    text = (
-        "the angle is the integrated velocity; its zero is the middle of the swing: for"
-        " figures and the methods of peaks; the trajectory method fits the velocity itself"
-    )
-    return work.finding("angle-integrated", text, mended=True)
+    return work.finding("angle-integrated")
 
 
 def _placed(work: Work) -> Accelerometer:
@@ -156,12 +143,8 @@ def _accelerated(work: Work) -> Finding:
     if sensor.direction != "angular":
         removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
         place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
-    text = (
-        f"the angle is computed from {place}, without the part of the damping: approximate,"
-        " for figures and the methods of peaks; the trajectory method fits the acceleration itself"
-    )
-    work.doubt = work.finding("acceleration-weak", doubt) if doubt else None
-    return work.finding("angle-from-acceleration", text, mended=True)
+    work.doubt = work.finding("acceleration-weak", doubt=doubt) if doubt else None
+    return work.finding("angle-from-acceleration", place=place)
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
@@ -192,18 +175,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
     work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
     centre = middle + size * np.array([a, b])
-    text = (
-        f"the angle is that on a circle around ({centre[0]:.5g}, {centre[1]:.5g}) of radius"
-        f" {radius * size:.5g}, y counted {'down' if down > 0 else 'up'}ward; the places are"
-        f" {rms * size:.2g} from it, rms"
-    )
     if error > RADIUS_DOUBT * radius:
-        doubt = (
-            f"the radius is uncertain by {100 * error / radius:.0f} %, and so is every angle: the"
-            " arc is short"
-        )
-        work.doubt = work.finding("circle-uncertain", doubt)
-    return work.finding("angle-from-pixels", text, mended=True)
+        work.doubt = work.finding("circle-uncertain", percent=100 * error / radius)
+    way, radius, rms = "down" if down > 0 else "up", radius * size, rms * size
+    x0, y0 = centre
+    return work.finding("angle-from-pixels", x=x0, y=y0, radius=radius, way=way, rms=rms)
 
 
 def _geometric(
@@ -238,8 +214,7 @@ def huge(work: Work) -> Finding | None:
             f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
             " large for a pendulum; a scale can be given in [columns] of experiment.toml"
         )
-    why = f"beyond {LARGEST_ANGLE:g} rad left out"
-    finding = work.leave_out(which, "angle-huge", "number", why)
+    finding = work.leave_out(which, "angle-huge", "number", largest=LARGEST_ANGLE)
     work.refuse_short()
     return finding
 
@@ -254,7 +229,5 @@ def wrapped(work: Work) -> Finding | None:
     work.theta = np.unwrap(work.theta)
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
     if fastest > math.pi / 2:
-        text = f"up to {fastest:.2g} rad from sample to sample: turns may be miscounted"
-        work.doubt = work.finding("unwrapping-uncertain", text)
-    text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"
-    return work.finding("angle-wrapped", text, mended=True, at=jumps + 1)
+        work.doubt = work.finding("unwrapping-uncertain", step=fastest)
+    return work.finding("angle-wrapped", at=jumps + 1, jumps=counted(jumps.size, "jump"))

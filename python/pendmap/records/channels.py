@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.description import Column
-from pendmap.records.experiment import Finding
+from pendmap.records.findings import finding_of
 from pendmap.records.rod_sensors import accelerometer_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, spelling
 from pendmap.records.work import Work
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from pendmap.records.description import Description, RunPlan
+    from pendmap.records.experiment import Finding
     from pendmap.records.tables import Table
     from pendmap.signal import Floats
 
@@ -67,8 +68,8 @@ def channels_of(  # noqa: C901 (a step each)
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
     elif rate:
-        text = f"{head_of(table, places['time'])!r} has the times: rate_hz {rate:g} is not used"
-        findings.append(Finding("rate-unused", text))
+        column = head_of(table, places["time"])
+        findings.append(finding_of("rate-unused", column=column, rate=rate))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")
@@ -77,8 +78,7 @@ def channels_of(  # noqa: C901 (a step each)
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
     if plan.pivot and "unit" not in plan.pivot:
-        text = 'the pivot has no unit: assumed to be an acceleration, unit = "m/s2"'
-        findings.append(Finding("pivot-unit", text))
+        findings.append(finding_of("pivot-unit.missing"))
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
     sensor, missing = None, ""
@@ -206,8 +206,7 @@ def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]
     places.pop("angle", None)
     places.update(pair)
     x, y = (table.names[k] for k in pair.values())
-    text = f"{head_of(table, place)!r} never changes: the angle is computed from {x!r} and {y!r}"
-    return [Finding("angle-constant", text, mended=True)]
+    return [finding_of("angle-constant", angle=head_of(table, place), x=x, y=y)]
 
 
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
@@ -231,7 +230,7 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
         guessed |= {"angle": free[0]} if len(free) == 1 else {}
     places.update(guessed)
     names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {names}")] if guessed else []
+    return [finding_of("columns-guessed", names=names)] if guessed else []
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
@@ -275,9 +274,8 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
     if free and not any(channel in places for channel in ANGLE_CHANNELS):
         places["angle"] = free[0]
         guesses.append(f"column {free[0] + 1} is the angle")
-    return (
-        [Finding("columns-guessed", f"no line of names: {', '.join(guesses)}")] if guesses else []
-    )
+    finding = finding_of("columns-guessed.places", names=", ".join(guesses))
+    return [finding] if guesses else []
 
 
 def _orders(values: Floats) -> bool:
@@ -330,7 +328,7 @@ def _unused(
     names = tuple(head_of(table, k) for k in rest)
     if not rest:
         return (), []
-    findings = [Finding("columns-unused", f"not used: {_listed(names, MOST_UNUSED)}")]
+    findings = [finding_of("columns-unused", names=_listed(names, MOST_UNUSED))]
     for k in rest:
         if changes(table.values[:, k]):
             findings += _suggestion(head_of(table, k), channels, plan)
@@ -344,18 +342,12 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     name, unit = plain(name), spelling(unit or "")
     words = plain(head)
     if (MOTOR_NAMES.search(name) or unit in MOTOR_UNITS) and plan.kind == "free":
-        text = f"{head!r} looks like a motor's: a driven record is no free decay"
-        return [Finding("motor-column", text)]
+        return [finding_of("motor-column", head=head)]
     bare = "angle" not in channels and "peaks" not in channels
     if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
-        text = f"{head!r} may be the angle itself: angle = {{ name = {head!r} }} in [columns]"
-        return [Finding("angle-column", f"{text} of experiment.toml reads it")]
+        return [finding_of("angle-column", head=head)]
     if PIVOT_NAMES.search(words) and plan.pivot is None:
         kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, words)), "m")
         unit = unit if unit in PIVOT_UNITS else kind
-        text = (
-            f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'
-            " (or vertical) in [[run]] of experiment.toml reads it"
-        )
-        return [Finding("pivot-column", text)]
+        return [finding_of("pivot-column", head=head, unit=unit)]
     return []

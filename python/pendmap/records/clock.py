@@ -40,7 +40,7 @@ def missing(work: Work) -> Finding | None:
     bad = ~np.isfinite(work.time)
     if bad.all():
         raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
-    finding = work.leave_out(bad, "time-missing", "row", "without a time left out")
+    finding = work.leave_out(bad, "time-missing", "row")
     if work.time.size < 2:
         work.refuse_short()
     return finding
@@ -59,11 +59,8 @@ def stopped(work: Work) -> Finding | None:
     begin, end = edges[stops] + usual * right, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
     times = listed([moment(work.time[k]) for k in begin], 3)
-    text = (
-        f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
-        " without own times left out"
-    )
-    finding = work.finding("time-stops", text, mended=True, at=begin)
+    readings = counted(out.size, "reading")
+    finding = work.finding("time-stops", at=begin, times=times, readings=readings)
     work.keep(np.delete(np.arange(work.time.size), out))
     return finding
 
@@ -76,8 +73,7 @@ def wrapped(work: Work) -> Finding | None:
         at = np.flatnonzero(np.abs(steps + wrap) < max(20 * usual, 1e-9))
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
             work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
-            text = f"the counter of the clock wrapped {counted(at.size, 'time')}: continued"
-            return work.finding("time-wrapped", text, mended=True, at=at + 1)
+            return work.finding("time-wrapped", at=at + 1, wraps=counted(at.size, "time"))
     return None
 
 
@@ -97,11 +93,14 @@ def restarted(work: Work) -> Finding | None:
         return None
     starts = np.array(edges[1:])
     low, high = longest_between(edges, work.time.size)
-    text = (
-        f"the clock starts again {counted(starts.size, 'time')}: of {starts.size + 1} parts the"
-        f" longest is used, rows {work.rows[low]} to {work.rows[high - 1]}"
+    finding = work.finding(
+        "time-restarts",
+        at=starts,
+        starts=counted(starts.size, "time"),
+        parts=starts.size + 1,
+        first=work.rows[low],
+        last=work.rows[high - 1],
     )
-    finding = work.finding("time-restarts", text, at=starts)
     work.keep(np.arange(low, high))
     return finding
 
@@ -120,8 +119,7 @@ def edge_stamps(work: Work) -> Finding | None:
     if not same:
         return None
     work.time = spread_stamps(work.time)
-    text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
-    return work.finding("time-coarse", text, mended=True)
+    return work.finding("time-coarse.edges", percent=100 * same)
 
 
 def _even_if_coarse(work: Work) -> bool:
@@ -147,27 +145,26 @@ def coarse(work: Work) -> Finding | None:
     if ticks is None:
         return None
     tick, even = ticks
-    text = f"stamps in ticks of {tick:.3g} s: the readings are spread evenly"
+    missing, few = "", ""
     place = np.arange(work.time.size)
     slips = slips_of(even.times, work.theta, fewest=1)
     if slips is not None:  # readings are lost where the others jump, if the stamps allow it
         lost = np.round((slips.time - even.times) / even.interval).astype(np.intp)
         if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
             even = whole
-            text += f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
+            missing = f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
     work.clock_stderr = even.stderr / even.interval
     if even.missed <= even.interval:
-        rate = Estimate(1 / even.interval, work.clock_stderr / even.interval)
+        rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
         work.time = even.times
-        return work.finding("time-coarse", f"{text}, {estimate_text(rate)} Hz", mended=True)
+        return work.finding("time-coarse.even", tick=tick, lost=missing, rate=rate)
     _, number = np.unique(work.time, return_counts=True)
-    few = np.repeat(number < np.median(number) - 1, number)
+    out = np.repeat(number < np.median(number) - 1, number)
     work.time = spread_stamps(work.time)
-    work.keep(~few)
-    text += " over each tick, no rate fits all"
-    if few.any():
-        text += f"; {counted(int(few.sum()), 'reading')} in ticks that lack readings left out"
-    return work.finding("time-coarse", text, mended=True)
+    work.keep(~out)
+    if out.any():
+        few = f"; {counted(int(out.sum()), 'reading')} in ticks that lack readings left out"
+    return work.finding("time-coarse.tick", tick=tick, lost=missing, few=few)
 
 
 def _ticks(
@@ -240,16 +237,14 @@ def backwards(work: Work) -> Finding | None:
     if not np.all(np.diff(work.time) < -_rounding(work.time)):
         return None
     work.keep(np.arange(work.time.size)[::-1])
-    text = "the rows run backwards in time: reversed"
-    return work.finding("time-backwards", text, mended=True)
+    return work.finding("time-backwards.reversed")
 
 
 def repeated(work: Work) -> Finding | None:
     """Remove rows with the time of the row before."""
     again = np.append(False, np.abs(np.diff(work.time)) <= _rounding(work.time))
     alike = np.sum(np.diff(work.theta, prepend=np.nan)[again] == 0)
-    why = f"twice ({alike} with the same reading): the first of each kept"
-    return work.leave_out(again, "time-duplicate", "time stamp", why)
+    return work.leave_out(again, "time-duplicate", "time stamp", alike=alike)
 
 
 def unordered(work: Work) -> Finding | None:
@@ -260,7 +255,7 @@ def unordered(work: Work) -> Finding | None:
     out = np.setdiff1d(np.arange(work.time.size), rising)
     order = np.argsort(work.time, kind="stable")
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
-        text = f"{counted(out.size, 'row')} out of order in time: sorted by time"
+        key, number = "time-backwards.sorted", counted(out.size, "row")
         rising = order
     elif out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
@@ -268,8 +263,8 @@ def unordered(work: Work) -> Finding | None:
             " of order, and sorted by time the angles are no smooth motion"
         )
     else:
-        text = f"{counted(out.size, 'time stamp')} out of order, left out"
-    finding = work.finding("time-backwards", text, mended=True, at=out)
+        key, number = "time-backwards.left-out", counted(out.size, "time stamp")
+    finding = work.finding(key, at=out, number=number)
     work.keep(rising)
     work.keep(np.append(True, np.diff(work.time) > _rounding(work.time)))
     return finding
@@ -322,17 +317,20 @@ def gaps(work: Work) -> Finding | None:
     steps, intervals = np.diff(work.time), intervals_of(work.time)
     at = intervals.gaps
     if at.size > steps.size / 4:
-        text = f"the samples are uneven: intervals from {steps.min():.3g} to {steps.max():.3g} s"
-        return work.finding("time-uneven", text)
+        return work.finding("time-uneven", low=steps.min(), high=steps.max())
     if not at.size:
         return None
     worst = at[int(np.argmax(steps[at]))]
     low, high = work.time[worst : worst + 2].tolist()
-    text = (
-        f"{counted(at.size, 'gap')}, about {counted(intervals.missing, 'sample')} missing; the"
-        f" longest {steps[worst]:.3g} s at {moment(low)} s"
+    return work.finding(
+        "time-gap",
+        at=at,
+        span=(low, high),
+        gaps=counted(at.size, "gap"),
+        samples=counted(intervals.missing, "sample"),
+        longest=steps[worst],
+        at_s=moment(low),
     )
-    return work.finding("time-gap", text, at=at, span=(low, high))
 
 
 def jitter(work: Work) -> Finding | None:
@@ -342,9 +340,8 @@ def jitter(work: Work) -> Finding | None:
     spread = math.sqrt(float(np.mean((np.delete(steps, at) - usual) ** 2)))
     if at.size > steps.size / 4 or spread <= REPORTED_JITTER * usual:
         return None
-    share = 100 * spread / usual
-    text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
-    return work.finding("time-jitter", text)
+    percent = 100 * spread / usual
+    return work.finding("time-jitter", spread=spread, percent=percent, interval=usual)
 
 
 def no_clock(work: Work) -> None:
@@ -380,10 +377,6 @@ def pause(work: Work) -> Finding | None:
             break
         places = np.arange(work.time.size)
         side = "before" if at >= work.time.size - at else "after"
-        text = (
-            f"a pause of {longest:.3g} s, longer than the rest of the record: the part {side} it"
-            " is used; from_s and to_s choose another"
-        )
-        finding = work.finding("time-pause", text, at=np.array([at]))
+        finding = work.finding("time-pause", at=np.array([at]), pause=longest, side=side)
         work.keep(places < at if side == "before" else places >= at)
     return finding

@@ -44,8 +44,7 @@ def velocity(work: Work) -> Finding | None:
     values = work.extra["velocity"]
     if missing := int(np.count_nonzero(~np.isfinite(values))):
         del work.extra["velocity"]
-        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
-        return work.finding("velocity-missing", text)
+        return work.finding("velocity-missing", number=counted(missing, "sample"))
     fit = local_fit(work.time, work.theta)
     which = work.trusted[fit.middle]
     slope, seen = fit.slope[which], values[fit.middle][which]
@@ -56,21 +55,17 @@ def velocity(work: Work) -> Finding | None:
     alike = float(np.corrcoef(slope, seen)[0, 1])
     if abs(alike) < SAME_MOTION:
         del work.extra["velocity"]
-        text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
-        return work.finding("velocity-unlike", text)
+        return work.finding("velocity-unlike", alike=alike)
     gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = values * math.pi / 180
-        text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
-        work.doubt = work.finding("velocity-unit", text, mended=True)
+        work.doubt = work.finding("velocity-unit", gain=gain)
     elif abs(gain - 1) > GAIN_OFF:
-        text = f"the velocity is {gain:.3g} times the angle's derivative"
-        work.doubt = work.finding("velocity-scale", text)
+        work.doubt = work.finding("velocity-scale", gain=gain)
     if alike > 0:
         return None
     work.extra["velocity"] = -work.extra["velocity"]
-    text = "the velocity has the opposite sign to the angle: inverted to agree with the angle"
-    return work.finding("sign-turned", text, mended=True)
+    return work.finding("sign-turned.velocity")
 
 
 def pivot_unit(work: Work) -> Finding | None:
@@ -78,8 +73,7 @@ def pivot_unit(work: Work) -> Finding | None:
     for way, values in work.pivot.items():
         span = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
-            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
-            return work.finding("pivot-unit", f"{text}: its unit is wrong")
+            return work.finding("pivot-unit.wrong", way=way, span=span, unit=work.pivot_unit)
     return None
 
 
@@ -114,10 +108,8 @@ def drive_sign(work: Work) -> Finding | None:
         return None  # no oscillation about theta = 0: the sign is undetermined
     for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
-            what = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
-            text = f"by the angle, {what} acts with the opposite sign: turned by 180 degrees?"
-            text += "" if name == "drive" else " sign = -1 in pivot reverses it"
-            return work.finding("sign-turned", text)
+            key = "sign-turned.drive" if name == "drive" else "sign-turned.pivot"
+            return work.finding(key, way=name)
     return None
 
 
@@ -143,8 +135,7 @@ def acceleration(work: Work) -> Finding | None:
     """Report an acceleration that is not used, since there is an angle."""
     if work.angle_source is not None or "acceleration" not in work.extra:
         return None
-    text = "the acceleration is not used: the angle is; without an angle it would be read"
-    return work.finding("acceleration-unused", text)
+    return work.finding("acceleration-unused")
 
 
 def pivot_steps(work: Work) -> Finding | None:
@@ -170,12 +161,10 @@ def pivot_steps(work: Work) -> Finding | None:
         pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
         work.pivot[way] = np.interp(work.time, even, pushed)
     what = "places" if order == 2 else "speeds"
-    text = (
-        f"the pivot's {what} come in steps: its acceleration is that of cubics through"
-        f" {max(windows)} readings, {max(windows) * interval:.3g} s"
-    )
     work.pivot_unit = "m/s2"
-    return work.finding("pivot-smoothed", text, mended=True)
+    longest = max(windows)
+    values = {"readings": longest, "seconds": longest * interval}
+    return work.finding("pivot-smoothed", what=what, **values)
 
 
 def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:

@@ -45,7 +45,7 @@ def moves(work: Work) -> Finding | None:
         return None
     work.segments = [Segment("rest", low, high, used=False)]
     work.trusted[:] = False
-    return work.finding("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
+    return work.finding("no-motion", span=spread)
 
 
 def _measure_noise(work: Work) -> None:
@@ -73,7 +73,7 @@ def free_motions(work: Work) -> Finding | None:
     read.middle = float(np.median(good)) if middle is None else middle
     period = _period(work, read.middle)
     if period is None:
-        return work.finding("no-swing", "too few whole swings: little can be checked")
+        return work.finding("no-swing")
     work.period, work.middle = period, read.middle
     span = _trusted_span(work)
     if work.angle_source is not None:
@@ -185,12 +185,13 @@ def _releases(work: Work, used: list[bool]) -> Finding:
     short = [span for span, use in zip(spans, used, strict=True) if not use]
     what = "each taken as a run" if len(taken) > 1 else "one is used"
     # The times are those of the used samples; ends of holds are estimated conservatively.
-    text = f"{counted(len(spans), 'release')}, used from {listed(taken, MOST_LISTED)}: {what}"
+    number, used_from, less = counted(len(spans), "release"), listed(taken, MOST_LISTED), ""
     if short:
-        text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
+        less = f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
     low, high = work.releases[0][0], work.releases[-1][1] - 1
     span = float(work.time[low]), float(work.time[high])
-    return work.finding("several-releases", text, span=span)
+    values = {"releases": number, "used": used_from, "what": what, "short": less}
+    return work.finding("several-releases", span=span, **values)
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
@@ -216,8 +217,7 @@ def held_at_first(work: Work) -> Finding | None:
     if first.what != "held":
         return None
     begin = moment(work.segments[1].from_s)
-    text = f"held at first: used from {begin} s, where the angle has clearly left the hold"
-    return work.finding("held-start", text, span=(first.from_s, first.to_s))
+    return work.finding("held-start", span=(first.from_s, first.to_s), begin=begin)
 
 
 def rest_at_last(work: Work) -> Finding | None:
@@ -225,8 +225,7 @@ def rest_at_last(work: Work) -> Finding | None:
     last = work.segments[-1]
     if last.what != "rest" or len(work.segments) == 1:
         return None
-    text = f"at rest from {moment(last.from_s)} s, not for fitting"
-    return work.finding("rest-tail", text, span=(last.from_s, last.to_s))
+    return work.finding("rest-tail", span=(last.from_s, last.to_s), begin=moment(last.from_s))
 
 
 def zero(work: Work) -> Finding | None:
@@ -238,7 +237,7 @@ def zero(work: Work) -> Finding | None:
         tail = work.theta[work.time >= last.from_s]
         value = float(np.mean(tail))
         error = max(float(np.std(tail)) / math.sqrt(tail.size), work.count / math.sqrt(12))
-        text = f"it rests at {_folded(value):+.3g} rad: an offset, or held there by friction"
+        finding = work.finding("zero-offset.rest", middle=_folded(value))
     else:
         _measure_noise(work)
         time, theta = work.time[work.trusted], work.theta[work.trusted]
@@ -253,11 +252,10 @@ def zero(work: Work) -> Finding | None:
         value = float(np.median(middles))
         error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
         error = max(error, work.count / math.sqrt(12 * middles.size))
-        text = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
-    known = any(finding.what == "zero-offset" for finding in work.findings)
-    if known or abs(_folded(value)) <= max(CERTAIN_OFFSET * error, 1e-5):
-        return None
-    return work.finding("zero-offset", f"{text}; left to the fit")
+        finding = work.finding("zero-offset.swing", middle=value, error=error)
+    known = any(other.what == "zero-offset" for other in work.findings)
+    small = abs(_folded(value)) <= max(CERTAIN_OFFSET * error, 1e-5)
+    return None if known or small else finding
 
 
 def _folded(angle: float) -> float:

@@ -254,8 +254,8 @@ def grows(work: Work) -> Finding | None:
     law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
     if law is None:
         return None
-    share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
-    return work.finding("noise-grows-with-speed", f"{law} ({share} of the interval)")
+    percent = 100 * law.tau / float(np.median(np.diff(work.time)))
+    return work.finding("noise-grows-with-speed", law=law, percent=percent)
 
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:

@@ -63,9 +63,7 @@ def outliers(work: Work) -> Finding | None:
         at, scale = _suspects(work, theta)
         at, scale = at[~seen[at]], scale[~seen[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
-            share = f"{100 * MOST_OUTLIERS:.0f} %"
-            text = f"more than {share} of the samples contradict their neighbours"
-            return work.finding("not-smooth", text)
+            return work.finding("not-smooth", percent=100 * MOST_OUTLIERS)
         verdicts = _judged(work, theta, at, scale)
         if not verdicts:
             break
@@ -89,8 +87,7 @@ def outliers(work: Work) -> Finding | None:
 def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:
     """Mark outliers and report the greatest deviation."""
     worst = float(np.max(np.abs(away[at]), initial=0.0))
-    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
-    return work.distrust(at, "outliers", text)
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
 
 
 def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
@@ -217,12 +214,8 @@ def slips(work: Work) -> Finding | None:
     clock = slips_of(work.time, work.bridged)
     if clock is None:
         return None
-    text = (
-        f"{counted(clock.places.size, 'slip')} of time: the readings jump by their velocity times"
-        f" {1e3 * clock.slip:.4g} +- {1e3 * clock.stderr:.1g} ms, an interval, and not by counts:"
-        " the times after each are moved by whole intervals"
-    )
-    finding = work.finding("time-slips", text, mended=True, at=clock.places)
+    number, size, error = counted(clock.places.size, "slip"), 1e3 * clock.slip, 1e3 * clock.stderr
+    finding = work.finding("time-slips", at=clock.places, slips=number, size=size, error=error)
     work.time = clock.time
     work.jumps = [j for j in work.jumps if np.min(np.abs(clock.places - j.at)) > SIDE]
     return finding
@@ -233,31 +226,33 @@ def jumps(work: Work) -> Finding | None:
     if not work.jumps:
         return None
     places = np.asarray([jump.at for jump in work.jumps], np.intp)
-    many = f"{counted(places.size, 'jump')} of the reading"
+    number = counted(places.size, "jump")
     if places.size > MOST_JUMPS:
-        return work.finding("missed-counts", f"{many} that stay: the zero drifts", at=places)
+        return work.finding("missed-counts.many", at=places, jumps=number)
     sizes = [jump.size for jump in work.jumps]
     turns = [round(size / math.tau) for size in sizes]
     off = [abs(size - n * math.tau) for size, n in zip(sizes, turns, strict=True)]
     counts = [_whole(jump, work.count) for jump in work.jumps]
+    step, whole, key = work.count, counts, "missed-counts.whole"
     if all(turns) and max(off) < OFF_TURN:
-        step, numbers, what, by = math.tau, turns, "turns-slipped", "whole turns"
-    else:
-        by = f"{', '.join(f'{count:+d}' for count in counts[:4])} counts"
-        step, numbers, what = work.count, counts, "missed-counts"
-    if all(numbers):
-        for at, number in zip(places, numbers, strict=True):
-            work.theta[at:] -= number * step
-        return work.finding(what, f"{many} by {by}, undone", mended=True, at=places)
+        step, whole, key = math.tau, turns, "turns-slipped"
+    if all(whole):
+        for at, steps in zip(places, whole, strict=True):
+            work.theta[at:] -= steps * step
+        by = ", ".join(f"{count:+d}" for count in counts[:4])
+        return work.finding(key, at=places, jumps=number, counts=by)
     low, high = longest_between([0, *places.tolist()], work.time.size)
     work.trusted[:low] = work.trusted[high:] = False
-    by = ", ".join(f"{size:+.3g}" for size in sizes[:4])
     other = ", or another recording begins" if max(map(abs, sizes)) > OTHER_RECORD else ""
-    text = (
-        f"{many} ({by} rad) that stay{other}:"
-        f" {moment(work.time[low])} to {moment(work.time[high - 1])} s is for fitting"
+    return work.finding(
+        "missed-counts",
+        at=places,
+        jumps=number,
+        sizes=", ".join(f"{size:+.3g}" for size in sizes[:4]),
+        other=other,
+        begin=moment(work.time[low]),
+        end=moment(work.time[high - 1]),
     )
-    return work.finding("missed-counts", text, at=places)
 
 
 def _whole(jump: Jump, count: float) -> int:

@@ -15,6 +15,7 @@ from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
+from pendmap.records.findings import finding_of
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of
@@ -184,8 +185,7 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
     plain = place.is_dir() and not described
     runs, findings, refused = list[Run](), list[Finding](), list[str]()
     if plain:
-        text = f"no {NAME}: each file is taken for one free run, in the order of the names"
-        findings.append(Finding("no-description", text))
+        findings.append(finding_of("no-description"))
     tables: dict[str, tuple[Table, str]] = {}
     for count, (plan, name) in enumerate(zip(plans, _names(plans), strict=True), 1):
         path = place / plan.file if place.is_dir() else place
@@ -197,7 +197,7 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
             if not plain:
                 raise
             refused.append(str(error))
-            findings.append(Finding("file-left-out", f"left out: {error}"))
+            findings.append(finding_of("file-left-out", error=error))
         else:
             runs += of_file
             findings += shared

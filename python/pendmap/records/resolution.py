@@ -47,11 +47,7 @@ def used_share(work: Work) -> Finding | None:
     used, whole = int(work.trusted.sum()), int((moving | work.trusted).sum())
     if not 0 < used < LEAST_USED * whole:
         return None
-    text = (
-        f"only {used} of {counted(whole, 'reading')} in motion are for fitting: the fit "
-        "may not describe the others"
-    )
-    return work.finding("few-used", text)
+    return work.finding("few-used", used=used, readings=counted(whole, "reading"))
 
 
 def drive(work: Work) -> Finding | None:
@@ -60,12 +56,9 @@ def drive(work: Work) -> Finding | None:
     drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
     if rate >= NYQUIST * drive:
         return None
-    text = (
-        f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a"
-        f" period do not resolve it, {NYQUIST:g} and more would; it looks like one of"
-        f" {abs(drive - rate * round(drive / rate)):.3g} Hz"
-    )
-    return work.finding("drive-unresolved", text)
+    number, alias = rate / drive, abs(drive - rate * round(drive / rate))
+    values = {"number": number, "least": NYQUIST, "alias": alias}
+    return work.finding("drive-unresolved", drive=drive, rate=rate, **values)
 
 
 def gain(work: Work) -> Finding | None:
@@ -77,12 +70,7 @@ def gain(work: Work) -> Finding | None:
         return None
     low, high = interval
     between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
-    text = (
-        f"swings so small hardly determine the gain of the sensor: by the growth of the period"
-        f" with the swing, the readings are {between} times the angle (95 %); friction is as"
-        " uncertain"
-    )
-    return work.finding("gain-unknown", text)
+    return work.finding("gain-unknown", between=between)
 
 
 def step_of(theta: Floats) -> float:

@@ -59,20 +59,13 @@ def named_step(work: Work) -> Finding | None:
     """Report the step of the readings, or that they are edges; called once the unit is certain."""
     turn = f"{2 * math.pi / (work.estimated_step or math.inf):.5g}"
     if work.edges:
-        text = (
-            f"an encoder of {turn} counts a turn writes a line at each edge: the angles are those"
-            f" of {counted(work.theta.size, 'edge')}, their errors those of the stamps; none is"
-            " missing between two of them"
-        )
-        return work.finding("edges-logged", text, mended=True)
+        return work.finding("edges-logged", turn=turn, edges=counted(work.theta.size, "edge"))
     counts, seen = work.known.get("encoder_counts"), work.estimated_step
     work.count = _count(work)
-    text = f"the readings come in steps of {seen:.4g} rad"
     if counts is None and seen > FINEST:
-        return work.finding("counts-seen", f"{text} ({turn} a turn)")
+        return work.finding("counts-seen", step=seen, turn=turn)
     if counts is not None and work.count == seen > 3 * math.pi / float(counts):
-        text = f"{text}, {turn} a turn: encoder_counts says {counts}"
-        return work.finding("counts-differ", text)
+        return work.finding("counts-differ", step=seen, turn=turn, counts=counts)
     return None
 
 
@@ -97,9 +90,7 @@ def clipped(work: Work) -> Finding | None:
             ends.append(f"{end:.4g}")
             marked |= ended  # including shorter plateaus
     at = np.flatnonzero(marked)
-    text = f"the sensor's range ends at {' and '.join(ends)} {unit}"
-    count = counted(at.size, "clipped sample")
-    return work.distrust(at, "clipped", f"{text}: {count} not for fitting")
+    return work.distrust(at, "clipped", "clipped sample", ends=" and ".join(ends), unit=unit)
 
 
 def _cut_off(work: Work, low: int, high: int) -> bool:
@@ -135,8 +126,7 @@ def frozen(work: Work) -> Finding | None:
         if jump * before > 0 and quick and _abrupt(work, a, b):
             marked[a:b] = True
     at = np.flatnonzero(marked)
-    text = f"the reading stands still while the pendulum moves: {counted(at.size, 'sample')}"
-    return work.distrust(at, "frozen", f"{text} not for fitting")
+    return work.distrust(at, "frozen", "sample")
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
@@ -237,14 +227,13 @@ def interpolated(work: Work) -> Finding | None:
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
     how = "each held" if readings.made == "held" else f"{readings.made} between"
-    text = f"the record repeats {_hertz(rate / readings.ratio)} at {_hertz(rate)}, {how}"
+    rates = {"from_hz": _hertz(rate / readings.ratio), "to_hz": _hertz(rate), "how": how}
     if work.pivot:
         # The pivot may have been read at every sample.
-        text += ": errors from the number of samples are too small"
-        return work.finding("interpolated", text)
+        return work.finding("interpolated.pivot", **rates)
     work.keep(readings.places)
     number = counted(readings.places.size, "reading")
-    return work.finding("interpolated", f"{text}: {number} kept of {samples} samples", mended=True)
+    return work.finding("interpolated", **rates, readings=number, samples=samples)
 
 
 def _hertz(rate: float) -> str:

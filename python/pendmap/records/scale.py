@@ -53,17 +53,14 @@ def seconds(work: Work) -> Finding | None:
         if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
             continue
         if "time" in work.declared:
-            text = f"a period of {small:.4g} s: times look like {name}, contrary to [columns]"
-            return work.finding("time-unit", text)
-        text = f"the times are {name}: as seconds the period would be {small:.4g} s"
+            return work.finding("time-unit.declared", period=small, unit=name)
         size = factor if work.integrated else 1.0
-        finding = work.finding("time-unit", text, mended=True)
+        finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
         work.theta *= size
         work.periods = Periods(work.periods.amplitude * size, work.periods.period * factor)
         return finding
-    text = f"a period of {small:.4g} s is implausible for a pendulum: is the unit right?"
-    return work.finding("time-unit", text)
+    return work.finding("time-unit.wrong", period=small)
 
 
 def _periods(work: Work) -> Periods | None:
@@ -83,9 +80,8 @@ def radians(work: Work) -> Finding | None:
     if periods is None or not _impossible(periods):
         return None
     largest = float(np.max(periods.amplitude))
-    text = f"swings of {largest:.4g} rad are impossible for a pendulum"
     if largest * DEGREE > math.pi or _channel(work) in work.declared:
-        return work.finding("angle-unit", f"{text}: the unit or the scale is wrong")
+        return work.finding("angle-unit.wrong", largest=largest)
     work.theta *= DEGREE
     if work.integrated:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
@@ -93,7 +89,7 @@ def radians(work: Work) -> Finding | None:
     work.estimated_step *= DEGREE
     work.periods = Periods(periods.amplitude * DEGREE, periods.period)
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
-    return work.finding("angle-unit", f"the {read}: {text}", mended=True)
+    return work.finding("angle-unit.degrees", read=read, largest=largest)
 
 
 def _impossible(periods: Periods) -> bool:
@@ -118,16 +114,16 @@ def curvature(work: Work) -> Finding | None:
     if error >= 0.1 or abs(share - 1) <= 0.3 + 5 * error:
         return None
     factor, spread = factor_of(periods)
-    flat = share < 0.1
-    text = (
-        f"from {periods.amplitude.min():.2g} to {largest:.2g} rad the period grows by"
-        f" {share:.2f} +- {error:.2f} of what a pendulum's does: the true angle is"
-        f" {factor:.4g} +- {spread:.1g} times the reading{' (degrees?)' if flat else ''}, or"
-        " another force acts"
+    return work.finding(
+        "angle-unit.flat" if share < 0.1 else "angle-scale",
+        low=periods.amplitude.min(),
+        high=largest,
+        share=share,
+        error=error,
+        factor=factor,
+        spread=spread,
+        channel=_channel(work),
     )
-    if not flat:
-        text += f"; --effect encoder_gain fits it, or scale the {_channel(work)} in [columns]"
-    return work.finding("angle-unit" if flat else "angle-scale", text)
 
 
 def period_of_rig(work: Work) -> Finding | None:
@@ -148,8 +144,7 @@ def period_of_rig(work: Work) -> Finding | None:
     ]
     if not other:
         return None
-    text = f"small swings take {seen:.4g} s, but {' and '.join(other)}: one is wrong"
-    return work.finding("period-unlike-rig", text)
+    return work.finding("period-unlike-rig", seen=seen, known=" and ".join(other))
 
 
 def sampling(work: Work) -> Finding | None:
@@ -158,12 +153,8 @@ def sampling(work: Work) -> Finding | None:
     number = work.periods.small / interval if work.periods else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
     if number < SAMPLES_A_PERIOD:
-        text = f"{number:.1f} samples a period: the shape of the swing is not resolved"
-    elif fastest > 1.0:
-        text = f"up to {fastest:.2g} rad from sample to sample: too slow for this motion"
-    else:
-        return None
-    return work.finding("sampling-slow", text)
+        return work.finding("sampling-slow", number=number)
+    return work.finding("sampling-slow.steps", step=fastest) if fastest > 1.0 else None
 
 
 def zero(work: Work) -> Finding | None:
@@ -175,20 +166,17 @@ def zero(work: Work) -> Finding | None:
     off = (middle or 0.0) - turns
     if middle is None or abs(off) < FAR_ZERO:
         return None
-    text = f"it swings about {off:.4g} rad"
     quarters = round(off / (math.pi / 2))
     gauge = quarters * math.pi / 2
     if not _certain(work.time[good], work.theta[good] - middle):
-        text = "too few whole swings to determine their middle: the zero is left to the fit"
-        return work.finding("zero-uncertain", text)
+        return work.finding("zero-uncertain")
     if "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
-        return work.finding("zero-offset", f"{text}: the zero that is given is wrong")
+        return work.finding("zero-offset.given", middle=off)
     if quarters and abs(off - gauge) < OFF_QUARTER:
         work.theta -= turns + gauge
-        text = f"the gauge is turned by {90 * quarters} degrees: {text}, turned back"
-        return work.finding("gauge-turned", text, mended=True)
+        return work.finding("gauge-turned", degrees=90 * quarters, middle=off)
     work.theta -= turns + off
-    return work.finding("zero-offset", f"{text}, not about its zero: subtracted", mended=True)
+    return work.finding("zero-offset.subtracted", middle=off)
 
 
 def _certain(time: Floats, theta: Floats) -> bool:

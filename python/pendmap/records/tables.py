@@ -16,7 +16,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import counted, listed
-from pendmap.records.experiment import Finding
+from pendmap.records.findings import finding_of
 from pendmap.records.units import CHANNELS
 from pendmap.records.workbooks import WORKBOOKS, sheet_text
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pendmap.records.description import Reader
+    from pendmap.records.experiment import Finding
     from pendmap.signal import Floats, Indices
 
 MOST_COLUMNS: Final = 1000  # Most columns of a table
@@ -200,8 +201,7 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
         raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     if nuls:
         data = data.replace(b"\0", b"")
-        text = f"{counted(nuls, 'NUL byte')} left out"
-        findings.append(Finding("nul-bytes", text, mended=True))
+        findings.append(finding_of("nul-bytes", number=counted(nuls, "NUL byte")))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -246,8 +246,7 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
     if half:
         fits[-1] = False
         columns = [column[:-1] for column in columns]
-        text = "the last line breaks off and is left out"
-        findings.append(Finding("half-line", text, mended=True))
+        findings.append(finding_of("half-line"))
     names, headed = _header([line for _, line in lines[:first]], delimiter, width)
     if headed and len(names) != width:
         raise InputError(
@@ -257,8 +256,8 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
     dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
     if dropped and not (half and len(dropped) == 1):
         shown = listed([str(k) for k in dropped], 3)
-        text = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
-        findings.append(Finding("unreadable-lines", text, mended=True, where=f"line {shown}"))
+        number, where = counted(len(dropped), "line"), f"line {shown}"
+        findings.append(finding_of("unreadable-lines", where=where, lines=number, width=width))
     if dated and headed and TIME not in names:
         names = (TIME, *names[1:])
     order = np.flatnonzero(fits)

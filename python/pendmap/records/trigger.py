@@ -81,17 +81,13 @@ def releases(work: Work) -> Finding | None:
         return None
     edges = edges_of(work.extra["trigger"], work.edge)
     if edges is None or not edges[0].size:
-        text = f"the trigger {_none(edges)}: it marks no release"
-        return work.finding("trigger-unlike", text)
+        return work.finding("trigger-unlike.none", why=_none(edges))
     places, edge = edges
     marked = _debounced(work.time, places, work.period)
     apart = np.diff(work.time[marked])
     if apart.size and np.median(apart) < RELEASES_APART * work.period:
-        text = (
-            f"the trigger's {counted(len(marked), f'{edge} edge')} recur after"
-            f" {np.median(apart):.3g} s, three swings and less: it marks no release"
-        )
-        return work.finding("trigger-unlike", text)
+        number = counted(len(marked), f"{edge} edge")
+        return work.finding("trigger-unlike.often", edges=number, apart=np.median(apart))
     motions = []
     for low, high in itertools.pairwise([*marked, work.time.size]):
         after = [(max(a, low), min(b, high)) for a, b in work.parts if a < high and b > low]
@@ -100,12 +96,12 @@ def releases(work: Work) -> Finding | None:
             # The trigger locates the release to a sample, the angle to a fraction of a swing.
             motions.append((low if work.time[a] - work.time[low] < work.period else a, b))
     if not motions:
-        text = "no free motion follows the trigger's edges: it is not used"
-        return work.finding("trigger-unlike", text)
+        return work.finding("trigger-unlike.still")
     work.parts = motions
     times = listed([f"{work.time[k]:.6g}" for k in marked], 6)
-    text = f"the trigger's {edge} edge marks {counted(len(marked), 'release')}, at {times} s"
-    return work.finding("trigger-release", text + _bounces(places.size - len(marked)))
+    number, bounces = counted(len(marked), "release"), _bounces(places.size - len(marked))
+    values = {"edge": edge, "releases": number, "times": times, "bounces": bounces}
+    return work.finding("trigger-release", **values)
 
 
 def _bounces(number: int) -> str:
@@ -161,8 +157,7 @@ def drive_missing(work: Work) -> Finding | None:
     """Report a forced run without a drive."""
     if work.free or work.plan.drive is not None or work.plan.pivot is not None:
         return None
-    text = 'kind is "forced" but neither drive nor pivot is given'
-    return work.finding("drive-missing", text)
+    return work.finding("drive-missing")
 
 
 def drive(work: Work) -> Finding | None:
@@ -173,22 +168,20 @@ def drive(work: Work) -> Finding | None:
     given = (work.plan.drive or {}).get("Omega")
     beat = beat_of(work.time, edges[0], given) if edges else None
     if edges is None or beat is None:
-        why = f"the trigger {_none(edges)}"
+        why = f" {_none(edges)}"
         if edges and edges[0].size:
             number = counted(edges[0].size, f"{edges[1]} edge")
-            uneven = f"the trigger's {number} do not recur evenly"
-            why = uneven if edges[0].size >= FEWEST_EDGES else f"the trigger has {number}"
-        return work.finding("trigger-unlike", f"{why}: it shows no drive")
-    text = (
-        f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
-        f" {counted(beat.time.size, f'{edges[1]} edge')}{_bounces(beat.left_out)}"
-    )
+            uneven = f"'s {number} do not recur evenly"
+            why = uneven if edges[0].size >= FEWEST_EDGES else f" has {number}"
+        return work.finding("trigger-unlike.drive", why=why)
+    number, bounces = counted(beat.time.size, f"{edges[1]} edge"), _bounces(beat.left_out)
+    values: dict[str, object] = {"omega": beat.omega, "error": beat.stderr}
+    values |= {"edges": number, "bounces": bounces}
     if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
-        text += f": the drive is given with {given:.7g}"
-        return work.finding("trigger-differs", text)
+        return work.finding("trigger-differs.frequency", **values, given=given)
     if given is not None and work.phase is not None:
         work.doubt = _phase(work, beat, given, work.phase)
-    return work.finding("trigger-drive", text)
+    return work.finding("trigger-drive", **values)
 
 
 def _phase(work: Work, beat: Beat, omega: float, phase: float) -> Finding | None:
@@ -200,9 +193,7 @@ def _phase(work: Work, beat: Beat, omega: float, phase: float) -> Finding | None
     error = omega * beat.error
     if given is None:
         work.plan = dataclasses.replace(work.plan, drive={**drive, "phi": phi})
-        text = f"phi = {phi:.4g} +- {error:.1g} rad by the trigger, phase {phase:g} at its edges"
-        return work.finding("trigger-phase", text)
+        return work.finding("trigger-phase", phi=phi, error=error, phase=phase)
     if abs(math.remainder(given - phi, 2 * math.pi)) > DIFFERENT * error:
-        text = f"by the trigger phi = {phi:.4g} +- {error:.1g} rad: it is given as {given:.4g}"
-        return work.finding("trigger-differs", text)
+        return work.finding("trigger-differs.phase", phi=phi, error=error, given=given)
     return None

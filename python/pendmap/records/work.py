@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed
-from pendmap.records.experiment import Finding, Segment
+from pendmap.records.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.description import RunPlan
+    from pendmap.records.experiment import Finding, Segment
     from pendmap.records.periods import Periods
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.signal import Floats, Indices, Mask, Stretch
@@ -94,14 +95,13 @@ class Work:
 
     def finding(
         self,
-        what: str,
-        text: str,
+        key: str,
         *,
-        mended: bool = False,
         at: Indices | None = None,
         span: tuple[float, float] | None = None,
+        **values: object,
     ) -> Finding:
-        """Return a finding, at samples or over a span of time in s."""
+        """Return a finding of :mod:`pendmap.records.findings`, at samples or over a span in s."""
         where = ""
         if at is not None and at.size:
             shown = listed([str(row) for row in self.rows[at[:4]]], 3)
@@ -109,7 +109,7 @@ class Work:
             span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
         if span is not None and not all(map(math.isfinite, span)):
             span = None
-        return Finding(what, text, mended, where, *(span or (None, None)))
+        return finding_of(key, where=where, span=span, **values)
 
     def keep(self, which: NDArray[Any]) -> None:
         """Keep the selected samples, in the given order."""
@@ -118,21 +118,21 @@ class Work:
         self.extra = {name: values[which] for name, values in self.extra.items()}
         self.pivot = {way: values[which] for way, values in self.pivot.items()}
 
-    def leave_out(self, which: Mask, what: str, noun: str, why: str) -> Finding | None:
-        """Remove samples, if any, and return their number and the reason."""
+    def leave_out(self, which: Mask, key: str, noun: str, **values: object) -> Finding | None:
+        """Remove samples, if any, and return the finding with their ``number``."""
         at = np.flatnonzero(which)
         if not at.size:
             return None
-        finding = self.finding(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
+        finding = self.finding(key, at=at, number=counted(at.size, noun), **values)
         self.keep(~which)
         return finding
 
-    def distrust(self, at: Indices, what: str, text: str) -> Finding | None:
-        """Exclude samples, if any, from fits, and return a finding on them."""
+    def distrust(self, at: Indices, key: str, noun: str, **values: object) -> Finding | None:
+        """Exclude samples, if any, from fits, and return the finding with their ``number``."""
         if not at.size:
             return None
         self.trusted[at] = False
-        return self.finding(what, text, at=at)
+        return self.finding(key, at=at, number=counted(at.size, noun), **values)
 
     def split_by_release(self) -> tuple[list[Work], list[Finding]]:
         """Return a record for each release, and the findings that belong to none of them."""
