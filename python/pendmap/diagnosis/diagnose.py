@@ -136,8 +136,8 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     best = nearest if claimed else begin
     if not settles(state.data, best.fitted):
         raise InputError(
-            f"{experiment.path}: the fit of the best model must converge, got one that ends "
-            f"{best.fitted.distance:.2g} standard errors from its minimum"
+            f"{experiment.path}: the fit of the best model must converge, got one whose sum of "
+            f"squares still falls from {best.fitted.chi2:.6g}"
         )
     before = after
     if nearest.fitted.chosen:
