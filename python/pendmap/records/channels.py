@@ -68,8 +68,8 @@ def channels_of(  # noqa: C901 (a step each)
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
     elif rate:
-        column = head_of(table, places["time"])
-        findings.append(finding_of("rate-unused", column=column, rate=rate))
+        head = head_of(table, places["time"])
+        findings.append(finding_of("rate-unused", column=head, rate=rate))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")

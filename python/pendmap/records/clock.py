@@ -377,6 +377,8 @@ def pause(work: Work) -> Finding | None:
             break
         places = np.arange(work.time.size)
         side = "before" if at >= work.time.size - at else "after"
+        if finding is not None:
+            work.findings.append(finding)
         finding = work.finding("time-pause", at=np.array([at]), pause=longest, side=side)
         work.keep(places < at if side == "before" else places >= at)
     return finding

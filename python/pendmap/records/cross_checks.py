@@ -73,7 +73,7 @@ def pivot_unit(work: Work) -> Finding | None:
     for way, values in work.pivot.items():
         span = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
-            return work.finding("pivot-unit.wrong", way=way, span=span, unit=work.pivot_unit)
+            return work.finding("pivot-unit.wrong", way=way, extent=span, unit=work.pivot_unit)
     return None
 
 
@@ -163,8 +163,8 @@ def pivot_steps(work: Work) -> Finding | None:
     what = "places" if order == 2 else "speeds"
     work.pivot_unit = "m/s2"
     longest = max(windows)
-    values = {"readings": longest, "seconds": longest * interval}
-    return work.finding("pivot-smoothed", what=what, **values)
+    seconds = longest * interval
+    return work.finding("pivot-smoothed", what=what, readings=longest, seconds=seconds)
 
 
 def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:

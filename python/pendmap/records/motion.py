@@ -45,7 +45,7 @@ def moves(work: Work) -> Finding | None:
         return None
     work.segments = [Segment("rest", low, high, used=False)]
     work.trusted[:] = False
-    return work.finding("no-motion", span=spread)
+    return work.finding("no-motion", extent=spread)
 
 
 def _measure_noise(work: Work) -> None:
@@ -190,8 +190,9 @@ def _releases(work: Work, used: list[bool]) -> Finding:
         less = f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
     low, high = work.releases[0][0], work.releases[-1][1] - 1
     span = float(work.time[low]), float(work.time[high])
-    values = {"releases": number, "used": used_from, "what": what, "short": less}
-    return work.finding("several-releases", span=span, **values)
+    return work.finding(
+        "several-releases", span=span, releases=number, used=used_from, what=what, short=less
+    )
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:

@@ -57,8 +57,9 @@ def drive(work: Work) -> Finding | None:
     if rate >= NYQUIST * drive:
         return None
     number, alias = rate / drive, abs(drive - rate * round(drive / rate))
-    values = {"number": number, "least": NYQUIST, "alias": alias}
-    return work.finding("drive-unresolved", drive=drive, rate=rate, **values)
+    return work.finding(
+        "drive-unresolved", drive=drive, rate=rate, number=number, least=NYQUIST, alias=alias
+    )
 
 
 def gain(work: Work) -> Finding | None:

@@ -91,7 +91,7 @@ RULES: Final[Rules] = (
     ("scale", scale.period_of_rig),
     ("scale", scale.sampling),
     ("scale", scale.zero),
-    ("angle", samples.named_step),
+    ("sampled", samples.named_step),
     # Motion
     ("moves", motion.free_motions),
     ("moves", trigger.releases),

@@ -57,6 +57,8 @@ def _count(work: Work) -> float:
 
 def named_step(work: Work) -> Finding | None:
     """Report the step of the readings, or that they are edges; called once the unit is certain."""
+    if work.integrated:
+        return None  # an integral has no steps
     turn = f"{2 * math.pi / (work.estimated_step or math.inf):.5g}"
     if work.edges:
         return work.finding("edges-logged", turn=turn, edges=counted(work.theta.size, "edge"))
@@ -227,13 +229,15 @@ def interpolated(work: Work) -> Finding | None:
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
     how = "each held" if readings.made == "held" else f"{readings.made} between"
-    rates = {"from_hz": _hertz(rate / readings.ratio), "to_hz": _hertz(rate), "how": how}
+    from_hz, to_hz = _hertz(rate / readings.ratio), _hertz(rate)
     if work.pivot:
         # The pivot may have been read at every sample.
-        return work.finding("interpolated.pivot", **rates)
+        return work.finding("interpolated.pivot", from_hz=from_hz, to_hz=to_hz, how=how)
     work.keep(readings.places)
     number = counted(readings.places.size, "reading")
-    return work.finding("interpolated", **rates, readings=number, samples=samples)
+    return work.finding(
+        "interpolated", from_hz=from_hz, to_hz=to_hz, how=how, readings=number, samples=samples
+    )
 
 
 def _hertz(rate: float) -> str:

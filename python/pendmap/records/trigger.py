@@ -100,8 +100,7 @@ def releases(work: Work) -> Finding | None:
     work.parts = motions
     times = listed([f"{work.time[k]:.6g}" for k in marked], 6)
     number, bounces = counted(len(marked), "release"), _bounces(places.size - len(marked))
-    values = {"edge": edge, "releases": number, "times": times, "bounces": bounces}
-    return work.finding("trigger-release", **values)
+    return work.finding("trigger-release", edge=edge, releases=number, times=times, bounces=bounces)
 
 
 def _bounces(number: int) -> str:
@@ -175,13 +174,19 @@ def drive(work: Work) -> Finding | None:
             why = uneven if edges[0].size >= FEWEST_EDGES else f" has {number}"
         return work.finding("trigger-unlike.drive", why=why)
     number, bounces = counted(beat.time.size, f"{edges[1]} edge"), _bounces(beat.left_out)
-    values: dict[str, object] = {"omega": beat.omega, "error": beat.stderr}
-    values |= {"edges": number, "bounces": bounces}
+    omega, error = beat.omega, beat.stderr
     if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
-        return work.finding("trigger-differs.frequency", **values, given=given)
+        return work.finding(
+            "trigger-differs.frequency",
+            omega=omega,
+            error=error,
+            edges=number,
+            bounces=bounces,
+            given=given,
+        )
     if given is not None and work.phase is not None:
         work.doubt = _phase(work, beat, given, work.phase)
-    return work.finding("trigger-drive", **values)
+    return work.finding("trigger-drive", omega=omega, error=error, edges=number, bounces=bounces)
 
 
 def _phase(work: Work, beat: Beat, omega: float, phase: float) -> Finding | None:

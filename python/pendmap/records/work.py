@@ -123,7 +123,7 @@ class Work:
         at = np.flatnonzero(which)
         if not at.size:
             return None
-        finding = self.finding(key, at=at, number=counted(at.size, noun), **values)
+        finding = self.finding(key, at=at, span=None, number=counted(at.size, noun), **values)
         self.keep(~which)
         return finding
 
@@ -132,7 +132,7 @@ class Work:
         if not at.size:
             return None
         self.trusted[at] = False
-        return self.finding(key, at=at, number=counted(at.size, noun), **values)
+        return self.finding(key, at=at, span=None, number=counted(at.size, noun), **values)
 
     def split_by_release(self) -> tuple[list[Work], list[Finding]]:
         """Return a record for each release, and the findings that belong to none of them."""

@@ -26,5 +26,6 @@ def test_each_finding_of_the_table_is_used_with_the_values_of_its_text() -> None
                 continue
             text, _ = texts()[keys[-1]]
             wanted = {field for _, field, _, _ in string.Formatter().parse(text) if field}
+            assert not wanted & {"at", "span", "where"}, keys[-1]
             assert wanted <= {k.arg for k in call.keywords} | GIVEN[name], keys[-1]
     assert used == set(texts())
