@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypedDict, final
+from typing import Any, Self, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ __all__ = [
     "fit_runs",
     "formula",
     "growth",
+    "kinds",
     "lyapunov",
     "orbits",
     "orbits_near",
@@ -92,9 +93,15 @@ _Pair: TypeAlias = tuple[float, float]
 
 class Attractor:
     name: str
+    plain: str
+    pair: str
     kind: str
+    rank: tuple[int, int, int]
+    chaotic: bool
     n: int | None
-    w: int | None
+    w: int
+    lean: int
+    turn: int
     points: list[_Pair]
     multipliers: list[_Pair]
     exponent: float
@@ -102,6 +109,7 @@ class Attractor:
     period: float | None
     twin: int | None
     fraction: float
+    def __new__(cls, kind: str, n: int = 0, w: int = 0, lean: int = 0, turn: int = 0) -> Self: ...
 
 @final
 class Orbit(Attractor):
@@ -203,7 +211,8 @@ class Trajectory:
 
 class ParameterMap:
     cell: _Places
-    kind: list[str]
+    kinds: list[Attractor]
+    kind: NDArray[np.int16]
     n: _Places
     w: _Places
     theta: _Floats
@@ -340,6 +349,7 @@ class WindowRows:
 
 def simd() -> str: ...
 def simd_available() -> list[str]: ...
+def kinds() -> list[str]: ...
 def reckon(what: str, count: int, each: int) -> None: ...
 def default_threads() -> int: ...
 def roles() -> list[str]: ...

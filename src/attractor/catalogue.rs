@@ -25,8 +25,12 @@ pub struct Attractor {
     pub kind: Kind,
     /// Period in forcing periods; `None` if meaningless.
     pub n: Option<usize>,
-    /// Net turns over that period.
-    pub w: Option<i64>,
+    /// Net turns over that period; without one the sense of its turns: 1, -1 or 0.
+    pub w: i64,
+    /// Side to which one of two asymmetric twins without net turns leans: 1, -1, or 0 for no twins.
+    pub lean: i64,
+    /// Multiple of a turn around which it moves, on the line.
+    pub turn: i64,
     /// Stroboscopic points: of a cycle in their order, of a chaotic attractor a sample.
     pub points: Vec<State>,
     /// Floquet multipliers; one for a running state without drive, none for chaos.
@@ -37,11 +41,9 @@ pub struct Attractor {
     pub exponent_stderr: f64,
     /// Time after which it closes; `None` for chaos.
     pub period: Option<f64>,
-    /// Sense of rotation of a set that has no `w`: 1, -1 or 0.
-    pub sense: i64,
     /// The region of its trajectories, if no trap determines membership.
     pub region: Option<Region>,
-    /// A reproducible name.
+    /// A reproducible name: [`Self::plain_name`], with what tells it from others of that name.
     pub name: String,
     /// Topology of its angle.
     pub angle: Angle,
@@ -50,49 +52,72 @@ pub struct Attractor {
 }
 
 impl Attractor {
+    /// One of this description alone, without points.
+    #[must_use]
+    pub const fn described(kind: Kind, n: Option<usize>, w: i64, angle: Angle) -> Self {
+        Self {
+            kind,
+            n,
+            w,
+            lean: 0,
+            turn: 0,
+            points: Vec::new(),
+            multipliers: Vec::new(),
+            exponent: f64::NAN,
+            exponent_stderr: 0.0,
+            period: None,
+            region: None,
+            name: String::new(),
+            angle,
+            twin: None,
+        }
+    }
+
     /// The attractor of a periodic orbit; also used to describe one that does not attract.
     #[must_use]
     pub fn periodic(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> Self {
         let period = orbit.n as f64 * pendulum.period();
         let kind = classify(pendulum, orbit);
-        let points = match kind {
-            Kind::Rest | Kind::InvertedRest => vec![[balanced(orbit.points[0][0]), 0.0]],
-            _ => orbit.points.clone(),
-        };
         Self {
-            kind,
-            n: Some(orbit.n),
-            w: Some(orbit.w),
-            points,
+            points: match kind.is_rest() {
+                true => vec![[balanced(orbit.points[0][0]), 0.0]],
+                false => orbit.points.clone(),
+            },
             multipliers: orbit.multipliers.0.to_vec(),
             exponent: orbit.multipliers.exponent(period),
-            exponent_stderr: 0.0,
             period: Some(period),
-            sense: orbit.w.signum(),
-            region: None,
-            name: String::new(),
-            angle: orbit.angle,
-            twin: None,
+            ..Self::described(kind, Some(orbit.n), orbit.w, orbit.angle)
         }
     }
 
     /// The set of states that friction holds for ever around `theta`, hanging or inverted.
     #[must_use]
     pub fn resting(angle: Angle, theta: f64) -> Self {
+        let kind = if theta.cos() < 0.0 { Kind::InvertedRest } else { Kind::Rest };
+        Self { points: vec![[theta, 0.0]], ..Self::described(kind, Some(1), 0, angle) }
+    }
+
+    /// The attractor of a running state without drive; its one multiplier is that of the angle section.
+    #[must_use]
+    pub fn running(rotation: &Rotation) -> Self {
         Self {
-            kind: if theta.cos() < 0.0 { Kind::InvertedRest } else { Kind::Rest },
-            n: Some(1),
-            w: Some(0),
-            points: vec![[theta, 0.0]],
-            multipliers: Vec::new(),
-            exponent: f64::NAN,
-            exponent_stderr: 0.0,
-            period: None,
-            sense: 0,
-            region: None,
-            name: String::new(),
-            angle,
-            twin: None,
+            points: vec![[0.0, rotation.velocity]],
+            multipliers: vec![Complex::new(rotation.multiplier, 0.0)],
+            exponent: 0.0,
+            period: Some(rotation.period),
+            ..Self::described(Kind::Rotation, Some(1), rotation.sense, Angle::Circle)
+        }
+    }
+
+    /// The attractor of a set of trajectories that no trap captures.
+    #[must_use]
+    pub fn sampled(set: &ChaoticSet) -> Self {
+        Self {
+            points: set.points.clone(),
+            exponent: set.exponent,
+            exponent_stderr: set.exponent_stderr,
+            region: set.band.is_none().then(|| set.region.clone()),
+            ..Self::described(set.kind, None, set.sense, set.region.angle())
         }
     }
 
@@ -122,51 +147,11 @@ impl Attractor {
         self.kind == Kind::Rotation && self.multipliers.len() == 1
     }
 
-    /// The attractor of a running state without drive; its one multiplier is that of the angle section.
-    #[must_use]
-    pub fn running(rotation: &Rotation) -> Self {
-        Self {
-            kind: Kind::Rotation,
-            n: Some(1),
-            w: Some(rotation.sense),
-            points: vec![[0.0, rotation.velocity]],
-            multipliers: vec![Complex::new(rotation.multiplier, 0.0)],
-            exponent: 0.0,
-            exponent_stderr: 0.0,
-            period: Some(rotation.period),
-            sense: rotation.sense,
-            region: None,
-            name: String::new(),
-            angle: Angle::Circle,
-            twin: None,
-        }
-    }
-
-    /// The attractor of a set of trajectories that no trap captures.
-    #[must_use]
-    pub fn sampled(set: &ChaoticSet) -> Self {
-        Self {
-            kind: set.kind,
-            n: None,
-            w: None,
-            points: set.points.clone(),
-            multipliers: Vec::new(),
-            exponent: set.exponent,
-            exponent_stderr: set.exponent_stderr,
-            period: None,
-            sense: set.sense,
-            region: set.band.is_none().then(|| set.region.clone()),
-            name: String::new(),
-            angle: set.region.angle(),
-            twin: None,
-        }
-    }
-
     /// Whether most of these points lie in its region, and it has this kind of turns.
     #[must_use]
     pub fn keeps(&self, points: &[State], senses: Senses) -> bool {
         let (kind, sense) = senses.kind();
-        let turns = self.kind == Kind::TumblingChaos || (self.kind, self.sense) == (kind, sense);
+        let turns = self.kind == Kind::TumblingChaos || (self.kind, self.w) == (kind, sense);
         turns && self.region.as_ref().is_some_and(|region| region.holds_most(points))
     }
 
@@ -184,8 +169,7 @@ impl Attractor {
 
     /// Whether the other is this one's mirror image; `image` holds the images of its points.
     fn mirrors(&self, image: &[State], other: &Self, tolerance: f64) -> bool {
-        let alike = (other.kind, other.n, other.w.map(|w| -w), -other.sense);
-        if (self.kind, self.n, self.w, self.sense) != alike {
+        if (self.kind, self.n, self.w) != (other.kind, other.n, -other.w) {
             return false;
         }
         if self.n.is_none() {
@@ -196,8 +180,39 @@ impl Attractor {
 
     fn key(&self) -> (Kind, usize, i64, f64, f64) {
         let first = self.points.first().copied().unwrap_or([0.0; 2]);
-        let w = self.w.unwrap_or(self.sense);
-        (self.kind, self.n.unwrap_or(0), w, first[0], first[1])
+        (self.kind, self.n.unwrap_or(0), self.w, first[0], first[1])
+    }
+
+    /// Its name from kind, period, turns, side and turn.
+    #[must_use]
+    pub fn plain_name(&self) -> String {
+        let sign = |x: i64| if x < 0 { "-" } else { "+" };
+        let mut name = self.pair_name();
+        match self.n {
+            Some(_) if self.w == 0 => {}
+            Some(n) if !self.kind.is_rest() => name = format!("{} {n}:{:+}", self.word(), self.w),
+            _ if matches!(self.kind, Kind::RotatingChaos | Kind::QuasiperiodicRotation) => {
+                name = format!("{name} {}", sign(self.w));
+            }
+            _ => {}
+        }
+        if self.lean != 0 {
+            name = format!("{name} ({})", sign(self.lean));
+        }
+        if self.turn != 0 { format!("{name} turn {:+}", self.turn) } else { name }
+    }
+
+    /// The name that it shares with its mirror image: without sense, side and turn.
+    #[must_use]
+    pub fn pair_name(&self) -> String {
+        match self.n {
+            Some(n) if !self.kind.is_rest() => format!("{} {n}:{}", self.word(), self.w.abs()),
+            _ => self.word(),
+        }
+    }
+
+    fn word(&self) -> String {
+        self.kind.word().replace('_', " ")
     }
 }
 
@@ -263,20 +278,25 @@ pub fn arrange(pendulum: &Pendulum, attractors: Vec<Attractor>) -> (Vec<Attracto
         sorted.iter().position(|b| a.mirrors(image, b, tolerance))
     };
     let twins: Vec<Option<usize>> = sorted.iter().zip(&images).map(|(a, i)| twin(a, i)).collect();
-    let plain = |i: usize| {
+    for (i, attractor) in sorted.iter_mut().enumerate() {
         // Twins lean to opposite sides, also where the image takes half a period.
-        let own = mean_angle(&sorted[i].points);
-        let turn = (own / TAU).round();
-        if sorted[i].angle == Angle::Line && turn != 0.0 {
-            return format!("{} turn {turn:+}", name(&sorted[i], false, 0.0));
-        }
+        let own = mean_angle(&attractor.points);
         let lean = if images[i].is_empty() { own } else { own - mean_angle(&images[i]) };
-        name(&sorted[i], twins[i] != Some(i), lean)
-    };
-    let plain: Vec<String> = (0..sorted.len()).map(plain).collect();
+        let swings = match attractor.n {
+            Some(_) => attractor.w == 0 && !attractor.kind.is_rest(),
+            None => attractor.kind == Kind::LibrationChaos,
+        };
+        let turn = if attractor.angle == Angle::Line { (own / TAU).round() } else { 0.0 };
+        attractor.turn = turn as i64;
+        if swings && attractor.turn == 0 && twins[i] != Some(i) {
+            attractor.lean = if lean < 0.0 { -1 } else { 1 };
+        }
+        attractor.twin = twins[i];
+    }
+    let plain: Vec<String> = sorted.iter().map(Attractor::plain_name).collect();
     let names: Vec<String> = (0..sorted.len()).map(|i| unique(&sorted, &plain, i)).collect();
-    for ((attractor, twin), name) in sorted.iter_mut().zip(twins).zip(names) {
-        (attractor.twin, attractor.name) = (twin, name);
+    for (attractor, name) in sorted.iter_mut().zip(names) {
+        attractor.name = name;
     }
     (sorted, place)
 }
@@ -297,25 +317,5 @@ fn unique(sorted: &[Attractor], plain: &[String], i: usize) -> String {
     match (4..=12).map(all).find(differ) {
         Some(names) => names[own].clone(),
         None => format!("{} ({})", plain[i], own + 1),
-    }
-}
-
-fn name(attractor: &Attractor, asymmetric: bool, lean: f64) -> String {
-    let signed = |w: i64| if w == 0 { "0".to_owned() } else { format!("{w:+}") };
-    let side = |x: f64| if x < 0.0 { "(-)" } else { "(+)" };
-    let word = attractor.kind.word().replace('_', " ");
-    match (attractor.kind, attractor.n, attractor.w) {
-        (Kind::Rest | Kind::InvertedRest, ..) => word,
-        (_, Some(n), Some(0)) if asymmetric => {
-            format!("{word} {n}:0 {}", side(lean))
-        }
-        (_, Some(n), Some(w)) => format!("{word} {n}:{}", signed(w)),
-        (Kind::RotatingChaos | Kind::QuasiperiodicRotation, ..) => {
-            format!("{word} {}", if attractor.sense < 0 { "-" } else { "+" })
-        }
-        (Kind::LibrationChaos, ..) if asymmetric => {
-            format!("{word} {}", side(lean))
-        }
-        _ => word,
     }
 }

@@ -115,7 +115,7 @@ impl Catalogue {
     pub fn take_over_chaos<'a>(&mut self, attractors: impl Iterator<Item = &'a Attractor>) {
         let known = |a: &Attractor| KnownChaos {
             kind: a.kind,
-            sense: a.sense,
+            sense: a.w,
             exponent: [a.exponent, a.exponent_stderr],
         };
         self.known.extend(attractors.filter(|a| a.kind.is_chaotic()).map(known));

@@ -24,6 +24,18 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All kinds, in the order of attractors.
+    pub const ALL: [Self; 8] = [
+        Self::Rest,
+        Self::InvertedRest,
+        Self::Oscillation,
+        Self::Rotation,
+        Self::QuasiperiodicRotation,
+        Self::LibrationChaos,
+        Self::RotatingChaos,
+        Self::TumblingChaos,
+    ];
+
     /// The name in files.
     #[must_use]
     pub const fn word(self) -> &'static str {
@@ -37,6 +49,12 @@ impl Kind {
             Self::RotatingChaos => "rotating_chaos",
             Self::TumblingChaos => "tumbling_chaos",
         }
+    }
+
+    /// Whether it is one of the two of rest.
+    #[must_use]
+    pub const fn is_rest(self) -> bool {
+        matches!(self, Self::Rest | Self::InvertedRest)
     }
 
     /// Whether it is one of the three kinds of chaos.

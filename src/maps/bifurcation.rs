@@ -188,8 +188,7 @@ impl Follow<'_> {
                     return same && state[1] == 0.0 && strobe.equation.holds_for_ever(state[0]);
                 }
                 if a.is_running() {
-                    let held =
-                        |(sense, band): &(i64, Band)| *sense == a.sense && band.contains(*state);
+                    let held = |(sense, band): &(i64, Band)| *sense == a.w && band.contains(*state);
                     return running.iter().any(held);
                 }
                 let near = |s: State| a.passes(s, ARRIVED);

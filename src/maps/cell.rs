@@ -312,7 +312,7 @@ impl Cell {
 
     /// Whether it has an orbit of that period and winding, in either sense.
     fn has(&self, n: usize, w: i64) -> bool {
-        let alike = |a: &Attractor| a.n == Some(n) && a.w.map(i64::abs) == Some(w.abs());
+        let alike = |a: &Attractor| a.n == Some(n) && a.w.abs() == w.abs();
         self.found.iter().any(|f| alike(&f.attractor))
     }
 }
@@ -320,22 +320,22 @@ impl Cell {
 impl Hint {
     /// None from a rest, which every search includes.
     fn of(attractor: &Attractor) -> Option<Self> {
-        if matches!(attractor.kind, Kind::Rest | Kind::InvertedRest) {
+        if attractor.kind.is_rest() {
             return None;
         }
         let most = if attractor.n.is_some() { 1 } else { HINTED };
         let points = spread(&attractor.points, most);
-        let (kind, w) = (attractor.kind, attractor.w.unwrap_or(attractor.sense));
+        let (kind, w) = (attractor.kind, attractor.w);
         (!points.is_empty()).then_some(Self { points, kind, n: attractor.n, w })
     }
 
     /// Whether an attractor is similar to its origin, or to its mirror image if it has one.
     fn is_like(&self, attractor: &Attractor, symmetric: bool) -> bool {
-        let w = attractor.w.unwrap_or(attractor.sense);
         let image = [-self.points[0][0], -self.points[0][1]];
         let near = |point: State| attractor.passes(point, LIKE);
-        let either =
-            |sign: i64, point: State| w == sign * self.w && (self.n.is_none() || near(point));
+        let either = |sign: i64, point: State| {
+            attractor.w == sign * self.w && (self.n.is_none() || near(point))
+        };
         (self.kind, self.n) == (attractor.kind, attractor.n)
             && (either(1, self.points[0]) || (symmetric && either(-1, image)))
     }

@@ -16,6 +16,7 @@ mod parameter_maps;
 mod surveys;
 mod tongues;
 
+use pendmap::attractor::Kind;
 use pendmap::error::Error;
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::bounds::{LEAST, cell_periods, max_periods};
@@ -77,6 +78,12 @@ fn simd_available() -> Vec<&'static str> {
         .collect()
 }
 
+/// The kinds of attractor in order: rest first, chaos last.
+#[pyfunction]
+fn kinds() -> Vec<&'static str> {
+    Kind::ALL.iter().map(|kind| kind.word()).collect()
+}
+
 /// Refuses `count` of `what`, with `each` bytes each, if that exceeds the free memory.
 #[pyfunction]
 fn reckon(what: &str, count: usize, each: usize) -> PyResult<()> {
@@ -100,6 +107,7 @@ mod _core {
         counts_turns, default_threads,
         exponents::{Ensemble, Lyapunov, growth, lyapunov},
         fit::{Fit, FitPoint, FittedRun, WindowRows, fit_rows, fit_runs, replay},
+        kinds,
         library::{effects, formula, roles},
         maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
         motion::{Trajectory, acceleration, advance, choose_steps, rates, simulate},

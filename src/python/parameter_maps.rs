@@ -1,5 +1,7 @@
 //! Bindings of maps over parameters.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use numpy::PyReadonlyArray1;
 use pendmap::attractor::Attractor;
 use pendmap::integrate::State;
@@ -7,9 +9,10 @@ use pendmap::lanes::InstructionSet;
 use pendmap::maps::bifurcation as diagram;
 use pendmap::maps::cell::{Found, HINTED};
 use pendmap::maps::parameter_map::{self as maps, Request, parameter_map as search};
+use pendmap::model::Angle;
 use pyo3::prelude::*;
 
-use super::convert::{Array, array, states};
+use super::convert::{Array, Attractor as PyAttractor, array, states};
 use super::long_calls::interruptible;
 use super::model::{Model, range};
 use super::raise;
@@ -23,7 +26,10 @@ pub type RangeTuple = Vec<(String, Vec<f64>)>;
 pub struct ParameterMap {
     /// The cell of each attractor.
     cell: Array<i32>,
-    kind: Vec<&'static str>,
+    /// All plain names of attractors in order; those of mirror images are one in a plane.
+    kinds: Vec<Py<PyAttractor>>,
+    /// The place of each attractor in `kinds`.
+    kind: Array<i16>,
     n: Array<i32>,
     w: Array<i32>,
     theta: Array<f64>,
@@ -65,8 +71,8 @@ pub struct Followed {
 }
 
 impl ParameterMap {
-    /// The arrays of a map.
-    pub fn new(py: Python<'_>, map: &maps::ParameterMap) -> PyResult<Self> {
+    /// The arrays of a map; with `pairs` mirror images are of one kind.
+    pub fn new(py: Python<'_>, map: &maps::ParameterMap, pairs: bool) -> PyResult<Self> {
         let cells = map.cells.iter();
         let each = cells.clone().enumerate();
         let all: Vec<(i32, &Found)> =
@@ -76,12 +82,15 @@ impl ParameterMap {
         let whole = |of: &dyn Fn(&Attractor) -> i64| {
             array(py, all.iter().map(|(_, f)| of(&f.attractor) as i32).collect())
         };
+        let (kinds, kind) = kinds_of(all.iter().map(|(_, found)| &found.attractor), pairs);
+        let kinds = kinds.iter().map(|one| Py::new(py, PyAttractor::new(one, f64::NAN)));
         let point = |f: &Found, k: usize| f.attractor.points.first().map_or(f64::NAN, |p| p[k]);
         Ok(Self {
             cell: array(py, all.iter().map(|(cell, _)| *cell).collect()),
-            kind: all.iter().map(|(_, f)| f.attractor.kind.word()).collect(),
+            kinds: kinds.collect::<PyResult<_>>()?,
+            kind: array(py, kind),
             n: whole(&|a| a.n.unwrap_or(0) as i64),
-            w: whole(&|a| a.w.unwrap_or(a.sense)),
+            w: whole(&|a| a.w),
             theta: number(&|f| point(f, 0)),
             velocity: number(&|f| point(f, 1)),
             exponent: number(&|f| f.attractor.exponent),
@@ -112,7 +121,7 @@ impl Bifurcation {
             up: Py::new(py, Followed::new(py, &found.up))?,
             down: Py::new(py, Followed::new(py, &found.down))?,
         };
-        Py::new(py, (own, ParameterMap::new(py, &found.map)?))
+        Py::new(py, (own, ParameterMap::new(py, &found.map, false)?))
     }
 }
 
@@ -161,7 +170,7 @@ pub fn parameter_map(
         threads,
     };
     let map = interruptible(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
-    ParameterMap::new(py, &map)
+    ParameterMap::new(py, &map, true)
 }
 
 /// The attractors along one parameter, their points, and the motions followed up and down.
@@ -196,6 +205,25 @@ pub fn bifurcation(
         diagram::bifurcation(&pendulum, &request, control)
     })?;
     Bifurcation::of(py, &found)
+}
+
+/// The descriptions of attractors in order, and the place of each attractor among them.
+fn kinds_of<'a>(
+    all: impl Iterator<Item = &'a Attractor>,
+    pairs: bool,
+) -> (Vec<Attractor>, Vec<i16>) {
+    let key = |a: &Attractor| match pairs {
+        true => (a.kind, a.n, a.w.abs(), 0, 0),
+        false => (a.kind, a.n, a.w, a.lean, a.turn),
+    };
+    let keys: Vec<_> = all.map(key).collect();
+    let every: BTreeSet<_> = keys.iter().copied().collect();
+    let place: BTreeMap<_, i16> = every.iter().copied().zip(0..).collect();
+    let described = |(kind, n, w, lean, turn)| {
+        let one = Attractor { lean, turn, ..Attractor::described(kind, n, w, Angle::Circle) };
+        Attractor { name: if pairs { one.pair_name() } else { one.plain_name() }, ..one }
+    };
+    (every.into_iter().map(described).collect(), keys.iter().map(|key| place[key]).collect())
 }
 
 /// Numbers, angles and velocities of points.

@@ -159,7 +159,7 @@ impl Survey {
     /// The whole map, from the results of all blocks after the last exchange.
     fn result(&self, py: Python<'_>, blocks: Vec<Vec<u8>>) -> PyResult<ParameterMap> {
         let map = self.stored(&blocks).and_then(|blocks| self.own.result(&blocks));
-        ParameterMap::new(py, &map.map_err(raise)?)
+        ParameterMap::new(py, &map.map_err(raise)?, true)
     }
 
     /// The whole diagram, from the results of all blocks; what is followed starts from `first`.

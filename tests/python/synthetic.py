@@ -29,6 +29,7 @@ class Painted:
     w: int = 0
     points: Floats = field(default_factory=lambda: np.empty((0, 2)))
     twin: int = 0
+    lean: int = 0
 
 
 def wrap(theta: Floats) -> Floats:
@@ -74,6 +75,8 @@ def assemble(  # noqa: PLR0913 (the schema has many parts)
         "kind": ("attractor", np.array([a.kind for a in attractors], dtype=object)),
         "n": ("attractor", np.array([a.n for a in attractors], dtype=int)),
         "w": ("attractor", np.array([a.w for a in attractors], dtype=int)),
+        "lean": ("attractor", np.array([a.lean for a in attractors], dtype=int)),
+        "turn": ("attractor", np.zeros(len(attractors), dtype=int)),
         "theta_point": ("attractor", first[:, 0]),
         "velocity_point": ("attractor", first[:, 1]),
         "period": ("attractor", np.array([a.n * math.pi for a in attractors], dtype=float)),
@@ -146,8 +149,8 @@ USUAL = (
     Painted(
         "oscillation 2:0", "oscillation", 2, 0, np.array([[-1.65, 0.21], [1.65, -0.21]]), twin=4
     ),
-    Painted("oscillation 1:0 (+)", "oscillation", 1, 0, np.array([[1.0, 1.2]]), twin=6),
-    Painted("oscillation 1:0 (-)", "oscillation", 1, 0, np.array([[-1.0, -1.2]]), twin=5),
+    Painted("oscillation 1:0 (+)", "oscillation", 1, 0, np.array([[1.0, 1.2]]), twin=6, lean=1),
+    Painted("oscillation 1:0 (-)", "oscillation", 1, 0, np.array([[-1.0, -1.2]]), twin=5, lean=-1),
     Painted("rotation 2:+2", "rotation", 2, 2, np.array([[-0.3, 2.8], [-0.7, 2.4]]), twin=8),
     Painted("rotation 2:-2", "rotation", 2, -2, np.array([[0.3, -2.8], [0.7, -2.4]]), twin=7),
     Painted(
@@ -160,7 +163,7 @@ USUAL = (
     ),
     Painted("inverted rest", "inverted_rest", 1, 0, np.array([[math.pi, 0.0]]), twin=10),
     Painted("libration chaos", "libration_chaos", 0, 0, np.array([[0.1, 1.5], [0.2, 1.6]])),
-    Painted("rotating chaos +", "rotating_chaos", 0, 0, np.array([[2.0, 2.1], [2.1, 2.2]])),
+    Painted("rotating chaos +", "rotating_chaos", 0, 1, np.array([[2.0, 2.1], [2.1, 2.2]])),
 )
 
 

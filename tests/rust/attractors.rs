@@ -39,7 +39,7 @@ fn every_known_attractor_and_no_other_is_found() {
                 .iter()
                 .find(|a| known.points.iter().all(|point| contains(a, *point, 1e-9)))
                 .unwrap_or_else(|| panic!("{:?} at p = {p}", known.points));
-            assert_eq!((found.n, found.w), (Some(known.n), Some(known.w)));
+            assert_eq!((found.n, found.w), (Some(known.n), known.w));
             assert_eq!(found.kind.word(), known.kind);
             assert_eq!(found.points.len(), known.n);
             let period = known.n as f64 * known.pendulum.period();
@@ -59,7 +59,7 @@ fn fractions_are_the_reference_ones() {
                 .attractors
                 .iter()
                 .position(|a| {
-                    (a.n, a.w) == (Some(n), Some(w))
+                    (a.n, a.w) == (Some(n), w)
                         && a.points.iter().any(|point| (point[0] - theta).abs() < 1e-4)
                 })
                 .unwrap_or_else(|| panic!("({n}, {w}) at {theta}, p = {p}"));
@@ -138,8 +138,8 @@ fn no_two_attractors_of_a_catalogue_share_a_name() {
                 let kinds = [Kind::Oscillation, Kind::TumblingChaos, Kind::LibrationChaos];
                 one.kind = kinds[below(3)];
                 (one.n, one.w) = match one.kind {
-                    Kind::Oscillation => (Some(1 + below(2)), Some(0)),
-                    _ => (None, None),
+                    Kind::Oscillation => (Some(1 + below(2)), 0),
+                    _ => (None, 0),
                 };
                 one
             })

@@ -81,7 +81,7 @@ fn does_what_it_says(own: &Own, attractor: &Attractor) {
         match attractor.kind {
             Kind::LibrationChaos => assert!(highest < PI, "p = {}: {name}", own.p),
             Kind::RotatingChaos => {
-                let sense = attractor.sense as f64;
+                let sense = attractor.w as f64;
                 assert!(turns * sense > 1.0, "p = {}: {name}, {turns} turns", own.p);
             }
             _ => {}
@@ -102,7 +102,7 @@ fn rotating_chaos_is_two_attractors_with_half_of_the_starts_each() {
     for attractor in &map.attractors {
         for point in some(attractor) {
             let (ways, _) = own.ways(point, 100);
-            assert!(ways.iter().all(|way| way * attractor.sense as f64 > 0.0));
+            assert!(ways.iter().all(|way| way * attractor.w as f64 > 0.0));
         }
     }
     // Starts of the plane end in these proportions after the transients, too.
@@ -197,11 +197,11 @@ fn a_stable_orbit_of_few_periods_is_no_part_of_chaos() {
     let rotations: Vec<&Attractor> = cell.found.iter().map(|f| &f.attractor).collect();
     assert_eq!(
         rotations.iter().map(|a| (a.n, a.w)).collect::<Vec<_>>(),
-        [(Some(2), Some(-1)), (Some(2), Some(1)),]
+        [(Some(2), -1), (Some(2), 1)]
     );
     for rotation in rotations {
         let mut point = rotation.points[0];
-        let turned = TAU * rotation.w.unwrap_or(0) as f64;
+        let turned = TAU * rotation.w as f64;
         let gap = |s: State| {
             let end = own.after(s, 2);
             [end[0] - s[0] - turned, end[1] - s[1]]

@@ -18,8 +18,7 @@ fn alone(pendulum: &Pendulum) -> Plan {
 fn mapped(plan: &mut Plan) -> (Vec<String>, Vec<i16>) {
     let pool = pool(1).expect("a pool");
     let (labels, _) = ends(plan, &plane(SIDE), &pool, &Control::default()).expect("labels");
-    let name = |a: &Attractor| a.name.split(" at ").next().unwrap_or_default().to_owned();
-    (plan.catalogue.attractors.iter().map(name).collect(), labels.label)
+    (plan.catalogue.attractors.iter().map(Attractor::plain_name).collect(), labels.label)
 }
 
 /// Maps each pendulum alone and continued from the one before.

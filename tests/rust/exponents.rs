@@ -71,7 +71,7 @@ fn a_closed_orbit_has_that_of_its_multipliers() {
             let found = of(&known.pendulum, &request([theta + 1e-3, velocity]));
             assert_eq!(found.end, End::Captured);
             let own = found.attractor.expect("an attractor");
-            assert_eq!((own.n, own.w), (Some(known.n), Some(known.w)));
+            assert_eq!((own.n, own.w), (Some(known.n), known.w));
             let largest = known.multipliers.iter().map(|m| m[0].hypot(m[1])).fold(0.0, f64::max);
             let exact = largest.ln() / (known.n as f64 * PI);
             assert!((own.exponent - exact).abs() < 1e-9, "p = {p}: {} {exact}", own.exponent);

@@ -77,7 +77,7 @@ fn orbits_with_friction_are_those_of_the_reference() {
             let error = map
                 .attractors
                 .iter()
-                .filter(|a| (a.n, a.w) == (Some(n), Some(w)))
+                .filter(|a| (a.n, a.w) == (Some(n), w))
                 .flat_map(|a| &a.points)
                 .map(|p| distance(*p, known))
                 .fold(f64::INFINITY, f64::min);

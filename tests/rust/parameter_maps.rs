@@ -49,7 +49,7 @@ fn diagram(base: &Pendulum, p: Vec<f64>) -> Diagram {
 
 /// Period and winding of all periodic attractors.
 fn closed(cell: &Cell) -> Vec<(usize, i64)> {
-    let key = |a: &pendmap::attractor::Attractor| Some((a.n?, a.w?));
+    let key = |a: &pendmap::attractor::Attractor| Some((a.n?, a.w));
     let mut found: Vec<_> = cell.found.iter().filter_map(|f| key(&f.attractor)).collect();
     found.sort_unstable();
     found
@@ -81,8 +81,7 @@ fn shares_of_many_starts_are_those_of_the_basins() {
     let count = 2000;
     let map = mapped(&driven(0.1, 0.5, 2.0), vec![0.5], vec![2.0], count, 1);
     for ((n, w, _), share) in fractions_at(0.5) {
-        let of =
-            |f: &pendmap::maps::cell::Found| (f.attractor.n, f.attractor.w) == (Some(n), Some(w));
+        let of = |f: &pendmap::maps::cell::Found| (f.attractor.n, f.attractor.w) == (Some(n), w);
         let found: f64 = map.cells[0].found.iter().filter(|f| of(f)).map(|f| f.share).sum();
         let error = (share * (1.0 - share) / count as f64).sqrt();
         assert!((found - share).abs() < 4.0 * error, "{n}:{w} {found} {share}");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.ndimage import find_objects, label
 from pendmap import _core
 from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, point, records, summarised, variable
+from pendmap.analysis.orbit_table import attractors_of, matched
+from pendmap.analysis.result import Field, Schema, point, rows, summarised, variable
 from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.numerics import Progress
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats, Indices, Mask
+    from pendmap.signal import Floats, Mask
     from pendmap.units import Units
 
 
@@ -43,9 +45,13 @@ _LISTED = 12  # Largest number of branches in a summary
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
-    keys = {key: f"branch_{key}" for key in ("kind", "w", "first", "last")}
-    kinds = dataset["kind"].values
-    return [one | {"kind": str(kinds[one["kind"]])} for one in records(dataset, **keys)]
+    every = attractors_of(dataset, "kind_")
+    found = []
+    for k, first, last in rows(dataset, "branch_kind", "branch_first", "branch_last"):
+        one = every[k]
+        names = {"name": one.name, "kind": one.kind, "n": one.n, "w": one.w if one.n else None}
+        found.append(names | {"first": first, "last": last})
+    return found
 
 
 SCHEMA = Schema(
@@ -168,7 +174,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    kinds, which = cell_search.kinds_of(raw)
+    kinds = cell_search.names(raw)
     of_entry, members = _linked(raw, axis.values.size)
     owner = raw.point_entry
     value = axis.values[raw.cell]
@@ -180,10 +186,10 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     }
     speeds = units.given(loose["velocity"], VELOCITY)
     way = np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])
-    kind, meanings = which[ends[:, 0]].astype(np.int16), dict(enumerate(kinds.tolist()))
+    kind, meanings = raw.kind[ends[:, 0]], dict(enumerate(kinds))
     on = "entry of the attractor that the sweep {} is on"
     data: dict[str, Any] = {
-        **cell_search.entries(raw, kinds, which, units),
+        **cell_search.entries(raw, units),
         "entry_value": ("entry", value, axis.attributes),
         "entry_branch": variable("entry", of_entry, "1", "number of the branch"),
         "branch_kind": variable("branch", kind, "", "kind of attractor", flags=meanings),
@@ -205,8 +211,8 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
         }
     coordinates = {
         **axis.coordinates,
-        "kind": variable("kind", kinds, long_name="kind of attractor"),
-        "entry": variable("entry", np.arange(which.size), "1", "number of the entry"),
+        "kind": variable("kind", np.array(kinds, dtype=str), long_name="kind of attractor"),
+        "entry": variable("entry", np.arange(raw.kind.size), "1", "number of the entry"),
     }
     return xr.Dataset(data, coords=coordinates)
 
@@ -224,8 +230,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     longest = np.argsort(-(last - first), kind="stable")[:_LISTED]
     for k in sorted(longest, key=lambda k: (first[k], last[k])):
         kind = str(dataset["kind"].values[int(dataset["branch_kind"][k])])
-        sense = {1: ", forward", -1: ", backward"}.get(int(np.sign(dataset["branch_w"][k])), "")
-        lines.append(f"{kind}{sense}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
+        lines.append(f"{kind}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
     lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
@@ -245,7 +250,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
     """Return summary lines on the values at which the sweeps are on different attractors."""
     up, down, values = dataset["up"].values, dataset["down"].values, dataset[name].values
-    kind = dataset["entry_kind"].values
+    pairs = np.array([one.pair for one in attractors_of(dataset, "kind_")], dtype=str)
+    kind = pairs[dataset["entry_kind"].values]
     arrived = (up >= 0) & (down >= 0)
     differ = arrived & (kind[up] != kind[down])
     where = "everywhere" if arrived.all() else "wherever both have arrived"
@@ -293,41 +299,32 @@ def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
 
 
 def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], list[list[int]]]:
-    """Return the branch of each entry, and the entries of each branch, value by value."""
+    """Return the branch of each entry, and the entries of each branch, value by value.
+
+    Orbits near one another and chaos of one kind are one branch, if they have equal turns.
+    """
     cell = raw.cell
     bounds = np.searchsorted(cell, np.arange(values + 1))
-    first = np.searchsorted(raw.point_entry, np.arange(cell.size + 1))
     plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
-    key = [(kind, int(n), int(w)) for kind, n, w in zip(raw.kind, raw.n, raw.w, strict=True)]
+    points = np.split(plane, np.searchsorted(raw.point_entry, np.arange(1, cell.size)))
+    kind = np.array([one.kind for one in raw.kinds], dtype=str)[raw.kind]
+    key = list(zip(kind.tolist(), raw.n.tolist(), raw.w.tolist(), strict=True))
     of_entry = np.full(cell.size, -1, dtype=np.int32)
     members: list[list[int]] = []
     for value in range(values):
-        here = range(bounds[value], bounds[value + 1])
-        before = range(bounds[value - 1], bounds[value]) if value else range(0)
-        pairs = sorted(
-            (apart, a, b)
-            for a in before
-            for b in here
-            if key[a] == key[b]
-            and (apart := _apart(plane, first, a, b, closed=key[a][1] > 0)) < _NEAR
-        )
-        taken: set[int] = set()
-        for _, a, b in pairs:
-            if a not in taken and of_entry[b] < 0:
-                taken.add(a)
-                of_entry[b] = of_entry[a]
-                members[of_entry[a]].append(b)
-        for b in here:
+        low, high = bounds[value : value + 2]
+        begin = bounds[max(value - 1, 0)]
+
+        def reach(a: int, b: int, begin: int = begin, low: int = low) -> float:
+            if key[begin + a] != key[low + b]:
+                return 0.0
+            return _NEAR if raw.n[low + b] else math.inf
+
+        for _, _, a, b in matched(points[begin:low], points[low:high], reach):
+            of_entry[low + b] = of_entry[begin + a]
+            members[of_entry[begin + a]].append(low + b)
+        for b in range(low, high):
             if of_entry[b] < 0:
                 of_entry[b] = len(members)
                 members.append([b])
     return of_entry, members
-
-
-def _apart(plane: Floats, first: Indices, a: int, b: int, *, closed: bool) -> float:
-    """Return the distance from the first point of ``a`` to the nearest of ``b``; 0 for chaos."""
-    if not closed:
-        return 0.0
-    gap = plane[first[b] : first[b + 1]] - plane[first[a]]
-    gap[:, 0] = (gap[:, 0] + np.pi) % (2 * np.pi) - np.pi
-    return float(np.hypot(gap[:, 0], gap[:, 1]).min())

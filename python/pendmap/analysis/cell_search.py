@@ -13,6 +13,7 @@ from scipy.ndimage import find_objects, label
 from pendmap.analysis import result
 from pendmap.analysis.along import DRIVE
 from pendmap.analysis.grid import Grid
+from pendmap.analysis.orbit_table import DESCRIBED, described
 from pendmap.analysis.result import Field, Found, point, variable
 from pendmap.errors import (
     MOST_CELLS,
@@ -23,14 +24,14 @@ from pendmap.formatting import counted, percent
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping, Sequence
+    from collections.abc import Hashable, Mapping
 
     import xarray as xr
     from numpy.typing import NDArray
 
     from pendmap import _core
     from pendmap.analysis.numerics import Numerics
-    from pendmap.signal import Floats, Indices
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")  # Name, comment
@@ -39,18 +40,6 @@ _PLASTIC = 1.324717957244746
 """Plastic number, whose powers give an even additive recurrence in two dimensions."""
 _CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
 UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
-
-_ORDER = (
-    "rest",
-    "inverted rest",
-    "oscillation",
-    "rotation",
-    "quasiperiodic rotation",
-    "libration chaos",
-    "rotating chaos",
-    "tumbling chaos",
-    UNDECIDED,
-)
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
@@ -122,61 +111,39 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: -one["cells"])
 
 
-def kind_of(kind: str, n: int, w: int) -> str:
-    """Return the name of a kind of attractor, like ``rotation 1:2``; mirror images have one."""
-    if kind == "oscillation":
-        return f"oscillation period {n}"
-    if kind == "rotation":
-        return f"rotation {n}:{abs(w)}"
-    return kind.replace("_", " ")
-
-
-def order(name: str) -> tuple[int, int, int]:
-    """Return the rank of a kind: rest first, chaos last, short periods before long."""
-    place = next(k for k, word in enumerate(_ORDER) if name.startswith(word))
-    digits = name.rsplit(" ", 1)[-1]
-    n, _, w = digits.partition(":")
-    return (place, int(n) if n.isdigit() else 0, int(w) if w.isdigit() else 0)
-
-
 def regimes(
-    names: Sequence[str], cell: NDArray[np.int32], cells: int
-) -> tuple[list[tuple[str, ...]], NDArray[np.int16], Floats]:
+    raw: _core.ParameterMap, cells: int
+) -> tuple[list[tuple[int, ...]], NDArray[np.int16], Floats]:
     """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
-    bounds = np.searchsorted(cell, np.arange(cells + 1))
-    own = [
-        tuple(sorted(set(names[low:high]), key=order)) or (UNDECIDED,)
-        for low, high in itertools.pairwise(bounds)
+    bounds = np.searchsorted(raw.cell, np.arange(cells + 1))
+    of_cell = [
+        tuple(np.unique(raw.kind[low:high]).tolist()) for low, high in itertools.pairwise(bounds)
     ]
-    count = Counter(own)
-    sets = sorted(count, key=lambda one: (-count[one], [order(name) for name in one]))
+    count = Counter(of_cell)
+    # Those without any attractor are the last of equally frequent ones.
+    sets = sorted(count, key=lambda one: (-count[one], one or (len(raw.kinds),)))
     place = {one: k for k, one in enumerate(sets)}
     share = np.array([count[one] / cells for one in sets])
-    return sets, np.array([place[one] for one in own], dtype=np.int16), share
+    return sets, np.array([place[one] for one in of_cell], dtype=np.int16), share
 
 
-def kinds_of(raw: _core.ParameterMap) -> tuple[NDArray[np.str_], Indices]:
-    """Return the kinds of all attractors, sorted, and the index of the kind of each."""
-    each = zip(raw.kind, raw.n.tolist(), raw.w.tolist(), strict=True)
-    names = np.array([kind_of(*one) for one in each], dtype=str)
-    kinds, which = np.unique(names, return_inverse=True)
-    return kinds, which
+def names(raw: _core.ParameterMap) -> list[str]:
+    """Return the names of all kinds of attractor, rest first, chaos last."""
+    return [one.name for one in raw.kinds]
 
 
-def entries(
-    raw: _core.ParameterMap, kinds: NDArray[np.str_], kind: Indices, units: Units
-) -> dict[str, Any]:
+def entries(raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
     """Return all attractors, each with the index of its kind, over ``entry``."""
     one, rate, speed = "entry", units.of_rate, units.of_velocity
     velocity = units.given(raw.velocity, VELOCITY)
     growth, error = (units.given(each, RATE) for each in (raw.exponent, raw.exponent_stderr))
-    none, place = "0: no meaning", "cell of the whole result, row by row"
-    meanings = dict(enumerate(kinds.tolist()))
+    place, meanings = "cell of the whole result, row by row", dict(enumerate(names(raw)))
     return {
+        **described(raw.kinds, "kind", "kind_"),
         "entry_cell": variable(one, raw.cell, "1", place),
-        "entry_kind": variable(one, kind.astype(np.int16), "", "kind of attractor", flags=meanings),
-        "entry_n": variable(one, raw.n, "periods", "period n", none),
-        "entry_w": variable(one, raw.w, "turns", "net turns w over a period"),
+        "entry_kind": variable(one, raw.kind, "", "kind of attractor", flags=meanings),
+        "entry_n": variable(one, raw.n, *DESCRIBED["n"]),
+        "entry_w": variable(one, raw.w, *DESCRIBED["w"]),
         **point(one, raw.theta, velocity, speed, "entry_{}"),
         "entry_exponent": variable(one, growth, rate, "largest Lyapunov exponent"),
         "entry_exponent_stderr": variable(one, error, rate, "standard error of the exponent"),

@@ -16,6 +16,7 @@ from pendmap.analysis.grid import FASTEST
 from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.lifetime_summary import summary_of, summary_of_draws
 from pendmap.analysis.numerics import Numerics, optional_whole
+from pendmap.analysis.orbit_table import chaotic
 from pendmap.analysis.result import Field, Found, Schema, flag, variable
 from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import window_said
@@ -287,7 +288,7 @@ def _complete(
 
 def _chaotic(found: xr.Dataset) -> float:
     """Return the share of the starts that end on a chaotic attractor."""
-    return float(found["fraction"][found["kind"].str.endswith("chaos")].sum())
+    return float(found["fraction"].values[chaotic(found)].sum())
 
 
 def _curves(

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.analysis import survival
+from pendmap.analysis.orbit_table import chaotic
 from pendmap.analysis.summary import effort
 from pendmap.files import facts
 from pendmap.formatting import counted, with_error
@@ -33,7 +34,7 @@ def summary_of(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
     else:
         lines.append(_why_not(dataset, exponent))
     if a["chaotic_share"] and not a["persistent"]:
-        names = found["attractor"].values[found["kind"].str.endswith("chaos").values]
+        names = found["attractor"].values[chaotic(found)]
         lines.append(
             f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
             f"left out: chaos there was not captured within {a['chaos_bound']} periods."

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.result import point, records, variable
+from pendmap import _core
+from pendmap.analysis.result import point, records, rows, variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap import _core
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Mask
 
 
+DESCRIBED: Final = {
+    "n": ("periods", "period n", "0: no meaning"),
+    "w": ("turns", "net turns w over a period", "without a period the sense of the turns"),
+    "lean": ("1", "side to which one of two twins leans", "0: not one of such twins"),
+    "turn": ("1", "multiple of a turn around which it moves"),
+}
+"""What tells attractors of one kind apart: unit, meaning, comment."""
 _APART = math.pi  # Distance assigned to an attractor without points, rad
 
 
 def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
     """Return orbits as variables over the dimension ``one``, their points over ``point``."""
-
-    def whole(key: str) -> NDArray[np.int32]:
-        return np.array([getattr(a, key) or 0 for a in orbits], dtype=np.int32)
 
     def measured(key: str, power: int) -> Floats:
         return np.asarray(units.given(np.array([getattr(a, key) for a in orbits], float), power))
@@ -43,27 +48,50 @@ def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str
     speed = units.given(np.array([c[1] for c in closed], dtype=float), VELOCITY)
     theta = np.array([c[0] for c in closed], dtype=float)
     rate, error = measured("exponent", RATE), measured("exponent_stderr", RATE)
-    names = {
-        key: np.array([getattr(a, key) for a in orbits], dtype=str) for key in ("name", "kind")
-    }
-    number, none = np.arange(1, len(orbits) + 1, dtype=np.int32), "0: no meaning"
+    names = np.array([orbit.name for orbit in orbits], dtype=str)
+    number = np.arange(1, len(orbits) + 1, dtype=np.int32)
     image = "its own number where symmetric, 0 if not known"
     multiplier, owner = "Floquet multiplier, real and imaginary part", f"number of the {one}"
     return {
-        one: variable(one, names["name"], long_name=f"name of the {one}"),
+        one: variable(one, names, long_name=f"name of the {one}"),
         "id": variable(one, number, "1", owner),
-        "kind": variable(one, names["kind"], long_name=f"kind of {one}"),
-        "n": variable(one, whole("n"), "periods", "period n", none),
-        "w": variable(one, whole("w"), "turns", "net turns w over a period"),
+        **described(orbits, one),
         **point(one, theta, speed, units.of_velocity, "{}_point"),
         "period": variable(one, measured("period", TIME), units.of_time, "period as a time"),
         "exponent": variable(one, rate, units.of_rate, "largest Lyapunov exponent"),
         "exponent_stderr": variable(one, error, units.of_rate, "standard error of the exponent"),
-        "twin": variable(one, whole("twin"), "1", "number of the mirror image", image),
+        "twin": variable(one, _whole(orbits, "twin"), "1", "number of the mirror image", image),
         "multipliers": variable((one, "eigenvalue", "part"), multipliers, "1", multiplier),
         f"point_{one}": variable("point", flat[:, 0].astype(np.int32), "1", owner),
         **point("point", flat[:, 1], flat[:, 2], units.of_velocity, "point_{}"),
     }
+
+
+def _whole(attractors: Sequence[_core.Attractor], key: str) -> NDArray[np.int32]:
+    return np.array([getattr(one, key) or 0 for one in attractors], dtype=np.int32)
+
+
+def described(attractors: Sequence[_core.Attractor], dim: str, prefix: str = "") -> dict[str, Any]:
+    """Return the variables from which :func:`attractors_of` makes attractors again."""
+    kind = np.array([one.kind for one in attractors], dtype=str)
+    return {
+        f"{prefix}kind": variable(dim, kind, long_name=f"kind of {dim}"),
+        **{
+            f"{prefix}{key}": variable(dim, _whole(attractors, key), *texts)
+            for key, texts in DESCRIBED.items()
+        },
+    }
+
+
+def attractors_of(dataset: xr.Dataset, prefix: str = "") -> list[_core.Attractor]:
+    """Return the attractors of :func:`described` variables, without points."""
+    every = rows(dataset, *(f"{prefix}{key}" for key in ("kind", *DESCRIBED)))
+    return [_core.Attractor(*row) for row in every]
+
+
+def chaotic(dataset: xr.Dataset) -> Mask:
+    """Return which attractors of a table are chaotic."""
+    return np.array([one.chaotic for one in attractors_of(dataset)], dtype=bool)
 
 
 def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
@@ -101,30 +129,43 @@ def points_of(dataset: xr.Dataset, one: str) -> list[Floats]:
     return [points[owner == k] for k in dataset["id"].values]
 
 
-def plain(name: str) -> str:
-    """Return a name without its angle (``... at +0.1234``), which moves with the parameters."""
-    return name.partition(" at ")[0]
-
-
 def matched(
-    names: list[str],
-    points: list[Floats],
-    others: list[str],
-    theirs: list[Floats],
-) -> list[int]:
-    """Match attractors of equal :func:`plain` names by least distance; return indices, else -1."""
-    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 (only draws need it)
+    old: Sequence[Floats],
+    new: Sequence[Floats],
+    reach: Callable[[int, int], float],
+    continued: Iterable[tuple[int, int]] = (),
+    *,
+    circle: bool = True,
+) -> list[tuple[bool, float, int, int]]:
+    """Match attractors of two models, given by their points: first what Newton's method continues.
 
-    found = [-1] * len(others)
-    for name in dict.fromkeys(map(plain, others)):
-        mine = [k for k, own in enumerate(names) if plain(own) == name]
-        new = [k for k, own in enumerate(others) if plain(own) == name]
-        if not mine:
-            continue
-        far = np.array([[distance(points[i], theirs[j]) for j in new] for i in mine])
-        for i, j in zip(*linear_sum_assignment(far), strict=True):
-            found[new[j]] = mine[i]
+    Of the others the nearest pairs come first, those apart by less than ``reach`` of their numbers;
+    0 where they are not alike. Return whether no orbit leads there, distance, and both numbers.
+    """
+    found = [(False, _apart(old[k], new[m], circle=circle), k, m) for k, m in continued]
+    taken = {k for _, _, k, _ in found}, {m for *_, m in found}
+    both = itertools.product(range(len(old)), range(len(new)))
+    free = [(k, m) for k, m in both if k not in taken[0] and m not in taken[1] and reach(k, m)]
+    for far, k, m in sorted((_apart(old[k], new[m], circle=circle), k, m) for k, m in free):
+        if k not in taken[0] and m not in taken[1] and far < reach(k, m):
+            taken[0].add(k)
+            taken[1].add(m)
+            found.append((True, far, k, m))
     return found
+
+
+def named_alike(
+    names: list[str], points: list[Floats], others: list[str], theirs: list[Floats]
+) -> list[int]:
+    """Match attractors of equal plain names by least distance; return indices, else -1."""
+    pairs = matched(points, theirs, lambda k, m: math.inf if names[k] == others[m] else 0.0)
+    place = {m: k for _, _, k, m in pairs}
+    return [place.get(m, -1) for m in range(len(others))]
+
+
+def _apart(one: Floats, other: Floats, *, circle: bool) -> float:
+    """Return the larger of the mean distances from the points of one set to the other."""
+    return max(distance(one, other, circle=circle), distance(other, one, circle=circle))
 
 
 def distance(one: Floats, other: Floats, *, circle: bool = True) -> float:

@@ -14,7 +14,7 @@ from pendmap.analysis import result
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.orbit_table import matched, objects, points_of, table
+from pendmap.analysis.orbit_table import attractors_of, named_alike, objects, points_of, table
 from pendmap.analysis.result import Field, Schema, flag, records, summarised, variable
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
@@ -260,7 +260,7 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     which it exists, and exists and is stable; ``drawn`` (D, parameter); ``drawn_others``, the mean
     number of orbits of a draw that the model itself lacks.
     """
-    names, points = dataset["orbit"].values.tolist(), points_of(dataset, "orbit")
+    names, points = [one.plain for one in attractors_of(dataset)], points_of(dataset, "orbit")
     count, total = len(names), len(draws)
     state = np.full((count, 2, total), np.nan)
     multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
@@ -268,7 +268,8 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     others = 0
     for d, one in enumerate(draws.each(run)):
         theirs = points_of(one, "orbit")
-        for j, k in enumerate(matched(names, points, one["orbit"].values.tolist(), theirs)):
+        alike = [orbit.plain for orbit in attractors_of(one)]
+        for j, k in enumerate(named_alike(names, points, alike, theirs)):
             if k < 0:
                 others += 1
                 continue

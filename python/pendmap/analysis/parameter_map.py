@@ -13,6 +13,7 @@ from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.numerics import part as progress_part
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
 from pendmap.analysis.stored import Kept
 from pendmap.analysis.summary import box_said
@@ -53,9 +54,8 @@ def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def sets(dataset: xr.Dataset, which: str = "regime_has", kind: str = "kind") -> list[list[str]]:
     """Return the kinds of attractor in each regime, rest first, chaos last."""
-    names = dataset[kind].values
-    found = (names[has.astype(bool)].tolist() for has in dataset[which].transpose(..., kind).values)
-    return [sorted(one, key=cell_search.order) or [cell_search.UNDECIDED] for one in found]
+    names, every = dataset[kind].values, dataset[which].transpose(..., kind).values
+    return [names[has.astype(bool)].tolist() or [cell_search.UNDECIDED] for has in every]
 
 
 def having(dim: str, sets: Iterable[Collection[str]], kinds: Iterable[str]) -> tuple[Any, ...]:
@@ -252,9 +252,10 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     dims = (rows.name, columns.name)
     cells = shape[0] * shape[1]
     cell, n, w = raw.cell, raw.n, raw.w
-    kinds, which = cell_search.kinds_of(raw)
-    sets, regime, frequency = cell_search.regimes(kinds[which].tolist(), cell, cells)
-    share = np.zeros((kinds.size, cells))
+    kinds, which = cell_search.names(raw), raw.kind
+    regimes, regime, frequency = cell_search.regimes(raw, cells)
+    sets = [[kinds[k] for k in one] or [cell_search.UNDECIDED] for one in regimes]
+    share = np.zeros((len(kinds), cells))
     np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
     np.fmax.at(exponent, cell, raw.exponent)
@@ -272,19 +273,19 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
     data: dict[str, Any] = {
         "regime": over(regime, "", "set of attractors", flags=dict(enumerate(map("+".join, sets)))),
         "regime_share": variable("set", frequency, "1", "share of the cells"),
-        "regime_has": having("set", sets, kinds.tolist()),
+        "regime_has": having("set", sets, kinds),
         "attractors": over(coexist, "1", "attractors that coexist"),
         "period": over(period, "periods", "period of the kind that most starts end on"),
         "winding": over(winding, "turns", "net turns in that period"),
         "exponent": over(units.given(exponent, RATE), units.of_rate, "largest Lyapunov exponent"),
-        "share": variable(("kind", *dims), share.reshape((kinds.size, *shape)), "1", on_kind),
+        "share": variable(("kind", *dims), share.reshape((len(kinds), *shape)), "1", on_kind),
         **cell_search.shares(raw, dims, shape),
-        **cell_search.entries(raw, kinds, which, units),
+        **cell_search.entries(raw, units),
     }
     coordinates = {
         **columns.coordinates,
         **rows.coordinates,
-        "kind": variable("kind", kinds, long_name="kind of attractor"),
+        "kind": variable("kind", np.array(kinds, dtype=str), long_name="kind of attractor"),
         "set": variable("set", np.arange(len(sets)), "1", "number of the regime"),
     }
     return xr.Dataset(data, coords=coordinates)
@@ -370,14 +371,16 @@ def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     dims, shape = dataset["regime"].dims, dataset["regime"].shape
     counts: dict[tuple[str, ...], np.ndarray] = {}
     shares: list[dict[tuple[str, ...], float]] = []
+    ranks: dict[str, tuple[int, ...]] = {}
     for one in draws.each(run):
+        ranks |= {kind.pair: kind.rank for kind in attractors_of(one, "kind_")}
         own = [tuple(kinds) for kinds in sets(one)]
         shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
         for k, kinds in enumerate(own):
             counts.setdefault(kinds, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
     share = np.array([[one.get(kinds, 0.0) for one in shares] for kinds in counts])
     order = np.argsort(-share.mean(axis=1), kind="stable")
-    every = sorted(set().union(*counts) - {cell_search.UNDECIDED})
+    every = sorted(set().union(*counts) - {cell_search.UNDECIDED}, key=ranks.__getitem__)
     ranked = [list(counts)[k] for k in order]
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
     found = dataset.assign(outcome_has=having("outcome", ranked, every))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.grid import FASTEST
+from pendmap.analysis.orbit_table import chaotic
 from pendmap.analysis.result import missed, of_model, rows
 from pendmap.files import facts
 from pendmap.formatting import counted, percent, with_error, written
@@ -127,7 +128,7 @@ def _bound(dataset: xr.Dataset, moving: int, *, chosen: bool) -> str:
     if not moving and facts(dataset)["torque"] == 0 and not effects_of(dataset.attrs):
         return ": they start exactly at an unstable equilibrium and stay there"
     text = f" within {counted(dataset.attrs['max_periods'], 'period')}"
-    if chosen and dataset["kind"].str.endswith("chaos").any():
+    if chosen and chaotic(dataset).any():
         text += " (where chaos coexists, ten times the longest settling seen, at least 200)"
     return f"{text}; --max-periods raises this bound"
 

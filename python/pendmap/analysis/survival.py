@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap import _core
+from pendmap.analysis.orbit_table import chaotic
 from pendmap.files import facts
 from pendmap.units import RATE, VELOCITY, Units
 
@@ -164,8 +165,7 @@ def growth_on_saddle(
     settle, label = found["settle_periods"].values, found["label"].values
     end = np.where(settle >= 0, settle, found.attrs["max_periods"])
     end = end - _settling(found, pendulum.period)
-    chaos = found["kind"].str.endswith("chaos").values
-    never = (label < 0) | np.concatenate([[False], chaos])[np.maximum(label, 0)]
+    never = (label < 0) | np.concatenate([[False], chaotic(found)])[np.maximum(label, 0)]
     # Long-lived trajectories sample the natural measure of the saddle.
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
     chosen = np.flatnonzero((end >= min(least, _LONGEST // 2)) & ~never)[:_FOLLOWED]

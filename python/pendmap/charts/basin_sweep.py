@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.orbit_table import plain
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.sweeps.report import varied_names
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
@@ -70,7 +70,7 @@ class Branch:
 def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
     """Return the attractors in the order of their numbers; all but ``most`` have one grey.
 
-    Those of equal names have successive colours of their family.
+    Those of equal plain names have successive colours of their family.
     """
     share = dataset["fraction"].sum(varied_names(dataset)).values
     if most is not None and share.size == most + 1:
@@ -78,14 +78,12 @@ def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
     named = set(np.argsort(-share, kind="stable")[:most].tolist())
     seen: Counter[str] = Counter()
     found = []
-    for k, name in enumerate(map(str, dataset["attractor"].values)):
-        short = plain(name).partition(" from ")[0]
-        seen[short] += 1
-        if k in named:
-            told = short if seen[short] == 1 else f"{short} #{seen[short]}"
-            found.append(Branch(k + 1, typeset(name), palette.colour(told)))
-        else:
-            found.append(Branch(k + 1, "", OTHERS))
+    chosen = dataset["colour"].values.tolist() if "colour" in dataset else [""] * share.size
+    for k, one in enumerate(attractors_of(dataset, "branch_")):
+        colour = chosen[k] or palette.colour(one, seen[one.plain])
+        seen[one.plain] += 1
+        name = typeset(str(dataset["attractor"].values[k]))
+        found.append(Branch(k + 1, *((name, colour) if k in named else ("", OTHERS))))
     return found
 
 

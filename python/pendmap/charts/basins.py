@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.charts import legend, names, palette, plane
+from pendmap.analysis.orbit_table import chaotic
+from pendmap.charts import legend, names, plane
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points, Text
 from pendmap.errors import InputError
@@ -157,8 +158,12 @@ def _marker(
     entry: legend.Entry, at: npt.NDArray[np.float64], name: str = "", size: float = 5.5
 ) -> Points:
     path = "" if name else f"attractors/{entry.id}"
-    shape = palette.marker(entry.name, entry.kind)
-    look: dict[str, Any] = {"marker": shape, "size": size, "colour": entry.colour, "name": name}
+    look: dict[str, Any] = {
+        "marker": entry.marker,
+        "size": size,
+        "colour": entry.colour,
+        "name": name,
+    }
     look |= {"path": path, "edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
     return Points(*at.T, clip=False, order=5.0, **look)
 
@@ -307,9 +312,9 @@ def transients(dataset: xr.Dataset) -> str:
 
 def exponents(dataset: xr.Dataset) -> str:
     """Return the largest exponents of the chaotic attractors in one line; empty if unknown."""
-    chaotic = [str(kind).endswith("chaos") for kind in dataset["kind"].values]
-    values = dataset["exponent"].values[chaotic]
-    errors = dataset.get("exponent_stderr", dataset["exponent"] * math.nan).values[chaotic]
+    which = chaotic(dataset)
+    values = dataset["exponent"].values[which]
+    errors = dataset.get("exponent_stderr", dataset["exponent"] * math.nan).values[which]
     known = [x for x in values if math.isfinite(x)]
     listed = ", ".join(f"{x:.3g}" for x in known)
     if len(known) == len(errors) == 1 and math.isfinite(errors[0]):

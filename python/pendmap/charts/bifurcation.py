@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.legend import typeset
+from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
 from pendmap.errors import InputError
 from pendmap.files import facts
@@ -31,7 +32,7 @@ _STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """All attractors of one kind, period and winding number.
+    """All attractors of one name.
 
     ``points``, shape (m, 3), are value, angle and velocity; ``exponents``, shape (k, 2), value and
     largest exponent; ``up`` and ``down`` mark the values at which the sweeps are on one of them.
@@ -39,6 +40,7 @@ class Family:
 
     name: str
     colour: str
+    chaotic: bool
     points: npt.NDArray[np.float64]
     exponents: npt.NDArray[np.float64]
     up: npt.NDArray[np.bool_]
@@ -90,8 +92,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
 def _dots(  # noqa: PLR0913, PLR0917 (what points are, and their look)
     dataset: xr.Dataset, one: Family, at: Floats, size: float, path: str, name: str = ""
 ) -> Points:
-    chaos = "chaos" in one.name
-    cells = plane.edges(dataset, str(dataset.attrs["varied"])) if chaos else None
+    cells = plane.edges(dataset, str(dataset.attrs["varied"])) if one.chaotic else None
     return Points(*at.T, colour=one.colour, size=size, path=path, name=name, cells=cells)
 
 
@@ -107,7 +108,7 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
         look: dict[str, Any] = {"colour": palette.UNNAMED, "name": "sweep, undecided"}
         drawn.append(Points(*loose, size=0.45, order=1.0, **look))
     for k, one in reversed([*enumerate(every)]):
-        of = 0.45 if "chaos" in one.name else size
+        of = 0.45 if one.chaotic else size
         points = one.points[:, [0, column]]
         drawn.append(_dots(dataset, one, points, of, f"{k}/points", _said(every, k)))
     return drawn
@@ -139,33 +140,23 @@ def families(dataset: xr.Dataset) -> list[Family]:
 
     Chaos is always among the :data:`MOST` named ones, however rare.
     """
-    kind, n, w, value = (dataset[f"entry_{key}"].values for key in ("kind", "n", "w", "value"))
-    keys = np.stack([kind, n, w], axis=1)
-    every, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    which = which.reshape(-1)
+    which, value = dataset["entry_kind"].values, dataset["entry_value"].values
+    every = attractors_of(dataset, "kind_")
+    count = np.bincount(which, minlength=len(every))
     owner = dataset["point_entry"].values
     points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
     found: list[Family] = []
-    rare = np.array(["chaos" not in str(dataset["kind"].values[word]) for word in every[:, 0]])
-    first = np.lexsort((-count, rare))[:MOST]
-    for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first))):
-        word, period, turns = every[k]
-        called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
+    regular = np.array([not one.chaotic for one in every], dtype=bool)
+    first = np.lexsort((-count, regular, count == 0))[:MOST]
+    shades, called = colours_of(dataset, "kind_"), dataset["kind"].values
+    for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first)))[: np.sum(count > 0)]:
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
-        named = len(found) < MOST
-        shade = palette.on_white(palette.colour(called)) if named else palette.UNNAMED
-        on = (sweeps["up"] == k, sweeps["down"] == k)
-        found.append(Family(called, shade, points[mine[owner]], exponents, *on))
+        shade = palette.on_white(shades[k]) if len(found) < MOST else palette.UNNAMED
+        look, on = (
+            (str(called[k]), shade, every[k].chaotic),
+            (sweeps["up"] == k, sweeps["down"] == k),
+        )
+        found.append(Family(*look, points[mine[owner]], exponents, *on))
     return found
-
-
-def _name(kind: str, n: int, w: int) -> str:
-    """Return an attractor's name from its kind, period and winding number."""
-    family = kind.rpartition(" ")[0]
-    if kind.startswith("oscillation"):
-        return f"oscillation {n}:0"
-    if family == "rotation":
-        return f"rotation {n}:{w:+d}"
-    return f"{kind} {'+' if w > 0 else '-'}" if w and n == 0 else kind

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-import re
+import operator
+import string
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import palette, plane
+from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import MINUS, typographic, with_error
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
 
 
@@ -22,29 +28,21 @@ if TYPE_CHECKING:
 class Entry:
     """One line of a legend.
 
-    ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells, whose ``kind`` is
-    the name; ``fraction`` and ``share`` are the share of the cells, in text with its standard
-    error, ``twin`` the name of the mirror twin, ``points``, shape (m, 2), the stroboscopic points:
-    angle in rad, velocity.
+    ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells; ``fraction`` and
+    ``share`` are the share of the cells, in text with its standard error, ``twin`` the name of the
+    mirror twin, ``points``, shape (m, 2), the stroboscopic points: angle in rad, velocity;
+    ``chaotic`` says whether they are samples of a chaotic set rather than a periodic orbit.
     """
 
     id: int
     name: str
-    kind: str
+    colour: str
+    marker: str
+    chaotic: bool
     fraction: float
     share: str
     twin: str
     points: npt.NDArray[np.float64]
-
-    @property
-    def colour(self) -> str:
-        """The colour, ``"#rrggbb"``."""
-        return palette.colour(self.name, self.kind)
-
-    @property
-    def chaotic(self) -> bool:
-        """Whether the points are samples of a chaotic set rather than a periodic orbit."""
-        return self.kind.endswith("chaos")
 
     @property
     def text(self) -> str:
@@ -62,31 +60,59 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
     owner = dataset["point_attractor"].values
     points = plane.points(dataset)
     found = []
-    for k, (i, name) in enumerate(names.items()):
+    looks = zip(names.items(), attractors_of(dataset), colours_of(dataset), strict=True)
+    for k, ((i, name), one, colour) in enumerate(looks):
         row = dataset.isel(attractor=k)
         twin = int(row["twin"])
         other = names.get(twin, "") if twin != i else ""
         fraction, mine = float(row["fraction"]), points[owner == i]
         share = percent(fraction, float(row["stderr"]))
-        found.append(Entry(i, name, str(row["kind"].item()), fraction, share, other, mine))
+        look = (colour, palette.marker(one), one.chaotic)
+        found.append(Entry(i, name, *look, fraction, share, other, mine))
     if dataset.attrs.get("layers") == "finite_time" and not found:
         return found
-    for i, name in ((0, "undecided"), (-1, "failed")):
+    none = np.empty((0, 2))
+    for i, name, colour in ((0, "undecided", palette.UNDECIDED), (-1, "failed", palette.FAILED)):
         share_of = float(facts(dataset).get(name, 0.0))
         if share_of > 0:
-            none = np.empty((0, 2))
-            found.append(Entry(i, name, name, share_of, percent(share_of), "", none))
+            look = (colour, "s", False)
+            found.append(Entry(i, name, *look, share_of, percent(share_of), "", none))
     return found
+
+
+def colours_of(dataset: xr.Dataset, prefix: str = "") -> list[str]:
+    """Return the colour of each attractor: the one a user chose, or that of its type."""
+    chosen = dataset["colour"].values.tolist() if "colour" in dataset else itertools.repeat("")
+    every = attractors_of(dataset, prefix)
+    return [own or palette.colour(one) for own, one in zip(chosen, every, strict=False)]
+
+
+def with_looks(
+    dataset: xr.Dataset, colours: Mapping[str, str], names: Mapping[str, str]
+) -> xr.Dataset:
+    """Return a result whose attractors, given by their names, have other colours and names."""
+    dim = next((dim for dim in ("attractor", "orbit", "kind") if dim in dataset.coords), None)
+    known = [] if dim is None else dataset[dim].values.tolist()
+    for what, given in (("colors", colours), ("names", names)):
+        for name in given:
+            if name not in known:
+                allowed = f"one of {', '.join(known)}" if known else "left out: there are none"
+                raise InputError(f"{what}: attractor must be {allowed}, got {name!r}")
+    if dim is None:
+        return dataset
+    chosen = [colours.get(name, "") for name in known]
+    renamed = np.array([names.get(name, name) for name in known], dtype=str)
+    return dataset.assign(colour=(dim, chosen)).assign_coords({dim: renamed})
 
 
 def colours(dataset: xr.Dataset) -> npt.NDArray[np.uint8]:
     """Return the colours of the labels -1, 0, 1, ..., K, in this order: shape (K + 2, 3)."""
     ids = dataset["id"].values.astype(int)
     table = np.empty((int(ids.max(initial=0)) + 2, 3), dtype=np.uint8)
-    table[:] = palette.rgb("unnamed")
-    table[0], table[1] = palette.rgb("failed"), palette.rgb("undecided")
-    for i, name, kind in zip(ids, dataset["attractor"].values, dataset["kind"].values, strict=True):
-        table[i + 1] = palette.rgb(str(name), str(kind))
+    table[:] = palette.parts(palette.UNNAMED)
+    table[0], table[1] = palette.parts(palette.FAILED), palette.parts(palette.UNDECIDED)
+    for i, colour in zip(ids, colours_of(dataset), strict=True):
+        table[i + 1] = palette.parts(colour)
     return table
 
 
@@ -99,4 +125,6 @@ def percent(share: float, stderr: float = math.nan) -> str:
 
 def typeset(name: str) -> str:
     """Return a name with minus signs for the hyphens before numbers, brackets and the end."""
-    return re.sub(r"-(?=\d|\)|$)", MINUS, name)
+    parts = name.split("-")
+    ends = (MINUS if part[:1] in {"", ")", *string.digits} else "-" for part in parts[1:])
+    return parts[0] + "".join(map(operator.add, ends, parts[1:]))

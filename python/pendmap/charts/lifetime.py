@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pendmap.charts import names, palette
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.legend import typeset
+from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import INK, QUIET, Band, Dash, Level, Line, Mark, Points, Span, bars
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error, written
@@ -36,7 +36,7 @@ class Curve:
     """Share of all starts still alive after ``periods``; without a name, of all attractors."""
 
     name: str
-    kind: str
+    colour: str
     periods: Floats
     share: Floats
 
@@ -63,15 +63,16 @@ def curves(dataset: xr.Dataset) -> list[Curve]:
     a = facts(dataset)
     starts = int(a["starts"])
     if a["persistent"]:
-        return [Curve("", "", np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
+        return [Curve("", INK, np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
     lasting = round(float(a["chaotic_share"]) * starts)
     everything = starts - int(a["failed"]) - lasting - captured.sum(axis=0)
     total = np.rint(dataset["fraction"].values * starts).astype(np.int64)
-    made = [Curve("", "", periods, _shares(everything, starts))]
+    made = [Curve("", INK, periods, _shares(everything, starts))]
     whole = int(a["censored"]) <= FEW * starts
+    names, colours = dataset["attractor"].values, colours_of(dataset)
     for k in np.flatnonzero(captured.any(axis=1)) if whole else ():
-        name, kind = (str(dataset[key].values[k]) for key in ("attractor", "kind"))
-        made.append(Curve(name, kind, periods, _shares(total[k] - captured[k], starts)))
+        alive = _shares(total[k] - captured[k], starts)
+        made.append(Curve(str(names[k]), palette.on_white(colours[k]), periods, alive))
     return made
 
 
@@ -125,9 +126,8 @@ def _survival(dataset: xr.Dataset) -> Panel:
     every = curves(dataset)
     marks: list[Mark] = []
     for k, one in enumerate(every):
-        colour = palette.on_white(palette.colour(one.name, one.kind)) if one.name else INK
         said = f"those that {typeset(one.name)} captures" if one.name else "all starts"
-        look: dict[str, Any] = {"name": said, "path": str(k), "colour": colour}
+        look: dict[str, Any] = {"name": said, "path": str(k), "colour": one.colour}
         look |= {"width": 1.3 if one.name else 1.8, "dash": _DASHES[k % 4]}
         marks.append(Line(one.periods, one.share, step=True, **look))
     marks += _fit(dataset, every[0])

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.legend import typeset
+from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import (
     DASHED,
     INK,
@@ -178,12 +179,11 @@ def _distribution(dataset: xr.Dataset) -> Panel:
 
 
 def _attractor(dataset: xr.Dataset) -> Panel:
-    name, kind = (str(dataset[key].values[0]) for key in ("attractor", "kind"))
     theta = plane.angles(dataset, dataset["point_theta"].values)
     points = plane.points(dataset)
     at = plane.copies(dataset, points, *theta)
-    size = 2.0 if kind.endswith("chaos") else 7.0
-    colour = palette.on_white(palette.colour(name, kind))
+    size = 2.0 if attractors_of(dataset)[0].chaotic else 7.0
+    colour = palette.on_white(colours_of(dataset)[0])
     spots = Points(*at.T, colour=colour, size=size, path="points")
     across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
     return Panel("attractor", "attractor, once a period", across, up, [spots])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.charts import names, palette, plane
+from pendmap.charts import names, plane
 from pendmap.charts.chart import Chart, Panel
-from pendmap.charts.legend import typeset
+from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import DASHED, INK, NONE, QUIET, Line, Mark, Points, together
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic
@@ -40,9 +40,11 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     over = f";   grey dots: {counted(count, 'draw')}" if count else ""
     # Stable orbits are drawn last, on top.
     stable = dataset["stable"].values.astype(bool)
+    colours = colours_of(dataset)
     for k in [*np.flatnonzero(~stable), *np.flatnonzero(stable)]:
         own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
-        marks += _orbit(dataset, int(k), paths[k], plane.copies(dataset, own, *theta))
+        at = plane.copies(dataset, own, *theta)
+        marks += _orbit(dataset, int(k), paths[k], at, colours[k])
     if dataset.sizes["orbit"] > MOST:
         more = f"and {dataset.sizes['orbit'] - MOST} more"
         marks.append(Points(NONE, NONE, marker="none", name=more))
@@ -66,7 +68,7 @@ def _drawn(dataset: xr.Dataset, theta: tuple[float, float]) -> list[Mark]:
     return [Points(*points.T, marker=".", size=3.0, colour=QUIET, order=3.0)]
 
 
-def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
+def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats, colour: str) -> list[Mark]:
     row = dataset.isel(orbit=k)
     number, name = int(row["id"]), str(row["orbit"].values)
     stable = bool(int(row["stable"]))
@@ -75,7 +77,6 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats) -> list[Mark]:
     says = "stable" if stable else "unstable"
     said = f"{number}: {typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
     named = number in sorted(dataset["id"].values)[:MOST]
-    colour = palette.colour(name, str(row["kind"].values))
     look: dict[str, Any] = {"colour": colour, "name": said if named else ""}
     # Pale colours on white, and all colours in grey, need an edge.
     line: dict[str, Any] = {"halo": QUIET, "path": f"{number}/path"}

@@ -1,4 +1,4 @@
-"""Colours of attractors by name, so that an attractor has one colour in every figure.
+"""Colours and markers of attractors by their type, so that each has one in every figure.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
@@ -15,20 +15,20 @@ no attractor            undecided light grey; failed black
 ======================  ==================================================================
 
 After its last colour a family repeats, darker, then lighter, and so on (:func:`lap`). Attractors
-around another turn of the line, ``"rest turn +1"``, are coloured likewise. A colour does not
-depend on the other attractors of a map, and no drawing library is imported.
+around another turn of the line are coloured likewise. A colour does not depend on the other
+attractors of a map, and no drawing library is imported.
 """
 
 from __future__ import annotations
 
 import functools
-import re
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from pendmap.formatting import MINUS
+if TYPE_CHECKING:
+    from pendmap._core import Attractor
 
 UNDECIDED = "#e4e4e4"
 """Cells not decided within the bound (label 0)."""
@@ -59,8 +59,6 @@ _SINGLE: dict[str, _Shade] = {
     "inverted_rest": ("#c4b49f", "taupe"),
     "tumbling_chaos": ("#cc79a7", "purple"),
     "libration_chaos": ("#ffa6d1", "pink"),
-    "undecided": (UNDECIDED, "light grey"),
-    "failed": (FAILED, "black"),
 }
 _DIRECTED: dict[str, dict[int, tuple[_Shade, ...]]] = {
     "rotation": {
@@ -82,8 +80,8 @@ _DIRECTED: dict[str, dict[int, tuple[_Shade, ...]]] = {
     "quasiperiodic_rotation": {+1: (("#f7c9a8", "peach"),), -1: (("#bfe0f5", "ice blue"),)},
     "rotating_chaos": {+1: (("#8f1d4f", "wine"),), -1: (("#5b2a98", "violet"),)},
 }
-_OSCILLATION: dict[str, tuple[_Shade, ...]] = {
-    "": (
+_OSCILLATION: dict[int, tuple[_Shade, ...]] = {
+    0: (
         ("#009e73", "bluish green"),
         ("#f0e442", "yellow"),
         ("#8f9f25", "olive"),
@@ -91,7 +89,7 @@ _OSCILLATION: dict[str, tuple[_Shade, ...]] = {
         ("#00604a", "bottle green"),
         ("#c9b458", "sand"),
     ),
-    "+": (
+    1: (
         ("#7adbb8", "light green"),
         ("#faf5a8", "light yellow"),
         ("#c8d45f", "light olive"),
@@ -99,7 +97,7 @@ _OSCILLATION: dict[str, tuple[_Shade, ...]] = {
         ("#2f8a72", "sea green"),
         ("#e0d08a", "straw"),
     ),
-    "-": (
+    -1: (
         ("#00694e", "dark green"),
         ("#5f5a00", "dark olive"),
         ("#6b7a1e", "moss green"),
@@ -122,36 +120,13 @@ _LAPS = (
 )
 """Grey that a family's colours are mixed with on repetition, its share, and its name."""
 
-_KINDS = ("oscillation", *_SINGLE, *_DIRECTED)
-_NUMBERS = re.compile(r"(\d+):([+-]?\d+)")
-_WHERE = re.compile(" (?:at|from) ")  # between a name and the angle or parameters of an attractor
-_TURN = re.compile(r"turn ([+-]\d+)")
-_MARK = re.compile(r"\(([+-])\)|[#\s]([b-z]|\d+)$")
+_SLOWER = 5  # Factor of the period of rotations of other than one turn a period
 
 
-@dataclass(frozen=True)
-class _Read:
-    """Parts of a name: kind, period n, direction, a mark such as ``+`` or ``b``, and the turn."""
-
-    kind: str
-    n: int
-    direction: int
-    mark: str
-    turn: int = 0
-
-
-def colour(name: str, kind: str | None = None) -> str:
-    """Return the colour ``#rrggbb`` of an attractor, of ``undecided`` or ``failed``, by its name.
-
-    ``kind`` is only needed if the name does not begin with it.
-    """
-    shade, round_ = _place(_read(name, kind))
-    return _mixed(shade[0], round_) if round_ else shade[0]
-
-
-def rgb(name: str, kind: str | None = None) -> tuple[int, int, int]:
-    """Return the colour of :func:`colour` as red, green and blue, each 0 to 255."""
-    return parts(colour(name, kind))
+def colour(attractor: Attractor, further: int = 0) -> str:
+    """Return the colour ``#rrggbb`` of an attractor, or the one ``further`` in its family."""
+    (code, _), round_ = _place(attractor, further)
+    return _mixed(code, round_) if round_ else code
 
 
 def parts(code: str) -> tuple[int, int, int]:
@@ -174,11 +149,12 @@ def on_white(code: str) -> str:
     return next(one for one in dark if 1.05 / (luminance(one) + 0.05) >= CONTRAST)
 
 
-def marker(name: str, kind: str | None = None) -> str:
-    """Return the marker of an attractor by its name; further ones where the colours repeat."""
-    read = _read(name, kind)
-    shapes = {1: "^>", -1: "v<"}.get(read.direction) or _SHAPES.get(read.kind, "o")
-    return shapes[_place(read)[1] % len(shapes)]
+def marker(attractor: Attractor) -> str:
+    """Return the marker of an attractor; further ones where the colours repeat."""
+    directed = attractor.kind in _DIRECTED
+    shapes = "^>" if attractor.w > 0 else "v<" if attractor.w < 0 else ""
+    shapes = shapes if directed and shapes else _SHAPES.get(attractor.kind, "o")
+    return shapes[lap(attractor) % len(shapes)]
 
 
 @functools.cache
@@ -194,6 +170,7 @@ def _words() -> dict[str, str]:
         for code, name in shades
     ]
     grey = [(UNNAMED, "grey"), ("#222222", "grey"), ("#666666", "grey")]
+    grey += [(UNDECIDED, "light grey"), (FAILED, "black")]
     curves = zip(CURVES, ("magenta", "cyan", "indigo"), strict=True)
     return dict(reversed([*grey, *curves, *shades, *mixed]))
 
@@ -208,12 +185,12 @@ def in_words(code: str) -> str:
     return known[every[int(np.argmin((apart**2).sum(axis=1)))]]
 
 
-def lap(name: str, kind: str | None = None) -> int:
+def lap(attractor: Attractor) -> int:
     """Return how often the colours of a family were repeated before this one: usually 0.
 
     ``oscillation 8:0`` has the colour of ``oscillation 2:0``, darkened, and the lap 1.
     """
-    return _place(_read(name, kind))[1]
+    return _place(attractor)[1]
 
 
 def shades(scale: str, at: npt.ArrayLike) -> npt.NDArray[np.uint8]:
@@ -236,41 +213,17 @@ def _toward(code: str, ground: int, part: float) -> str:
     return "#{:02x}{:02x}{:02x}".format(*mixed)
 
 
-def _place(read: _Read) -> tuple[_Shade, int]:
-    """Return the colour of a name in its family, and the number of repetitions of the family."""
-    step = max(read.n, 1) - 1
+def _place(attractor: Attractor, further: int = 0) -> tuple[_Shade, int]:
+    """Return the colour of an attractor in its family, and the repetitions of the family."""
+    kind, n, w = attractor.kind, attractor.n or 1, attractor.w
     family: tuple[_Shade, ...]
-    if read.kind in _SINGLE:
-        family, step = (_SINGLE[read.kind],), 0
-    elif read.kind in _DIRECTED:
-        family = _DIRECTED[read.kind][read.direction or 1]
-    elif read.kind == "oscillation":
-        family = _OSCILLATION.get(read.mark, _OSCILLATION[""])
+    if kind in _SINGLE:
+        family, step = (_SINGLE[kind],), 0
+    elif kind in _DIRECTED:
+        family = _DIRECTED[kind][-1 if w < 0 else 1]
+        step = (n if abs(w) in (0, n) else _SLOWER * n) - 1
     else:
-        return (UNNAMED, "grey"), 0
-    around, at = divmod(step + _further(read.mark), len(family))
+        family, step = _OSCILLATION[attractor.lean], n - 1
+    around, at = divmod(step + further, len(family))
     # Turns +1, -1, +2, ... use successive laps.
-    return family[at], around + 2 * abs(read.turn) - (read.turn > 0)
-
-
-def _read(name: str, kind: str | None) -> _Read:
-    words = _WHERE.split(name.replace(MINUS, "-").replace("_", " ").lower())[0].strip()
-    found = next((k for k in _KINDS if words.startswith(k.replace("_", " "))), None)
-    found = found or (kind or "").lower().replace(" ", "_")
-    numbers = _NUMBERS.search(words)
-    n, w = (int(numbers[1]), int(numbers[2])) if numbers else (1, 0)
-    mark = _MARK.search(_TURN.sub("", words[numbers.end() :] if numbers else words))
-    turn = (w > 0) - (w < 0)
-    if not turn and found in _DIRECTED:
-        sign = _TURN.sub("", words)
-        turn = -1 if "-" in sign else 1 if "+" in sign else 0
-    away = _TURN.search(words)
-    counted = int(away[1]) if away else 0
-    return _Read(found, n, turn, (mark[1] or mark[2]) if mark else "", counted)
-
-
-def _further(mark: str) -> int:
-    """Return the number of shades that a mark such as ``b`` or ``2`` advances; a twin's sign: 0."""
-    if mark.isdigit():
-        return max(int(mark) - 1, 0)
-    return ord(mark) - ord("a") if mark.isalpha() else 0
+    return family[at], around + 2 * abs(attractor.turn) - (attractor.turn > 0)

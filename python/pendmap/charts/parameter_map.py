@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from pendmap._core import Attractor
+from pendmap.analysis.cell_search import UNDECIDED
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.parameter_map import sets
 from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts.legend import colours_of
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.errors import InputError
 from pendmap.files import facts
@@ -41,11 +46,11 @@ _MOST_COUNT: Final = 8  # Largest count that has its own colour
 _MOST, _LEAST = 13, 0.002
 """Greatest number of named kinds, and the least share of the cells with one."""
 
-_OTHERS = {
-    "oscillation": ("oscillation, other periods", "oscillation 12:0"),
-    "rotation": ("rotation, others", "rotation 9:+9"),
+_OTHERS: Final = {
+    "oscillation": ("oscillation, other periods", palette.colour(Attractor("oscillation", 12))),
+    "rotation": ("rotation, others", palette.colour(Attractor("rotation", 9, 9))),
 }
-"""Names of the rare kinds of a family together, and the attractors whose colour they have."""
+"""Names of the rare kinds of a family together, and their colours."""
 
 
 @dataclass(frozen=True)
@@ -73,51 +78,32 @@ def _percent(share: float) -> str:
 def kinds(dataset: xr.Dataset) -> list[Kind]:
     """Return the kinds that a map names, in a fixed order of families."""
     share = dataset["regime_share"].values
-    presence: dict[str, float] = {}
-    for k, one in enumerate(sets(dataset)):
-        for name in one:
-            presence[name] = presence.get(name, 0.0) + float(share[k])
-    frequent = sorted(presence, key=lambda name: -presence[name])[:_MOST]
-    frequent = [name for name in frequent if presence[name] >= _LEAST]
-    found: list[Kind] = []
-    rare: dict[str, list[str]] = {}
-    for name, here in presence.items():
-        family, colour = name.split()[0], palette.colour(_named(name))
-        like = _OTHERS[family][1] if family in _OTHERS else ""
-        if not like or (name in frequent and colour != palette.colour(like)):
-            found.append(Kind(name, colour, (name,), here))
+    has = dataset["regime_has"].transpose("set", "kind").values.astype(bool)
+    presence, called = share @ has, dataset["kind"].values
+    looks, every = colours_of(dataset, "kind_"), attractors_of(dataset, "kind_")
+    frequent = np.argsort(-presence, kind="stable")[:_MOST]
+    frequent = frequent[presence[frequent] >= _LEAST]
+    found: list[tuple[tuple[float, ...], Kind]] = []
+    rare: dict[str, list[int]] = {}
+    for k in np.flatnonzero(presence).tolist():
+        family, colour = every[k].kind, looks[k]
+        if family not in _OTHERS or (k in frequent and colour != _OTHERS[family][1]):
+            one = Kind(str(called[k]), colour, (str(called[k]),), float(presence[k]))
+            found.append((every[k].rank, one))
         else:
-            rare.setdefault(family, []).append(name)
+            rare.setdefault(family, []).append(k)
     for family, members in rare.items():
-        own = [set(members) & set(one) for one in sets(dataset)]
-        total = float(sum(s for s, has in zip(share, own, strict=True) if has))
-        several, like = _OTHERS[family]
-        name = several if len(members) > 1 else members[0]
-        found.append(Kind(name, palette.colour(like), tuple(members), total))
-    return sorted(found, key=lambda kind: _place(kind.name))
-
-
-def _named(name: str) -> str:
-    """Return an attractor name with the colour of a kind, the forward one of two directions."""
-    family, _, which = name.rpartition(" ")
-    if name.startswith("oscillation period"):
-        return f"oscillation {which}:0"
-    if family == "rotation":
-        n, _, w = which.partition(":")
-        # Rotations slower than one turn per period have separate colours.
-        return f"rotation {n}:+{w}" if n == w else f"rotation {5 * int(n)}:+{w}"
-    return f"{name} +" if name in ("rotating chaos", "quasiperiodic rotation") else name
-
-
-def _place(name: str) -> tuple[int, float, float]:
-    families = ("rest", "inverted", "oscillation", "rotation", "quasi", "libration", "rotating")
-    order = next((k for k, word in enumerate(families) if name.startswith(word)), len(families))
-    n, _, w = name.rsplit(" ", 1)[-1].partition(":")
-    return (
-        order + 10 * (name == "undecided"),
-        float(n) if n.isdigit() else math.inf,
-        float(w) if w.isdigit() else 0.0,
-    )
+        total = float(share[has[:, members].any(axis=1)].sum())
+        own, first = tuple(map(str, called[members])), every[members[0]].rank
+        if len(members) > 1:
+            found.append(((first[0], math.inf), Kind(*_OTHERS[family], own, total)))
+        else:
+            found.append((first, Kind(own[0], looks[members[0]], own, total)))
+    undecided = float(share[~has.any(axis=1)].sum())
+    if undecided:
+        one = Kind(UNDECIDED, palette.UNDECIDED, (UNDECIDED,), undecided)
+        found.append(((math.inf,), one))
+    return [one for _, one in sorted(found, key=operator.itemgetter(0))]
 
 
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pendmap import charts
 from pendmap.charts.basins import refuse_too_large
+from pendmap.charts.legend import with_looks
 from pendmap.charts.selection import shown
 from pendmap.errors import InputError, short_repr
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
 
     from pendmap.charts.chart import Chart, Sheet
@@ -71,10 +74,23 @@ def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     return builder(dataset, layer=layer, cells=cells)
 
 
-def of_result(result: Any, *, layer: str | None = None, cells: int = 1200) -> Chart | Sheet:  # noqa: ANN401
-    """Return what a figure shows of a dataset, of records, or of what was found in records."""
+def of_result(
+    result: Any,  # noqa: ANN401
+    *,
+    layer: str | None = None,
+    cells: int = 1200,
+    colours: Mapping[str, str] | None = None,
+    names: Mapping[str, str] | None = None,
+) -> Chart | Sheet:
+    """Return what a figure shows of a dataset, of records, or of what was found in records.
+
+    ``colours`` and ``names`` of attractors replace those of their types.
+    """
     name = RESULTS.get(type(result).__name__)
     if name is None:
-        return build(ready(result, "draw"), layer=layer, cells=cells)
+        dataset = ready(result, "draw")
+        if colours or names:
+            dataset = with_looks(dataset, colours or {}, names or {})
+        return build(dataset, layer=layer, cells=cells)
     made: Chart | Sheet = importlib.import_module(f"pendmap.charts.{name}").sheet(result)
     return made.only(layer)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.analysis.basins import RELIABLE
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import shares
 from pendmap.charts import plane
 from pendmap.errors import InputError
@@ -146,10 +147,11 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def _rising(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in which numeric and kind coordinates rise."""
-    numbers = [
-        name for name in dataset.indexes if name == "kind" or dataset[name].dtype.kind in "iuf"
-    ]
+    """Return a dataset in which numeric coordinates rise, and kinds in their order."""
+    if "kind" in dataset.indexes:
+        ranks = [(*one.rank, one.w, one.lean, one.turn) for one in attractors_of(dataset, "kind_")]
+        dataset = dataset.isel(kind=sorted(range(len(ranks)), key=ranks.__getitem__))
+    numbers = [name for name in dataset.indexes if dataset[name].dtype.kind in "iuf"]
     for name in [*numbers, *(key for key in _RISING if key in dataset)]:
         values = dataset[name].values
         if not (values[:-1] <= values[1:]).all():

@@ -313,13 +313,20 @@ def _forced(one: ForcedComparison) -> dict[str, Any]:
 
 def _steady(found: Steady) -> dict[str, Any]:
     return {
-        "kind": found.measured.kind,
+        "name": found.measured.name,
+        "kind": found.measured.attractor.kind,
         "n": found.measured.n,
         "w": found.measured.w,
         "cycles": found.cycles,
         "amplitude": found.measured.amplitude,
         "model": [
-            {"kind": one.cycle.kind, "n": one.cycle.n, "w": one.cycle.w, "share": one.share}
+            {
+                "name": one.cycle.name,
+                "kind": one.cycle.attractor.kind,
+                "n": one.cycle.n,
+                "w": one.cycle.w,
+                "share": one.share,
+            }
             for one in found.reached
         ],
         "rms_theta": found.rms,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pendmap.analysis.cell_search import kind_of
+from pendmap._core import Attractor
 from pendmap.comparison.itinerary import LONGEST
 
 if TYPE_CHECKING:
@@ -70,19 +70,16 @@ class Cycle:
         return self.w == 0 and self.amplitude < _AT_REST
 
     @property
-    def kind(self) -> str:
-        """Kind of motion: ``rest``, ``oscillation period 2``, ``rotation 1:1``, ..."""
-        if self.w:
-            return kind_of("rotation", self.n, self.w)
+    def attractor(self) -> Attractor:
+        """Kind, period and turns of the motion."""
         if self.at_rest:
-            upside_down = math.cos(float(self.theta.mean())) < 0
-            return kind_of("inverted_rest" if upside_down else "rest", 1, 0)
-        return kind_of("oscillation", self.n, 0)
+            return Attractor("inverted_rest" if math.cos(self.theta.mean()) < 0 else "rest", 1)
+        return Attractor("rotation" if self.w else "oscillation", self.n, self.w)
 
     @property
     def name(self) -> str:
-        """Kind of motion, a rotation with its sense: ``rotation 1:+1``."""
-        return f"rotation {self.n}:{self.w:+d}" if self.w else self.kind
+        """Name of the motion: ``rest``, ``oscillation 2:0``, ``rotation 1:+1``, ..."""
+        return self.attractor.name
 
     def nearest(self, other: Cycle) -> tuple[float, Cycle]:
         """Return the least rms difference to another cycle, rad, and this cycle shifted to it.

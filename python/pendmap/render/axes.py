@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import is_color_like, to_hex
 from matplotlib.transforms import Bbox, BboxTransformFrom, BboxTransformTo, ScaledTranslation
 
 from pendmap.charts import registry
 from pendmap.charts.chart import Chart
-from pendmap.errors import check_type
+from pendmap.errors import InputError, check_type
 from pendmap.render import drawing, marks, style, ticks
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.colors import Colormap
 
@@ -39,6 +40,8 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
     title: bool | str = True,
     legend: bool | None = None,
     colormap: str | Colormap | None = None,
+    colors: Mapping[str, Any] | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> Axes:
     """Draw one part of any result into Axes, in the fonts and sizes of the user's style.
 
@@ -60,6 +63,9 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
         out.
     colormap : str or Colormap, optional
         Colour map of matplotlib, or its name, for layers of numbers.
+    colors, names : mapping, optional
+        Colours, as matplotlib knows them, and names of attractors, by their own names, like
+        ``{"rotation 1:+1": "black"}``.
 
     Returns
     -------
@@ -70,7 +76,7 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
     Raises
     ------
     InputError
-        For what has no figure, and for an unknown layer or colour map.
+        For what has no figure, and for an unknown layer, colour map, attractor or colour.
 
     Examples
     --------
@@ -82,7 +88,7 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
     >>> ax = pendmap.plot(map_, right, layer="settle", title=False)
     >>> plt.close(fig)
     """
-    panel = _panel(result, layer, colormap)
+    panel = _panel(result, layer, colormap, _colours(colors), names)
     if legend is not None:
         check_type("legend", legend, bool, "False")
     with style.DRAWING:
@@ -105,7 +111,21 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
     return ax
 
 
-def _panel(result: Any, layer: str | None, colormap: str | Colormap | None) -> Panel:  # noqa: ANN401
+def _colours(given: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return colours as ``#rrggbb``."""
+    for name, colour in (given or {}).items():
+        if not is_color_like(colour):
+            raise InputError(f"colors: {name} must have a colour of matplotlib, got {colour!r}")
+    return {name: to_hex(colour) for name, colour in (given or {}).items()}
+
+
+def _panel(
+    result: Any,  # noqa: ANN401
+    layer: str | None,
+    colormap: str | Colormap | None,
+    colours: Mapping[str, str],
+    names: Mapping[str, str] | None,
+) -> Panel:
     """Return one part of a result, by default the leading one."""
     if layer is None:
         layer = _FIRST.get(type(result).__name__)
@@ -113,7 +133,7 @@ def _panel(result: Any, layer: str | None, colormap: str | Colormap | None) -> P
             layer = "0"
     # Alone a part has no names that the other parts explain.
     layer = layer or registry.of_result(result).panels[0].name
-    chart = registry.of_result(result, layer=layer)
+    chart = registry.of_result(result, layer=layer, colours=colours, names=names)
     if colormap is not None:
         chart = drawing.in_colours(chart, colormap)
     return chart.whole(chart.panels[0]) if isinstance(chart, Chart) else chart.panels[0]

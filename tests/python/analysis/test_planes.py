@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,9 @@ import xarray as xr
 import pendmap
 from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig
-from pendmap.analysis.cell_search import kind_of, regimes, spread, undecided_cells
+from pendmap._core import Attractor
+from pendmap.analysis.cell_search import regimes, spread, undecided_cells
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 
@@ -67,13 +70,7 @@ def test_a_cell_is_the_pendulum_with_its_parameters(plane: xr.Dataset) -> None:
     model = Pendulum(p=float(there["p"]), omega=float(there["omega"]))
     basins = pendmap.basins(model, Grid.square(40), check=False)
     said = drawn.sets(plane)[int(there["regime"])]
-    closed = {
-        kind_of(str(k), int(n), int(w))
-        for k, n, w in zip(
-            basins["kind"].values, basins["n"].values, basins["w"].values, strict=True
-        )
-    }
-    assert set(said) == closed
+    assert set(said) == {one.pair for one in attractors_of(basins)}
 
 
 def test_parameters_of_effects_vary_too() -> None:
@@ -125,11 +122,24 @@ def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> Non
         pendmap.parameter_map(Pendulum(), {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)}, **given)
 
 
-def test_names_of_kinds() -> None:
-    assert kind_of("rotation", 2, -2) == "rotation 2:2"
-    assert kind_of("oscillation", 4, 0) == "oscillation period 4"
-    sets, regime, share = regimes(["rest", "rotation 1:1"], np.array([0, 2], dtype=np.int32), 4)
-    assert sets == [("undecided",), ("rest",), ("rotation 1:1",)]
+def test_without_damping_all_cells_are_undecided() -> None:
+    found = pendmap.parameter_map(Pendulum(gamma=0.0), {"p": (0.1, 0.2, 2), "omega": (2, 2.1, 2)})
+    assert drawn.sets(found)[0] == ["undecided"]
+    assert np.allclose(found["undecided"], 1)
+
+
+def test_names_of_attractors() -> None:
+    assert Attractor("rotation", 2, -2).name == "rotation 2:-2"
+    assert Attractor("rotation", 2, -2).pair == "rotation 2:2"
+    assert Attractor("oscillation", 4).name == "oscillation 4:0"
+    assert Attractor("oscillation", 1, lean=1).name == "oscillation 1:0 (+)"
+    assert Attractor("rest", 1, turn=-1).name == "rest turn -1"
+    assert Attractor("rotating_chaos", w=-1).name == "rotating chaos -"
+    with pytest.raises(ValueError, match="no kind"):
+        Attractor("chaos")
+    raw: Any = SimpleNamespace(cell=np.array([0, 2]), kind=np.array([0, 1]), kinds=[None, None])
+    sets, regime, share = regimes(raw, 4)
+    assert sets == [(), (0,), (1,)]
     assert regime.tolist() == [1, 0, 2, 0]
     assert share.tolist() == [0.5, 0.25, 0.25]
 

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 import pendmap
 from drawn import made
 from pendmap import InputError
-from pendmap.charts import palette
+from pendmap.charts import legend
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -112,7 +112,7 @@ def test_a_figure_marks_each_attractor_where_it_is_alone(tmp_path: Path) -> None
     marked = np.concatenate([line.get_xdata() for line in axes.lines])
     np.testing.assert_allclose(np.sort(marked), np.sort(found["point_theta"].values))
     # Attractors around different turns differ in colour.
-    colours = [palette.colour(str(name)) for name in found["attractor"].values]
+    colours = legend.colours_of(found)
     assert len(set(colours)) == len(colours)
 
 

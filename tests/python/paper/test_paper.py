@@ -175,8 +175,8 @@ def test_figure_8_compares_steady_states_of_the_requested_kinds(
     """Rig and model reach the same two oscillations of period 2 and two rotations."""
     monkeypatch.setattr(paper_motions, "SECONDS", 250.0)
     runs = paper_motions.steady_states(model)
-    kinds = [one.steady.measured.kind for one in runs if one.steady is not None]
-    assert kinds == ["oscillation period 2"] * 2 + ["rotation 1:1"] * 2
+    kinds = [one.steady.measured.name for one in runs if one.steady is not None]
+    assert kinds == ["oscillation 2:0"] * 2 + ["rotation 1:+1"] * 2
     for one in runs:
         assert one.steady is not None
         assert one.steady.reached[0].share == 1.0

@@ -1,4 +1,4 @@
-"""Colours: distinguishable with every kind of colour vision, and assigned by name alone."""
+"""Colours: distinguishable with every kind of colour vision, and assigned by type alone."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from pendmap._core import Attractor
 from pendmap.charts import palette
 
 # Machado, Oliveira and Fernandes (2009): protanopia, deuteranopia, tritanopia, on linear RGB.
@@ -36,20 +37,28 @@ DEFICIENCIES = {
         ]
     ),
 }
+REST, TUMBLING = Attractor("rest", 1), Attractor("tumbling_chaos")
+FORWARD, BACKWARD = Attractor("rotation", 1, 1), Attractor("rotation", 1, -1)
+DOUBLED = Attractor("oscillation", 2)
 COEXISTING = (
-    ("rest", "rotation 1:+1", "rotation 1:-1", "oscillation 2:0", "undecided", "failed"),
-    ("rest", "rotation 1:+1", "rotation 1:-1", "oscillation 1:0 (+)", "oscillation 1:0 (-)"),
-    ("oscillation 2:0", "rotation 1:+1", "rotation 1:-1", "rotation 2:+2", "rotation 2:-2"),
-    ("rest", "inverted rest", "rotation 1:+1", "rotation 1:-1", "tumbling chaos", "undecided"),
-    ("rotating chaos +", "rotating chaos -", "tumbling chaos", "oscillation 2:0", "failed"),
-    ("oscillation 4:0 (+)", "oscillation 4:0 (-)", "rotation 1:+1", "rotation 1:-1", "undecided"),
-    ("rest", "oscillation 1:0", "oscillation 2:0", "oscillation 3:0", "tumbling chaos"),
+    (REST, FORWARD, BACKWARD, DOUBLED, "undecided", "failed"),
+    (REST, FORWARD, BACKWARD, *(Attractor("oscillation", 1, lean=side) for side in (1, -1))),
+    (DOUBLED, FORWARD, BACKWARD, Attractor("rotation", 2, 2), Attractor("rotation", 2, -2)),
+    (REST, Attractor("inverted_rest", 1), FORWARD, BACKWARD, TUMBLING, "undecided"),
+    (*(Attractor("rotating_chaos", w=w) for w in (1, -1)), TUMBLING, DOUBLED, "failed"),
+    (*(Attractor("oscillation", 4, lean=side) for side in (1, -1)), FORWARD, BACKWARD, "undecided"),
+    (REST, *(Attractor("oscillation", n) for n in (1, 2, 3)), TUMBLING),
 )
 
 
-def perceived(name: str, deficiency: str) -> npt.NDArray[np.float64]:
+def shade(one: Attractor | str) -> str:
+    cells = {"undecided": palette.UNDECIDED, "failed": palette.FAILED}
+    return cells[one] if isinstance(one, str) else palette.colour(one)
+
+
+def perceived(one: Attractor | str, deficiency: str) -> npt.NDArray[np.float64]:
     """Return the perceived colour in Ottosson's OKLab, times 100."""
-    channel = np.array(palette.rgb(name)) / 255
+    channel = np.array(palette.parts(shade(one))) / 255
     linear = np.where(channel <= 0.04045, channel / 12.92, ((channel + 0.055) / 1.055) ** 2.4)
     seen = np.clip(DEFICIENCIES[deficiency] @ linear, 0, 1)
     to_cones = np.array(
@@ -71,24 +80,19 @@ def perceived(name: str, deficiency: str) -> npt.NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
-@pytest.mark.parametrize("names", COEXISTING, ids=lambda names: names[0])
-def test_colours_that_coexist_are_distinguishable(names: tuple[str, ...], deficiency: str) -> None:
-    for one, other in itertools.combinations(names, 2):
+@pytest.mark.parametrize("every", COEXISTING)
+def test_colours_that_coexist_are_distinguishable(
+    every: tuple[Attractor | str, ...], deficiency: str
+) -> None:
+    for one, other in itertools.combinations(every, 2):
         gap = np.linalg.norm(perceived(one, deficiency) - perceived(other, deficiency))
         assert gap > 5.0, (one, other, gap)
 
 
-def test_colours_depend_on_names_alone() -> None:
-    assert palette.colour("rest") == "#474747"
-    assert palette.colour("rotation 1:\N{MINUS SIGN}1") == palette.colour("rotation 1:-1")
-    assert palette.colour("inverted_rest") == palette.colour("inverted rest")
-    assert palette.colour("another name", "tumbling_chaos") == palette.colour("tumbling chaos")
-    assert palette.colour("rotation 1:+1", "tumbling_chaos") == palette.colour("rotation 1:+1")
-    assert palette.colour("no such thing") == palette.UNNAMED
-    for name in itertools.chain(*COEXISTING):
-        red, green, blue = palette.rgb(name)
-        assert f"#{red:02x}{green:02x}{blue:02x}" == palette.colour(name)
-        assert palette.in_words(palette.colour(name)).replace(" ", "").isalpha()
+def test_colours_have_names() -> None:
+    assert palette.colour(REST) == "#474747"
+    for one in itertools.chain(*COEXISTING):
+        assert palette.in_words(shade(one)).replace(" ", "").isalpha()
 
 
 @pytest.mark.parametrize("name", ["RdBu_r", "cividis", "magma", "viridis"])
@@ -98,19 +102,22 @@ def test_colours_of_recordings_are_those_of_figures(name: str) -> None:
     assert np.abs(palette.shades(name, at) - drawn).max() < 16
 
 
-@pytest.mark.parametrize("name", ["oscillation {}:0", "oscillation {}:0 (+)", "rotation {0}:-{0}"])
-def test_colours_of_all_periods_differ(name: str) -> None:
-    names = [name.format(n) for n in range(1, 33)]
-    assert len({palette.colour(one) for one in names}) == len(names)
-    for one, other in itertools.combinations(names, 2):
+@pytest.mark.parametrize(
+    ("kind", "turns", "lean"), [("oscillation", 0, 0), ("oscillation", 0, 1), ("rotation", -1, 0)]
+)
+def test_colours_of_all_periods_differ(kind: str, turns: int, lean: int) -> None:
+    every = [Attractor(kind, n, turns * n, lean) for n in range(1, 33)]
+    assert len({palette.colour(one) for one in every}) == len(every)
+    for one, other in itertools.combinations(every, 2):
         gap = float(np.linalg.norm(perceived(one, "none") - perceived(other, "none")))
         assert gap > 1.0 or palette.lap(one) != palette.lap(other), (one, other, gap)
 
 
 def test_a_repeated_colour_is_darker_or_lighter() -> None:
-    assert palette.lap("oscillation 2:0") == palette.lap("rotation 5:+1") == 0
-    assert palette.lap("oscillation 14:0") == 2
-    assert palette.in_words(palette.colour("oscillation 14:0")) == "lighter yellow"
-    lightness = [perceived(f"oscillation {n}:0", "none")[0] for n in (8, 2, 14)]
+    assert palette.lap(DOUBLED) == palette.lap(Attractor("rotation", 5, 5)) == 0
+    late = Attractor("oscillation", 14)
+    assert palette.lap(late) == 2
+    assert palette.in_words(palette.colour(late)) == "lighter yellow"
+    lightness = [perceived(Attractor("oscillation", n), "none")[0] for n in (8, 2, 14)]
     assert lightness == sorted(lightness)
-    assert palette.colour("tumbling chaos") != palette.colour("tumbling chaos b")
+    assert palette.colour(TUMBLING) != palette.colour(TUMBLING, 1)

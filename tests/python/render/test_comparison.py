@@ -99,4 +99,4 @@ def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_pat
             assert max(box.x1 for box in boxes) < figure.bbox.x1 + 1
     drawn = written(sheets[0])
     assert "escapes from a well" in drawn
-    assert ("oscillation period 2" in drawn) == (seconds > 60)
+    assert ("oscillation 2:0" in drawn) == (seconds > 60)

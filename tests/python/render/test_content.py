@@ -15,6 +15,7 @@ import motions
 import pendmap
 import synthetic
 from drawn import made, named, plain, subtitle, titles, written
+from pendmap._core import Attractor
 from pendmap.charts import legend, palette
 
 if TYPE_CHECKING:
@@ -69,15 +70,13 @@ def test_undecided_and_failed_are_in_the_legend_only_if_present() -> None:
 
 def test_cells_have_their_attractors_colour_the_right_way_up() -> None:
     dataset = synthetic.painted(synthetic.USUAL[:5], (12, 9), undecided=2, failed=1)
-    image = made(dataset).axes[0].images[0]
+    image, colours = made(dataset).axes[0].images[0], legend.colours_of(dataset)
     drawn = np.asarray(image.get_array())
     assert image.origin == "lower"
     assert image.get_extent() == pytest.approx([-math.pi, math.pi, -3, 3])
     for (row, column), label in np.ndenumerate(dataset["label"].values):
-        name = {0: "undecided", -1: "failed"}.get(
-            int(label), str(dataset["attractor"].values[label - 1])
-        )
-        assert tuple(drawn[row, column]) == palette.rgb(name)
+        shade = {0: palette.UNDECIDED, -1: palette.FAILED}.get(int(label), colours[label - 1])
+        assert tuple(drawn[row, column]) == palette.parts(shade)
 
 
 def test_attractors_are_marked_with_their_copies() -> None:
@@ -85,11 +84,13 @@ def test_attractors_are_marked_with_their_copies() -> None:
         synthetic.USUAL[:4], theta=(-2 * math.pi, 2 * math.pi), velocity=(-1.0, 3.0)
     )
     marks = {line.get_markerfacecolor(): line.get_xydata() for line in made(dataset).axes[0].lines}
-    rest = np.asarray(marks[palette.colour("rest")])
+    rest = np.asarray(marks[palette.colour(Attractor("rest", 1))])
     assert sorted(rest[:, 0]) == pytest.approx([-2 * math.pi, 0, 2 * math.pi])
-    swing = np.asarray(marks[palette.colour("oscillation 2:0")])
+    swing = np.asarray(marks[palette.colour(Attractor("oscillation", 2))])
     assert len(swing) == 4
-    assert palette.colour("rotation 1:-1") not in marks, "its point lies outside the window"
+    assert palette.colour(Attractor("rotation", 1, -1)) not in marks, (
+        "its point lies outside the window"
+    )
 
 
 def test_values_of_settle_time_and_cells_without_one() -> None:
@@ -136,9 +137,9 @@ def test_a_real_map_has_the_basins_of_the_smooth_point() -> None:
     dataset = motions.integrated(p=0.6, cells=30, periods=60)
     figure = made(dataset)
     drawn = np.asarray(figure.axes[0].images[0].get_array()).reshape(-1, 3)
-    yellow = np.all(drawn == palette.rgb("oscillation 2:0"), axis=1).mean()
-    blue = np.all(drawn == palette.rgb("rotation 1:-1"), axis=1).mean()
-    red = np.all(drawn == palette.rgb("rotation 1:+1"), axis=1).mean()
+    every = Attractor("oscillation", 2), Attractor("rotation", 1, -1), Attractor("rotation", 1, 1)
+    shades = (palette.parts(palette.colour(one)) for one in every)
+    yellow, blue, red = (np.all(drawn == shade, axis=1).mean() for shade in shades)
     assert yellow == pytest.approx(0.83, abs=0.03)
     assert blue == red == pytest.approx(0.085, abs=0.02)
 

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from hypothesis import given as drawing_of
-from hypothesis import strategies as st
 from matplotlib import pyplot as plt
 from matplotlib.text import Text
 
@@ -171,18 +169,22 @@ def test_recorded_curves_of_a_panel_have_names_and_colours_of_their_own() -> Non
             assert words.count("grey") < 2, (panel.name, known)
 
 
-@drawing_of(st.data())
-def test_an_attractor_has_one_marker_and_colour(drawn: Any) -> None:  # noqa: ANN401
-    n, w, mark = drawn.draw(
-        st.tuples(st.integers(1, 20), st.integers(-9, 9), st.sampled_from("+-"))
-    )
-    kind = drawn.draw(st.sampled_from(["oscillation", "rotation", "tumbling chaos", "rest"]))
-    name = {"oscillation": f"oscillation {n}:0 ({mark})", "rotation": f"rotation {n}:{w:+d}"}
-    plain = name.get(kind, kind)
-    at = drawn.draw(st.floats(-4, 4))
-    for place in (f" at {at:+.4f}", f" from p = {at:.4g}", f" from p = {n}, omega = 2 (2)"):
-        assert palette.colour(plain + place) == palette.colour(plain)
-        assert palette.marker(plain + place) == palette.marker(plain)
+def test_users_choose_colours_and_names_of_attractors() -> None:
+    few = synthetic.painted(synthetic.USUAL[:4], (30, 40))
+    axes = plot(few, colors={"rest": "white"}, names={"rest": "hanging"}, legend=True)
+    texts = [plain(one.get_text()) for one in axes.get_legend().get_texts()]
+    assert any(text.startswith("hanging, ") for text in texts)
+    shades = {
+        tuple(shade) for shade in np.asarray(axes.images[0].get_array()).reshape(-1, 3).tolist()
+    }
+    assert (255, 255, 255) in shades
+    for look in ({"colors": {"rets": "white"}}, {"names": {"rets": "hanging"}}):
+        with pytest.raises(pendmap.InputError, match="one of rest, rotation 1:"):
+            plot(few, **look)
+    with pytest.raises(pendmap.InputError, match="rest must have a colour"):
+        plot(few, colors={"rest": "no colour"})
+    with pytest.raises(pendmap.InputError, match="there are none"):
+        plot(MOTION, names={"rest": "hanging"})
 
 
 def test_a_map_of_a_sweep_looks_like_the_map_alone() -> None:
@@ -191,7 +193,7 @@ def test_a_map_of_a_sweep_looks_like_the_map_alone() -> None:
         alone = pendmap.basins(Pendulum(gamma=0.05, p=float(p)), 12)
         looks = [
             {
-                (one.name.partition(" ")[0], one.kind, one.colour, palette.marker(one.name))
+                (one.name.partition(" ")[0], one.chaotic, one.colour, one.marker)
                 for one in legend_entries(member)
             }
             for member in (selection.shown(swept.sel(p=p)), alone)

@@ -69,8 +69,8 @@ def at(image: npt.NDArray[Any], extent: list[float], x: float, y: float) -> Any:
 def colour(part: xr.Dataset, theta: float, velocity: float) -> tuple[int, int, int]:
     """Return the colour of the attractor that a start of a basin map ends on."""
     label = int(part["label"].sel(theta=theta, velocity=velocity))
-    names = {0: "undecided"} | dict(zip(part["id"].values, part["attractor"].values, strict=True))
-    return palette.rgb(str(names[label]))
+    shades = dict(zip(part["id"].values, legend.colours_of(part), strict=True))
+    return palette.parts(shades.get(label, palette.UNDECIDED))
 
 
 @settings(max_examples=5, phases=FEW)

@@ -10,7 +10,7 @@ import pytest
 
 import motions
 import synthetic
-from pendmap.charts import basins, palette
+from pendmap.charts import basins, legend, palette
 from pendmap.viewer import chart
 from pendmap.viewer.chart import drawings
 from recordings import ReadBack, recorded
@@ -76,13 +76,14 @@ def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:
     names, shades = (each(back, "/basin/data/labels") for each in (ReadBack.names, colours))
     minus = "\N{MINUS SIGN}"
     wanted = ["undecided", "rest", "rotation 1:+1", f"rotation 1:{minus}1", "oscillation 2:0"]
+    of_type = legend.colours_of(dataset)
     for number, name in enumerate(wanted, 1):
         assert names[number].startswith(f"{name}, ")
-        assert shades[number] == palette.colour(name)
-    for number, name in enumerate(wanted[1:], 1):
+        assert shades[number] == [palette.UNDECIDED, *of_type][number - 1]
+    for number, own in enumerate(of_type, 1):
         path = f"/basin/data/attractors/{number}"
         (((shade,),),) = [back.columns[path]["Points2D:colors"]]
-        assert f"#{shade >> 8:06x}" == palette.colour(name)
+        assert f"#{shade >> 8:06x}" == own
     turns = back.image("/turns/data/turns", "SegmentationImage", np.uint8)
     assert set(np.unique(turns).tolist()) <= set(back.names("/turns/data/turns"))
 

@@ -20,6 +20,7 @@ import motions
 import pendmap
 import synthetic
 from pendmap import viewer
+from pendmap._core import Attractor
 from pendmap.charts import methods, palette
 from pendmap.identification import identify
 from pendmap.viewer import runs, window
@@ -109,8 +110,12 @@ def test_the_viewers_own_picture(tmp_path: Path, which: str) -> None:
     shares = shares_of_colours(file, tmp_path, cursor)
     if which == "labels":
         map_share = 0.25
-        for name, share in (("oscillation 2:0", 0.83), ("rotation 1:+1", 0.08)):
-            assert shares.get(palette.rgb(name), 0.0) > 0.5 * share * map_share
+        for one, share in (
+            (Attractor("oscillation", 2), 0.83),
+            (Attractor("rotation", 1, 1), 0.08),
+        ):
+            shade = palette.parts(palette.colour(one))
+            assert shares.get(shade, 0.0) > 0.5 * share * map_share
     elif which == "trajectory":
         assert shares.get((120, 150, 190), 0.0) > 1e-3, "the curve in the phase plane"
     else:

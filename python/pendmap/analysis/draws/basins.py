@@ -22,7 +22,7 @@ import numpy as np
 
 from pendmap.analysis.draws import drawn_field, outcomes, sure_line
 from pendmap.analysis.fractality import BOX
-from pendmap.analysis.orbit_table import matched, plain, points_of
+from pendmap.analysis.orbit_table import attractors_of, named_alike, points_of
 from pendmap.analysis.result import rows, variable
 
 if TYPE_CHECKING:
@@ -76,8 +76,10 @@ def drawn_basins(dataset: xr.Dataset) -> dict[str, Any]:
 class _End:
     """An outcome of starts with its counts over draws."""
 
+    plain: str
+    """Plain name of the attractor."""
     points: Floats
-    """Stroboscopic points of the attractor, shape (L, 2)."""
+    """Its stroboscopic points, shape (L, 2)."""
     cells: NDArray[np.uint16]
     """Number of draws in which each cell has this outcome."""
     boxes: Floats
@@ -93,22 +95,23 @@ def _counted(
     own = dataset["label"]
     none = _in_boxes(own, own.values > 0).values * 0.0
 
-    def new(points: Floats) -> _End:
-        return _End(points, np.zeros(own.shape, np.uint16), none.copy())
+    def new(plain: str, points: Floats) -> _End:
+        return _End(plain, points, np.zeros(own.shape, np.uint16), none.copy())
 
-    names, points = dataset["attractor"].values.tolist(), points_of(dataset, "attractor")
-    ends = {name: new(mine) for name, mine in zip(names, points, strict=True)}
+    names, plain, points = _attractors(dataset)
+    ends = {name: new(plain[k], points[k]) for k, name in enumerate(names)}
     start, known = none.copy(), none.astype(np.int64)
     for d, one in enumerate(drawn):
         label = one["label"].values
-        names, points = one["attractor"].values.tolist(), points_of(one, "attractor")
-        places = matched(list(ends), [end.points for end in ends.values()], names, points)
+        names, plain, points = _attractors(one)
+        every = ends.values()
+        places = named_alike([e.plain for e in every], [e.points for e in every], plain, points)
         mine = [list(ends)[place] if place >= 0 else "" for place in places]
         for k, name in enumerate(names):
             if not mine[k]:
-                alike = sum(plain(other) == plain(name) for other in ends)
+                alike = sum(end.plain == plain[k] for end in ends.values())
                 mine[k] = name if name not in ends else f"{name} ({alike + 1})"
-                ends[mine[k]] = new(points[k])
+                ends[mine[k]] = new(plain[k], points[k])
         inside = _in_boxes(own, label > 0).values
         known += inside > 0
         entropy = none.copy()
@@ -123,10 +126,16 @@ def _counted(
         for value, name in zip((0, -1), _UNKNOWN, strict=True):
             here = label == value
             if here.any():
-                end = ends.setdefault(name, new(np.empty((0, 2))))
+                end = ends.setdefault(name, new(name, np.empty((0, 2))))
                 end.cells += here
                 end.shares[d] = float(here.mean())
     return ends, start, known
+
+
+def _attractors(dataset: xr.Dataset) -> tuple[list[str], list[str], list[Floats]]:
+    """Return names, plain names and points of the attractors of a map."""
+    plain = [one.plain for one in attractors_of(dataset)]
+    return dataset["attractor"].values.tolist(), plain, points_of(dataset, "attractor")
 
 
 def _variables(

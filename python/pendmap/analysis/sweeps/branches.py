@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis.orbit_table import distance, plain
+from pendmap.analysis.orbit_table import distance, matched
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from pendmap.analysis.sweeps.tiles import Found, Mapped, Place, SweepTiles
     from pendmap.signal import Floats
@@ -50,10 +50,9 @@ def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[
     links = [link for pair in pairs for link in _links(job, maps, *pair)]
     for _, _, one, other in sorted(links):
         joined.join(one, other)
-    rests = [(place, k) for place in places for k, a in enumerate(maps[place].found) if _rests(a)]
-    for both in itertools.pairwise(sorted(rests, key=lambda node: _name(maps, node))):
-        if _name(maps, both[0]) == _name(maps, both[1]):
-            joined.join(*both)
+    for before, after in itertools.pairwise(sorted(_rests(maps, places))):
+        if before[0] == after[0]:
+            joined.join(before[1], after[1])
     number: dict[Node, int] = {}
     for place in places:
         for k in range(len(maps[place].found)):
@@ -64,13 +63,13 @@ def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[
     }
 
 
-def _rests(own: Found) -> bool:
-    """Return whether it is at rest: one attractor also where it repels in between."""
-    return own.kind in ("rest", "inverted_rest")
-
-
-def _name(maps: Mapping[Place, Mapped], node: Node) -> str:
-    return maps[node[0]].found[node[1]].name
+def _rests(maps: Mapping[Place, Mapped], places: list[Place]) -> Iterator[tuple[str, Node]]:
+    """Yield what is at rest, the only one of its name: one also where it repels in between."""
+    for place in places:
+        names = [_core.Attractor(*own.described).plain for own in maps[place].found]
+        for k, own in enumerate(maps[place].found):
+            if own.kind in ("rest", "inverted_rest") and names.count(names[k]) == 1:
+                yield names[k], (place, k)
 
 
 def _before(place: Place) -> list[Place]:
@@ -113,25 +112,18 @@ def _links(
     circle = not _core.counts_turns(job.pendulum)
     ahead, there = _followed(job, maps, before, place)
     back, here = _followed(job, maps, place, before)
-    orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
-    left = set(range(len(old))) - {k for k, _ in orbits}
-    free = set(range(len(new))) - {m for _, m in orbits}
-    others = [
-        (k, m)
-        for k, m in itertools.product(left, free)
-        if _alike(old[k], new[m], k, m) and not (k in here and m in there and old[k].n == new[m].n)
-    ]
-    every = (*orbits, *others)
-    far = {(k, m): _apart(old[k].points, new[m].points, circle=circle) for k, m in every}
-    near: list[tuple[int, int]] = []
-    for k, m in sorted(others, key=lambda pair: (far[pair], pair)):
-        taken = any(k == one or m == other for one, other in near)
+
+    def reach(k: int, m: int) -> float:
+        missed = k in here and m in there and old[k].n == new[m].n
+        if missed or not _alike(old[k], new[m]):
+            return 0.0
         alone = old[k].kind == new[m].kind in _ALONE and k not in here and m not in there
-        if not taken and (alone or far[k, m] < _LIKE):
-            near.append((k, m))
-    return [
-        (pair in near, far[pair], (before, pair[0]), (place, pair[1])) for pair in (*orbits, *near)
-    ]
+        return math.inf if alone else _LIKE
+
+    first, second = ([own.points for own in found] for found in (old, new))
+    orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
+    pairs = matched(first, second, reach, orbits, circle=circle)
+    return [(near, far, (before, k), (place, m)) for near, far, k, m in pairs]
 
 
 def _followed(
@@ -144,7 +136,7 @@ def _followed(
 
     def moved(every: list[Found], points: Mapping[int, Floats], at: float) -> dict[int, Floats]:
         model = job.model((first + at * (last - first)).tolist())
-        states = [(*x.tolist(), every[k].n, _symmetric(every[k], k)) for k, x in points.items()]
+        states = [(*x.tolist(), every[k].n, every[k].symmetric) for k, x in points.items()]
         orbits = zip(points, _core.orbits_near(model, steps, states), strict=True)
         return {k: np.array(one[1]) for k, one in orbits if one and one[0] == every[k].w}
 
@@ -175,29 +167,18 @@ def _followed(
     return followed, {*those}
 
 
-def _symmetric(own: Found, k: int) -> bool | None:
-    """Return whether an attractor is its own mirror image, None if that is not known."""
-    return own.twin == k + 1 if own.twin else None
-
-
-def _alike(one: Found, other: Found, k: int, m: int) -> bool:
+def _alike(one: Found, other: Found) -> bool:
     """Return whether they may follow one another: equal turns, not one symmetric alone."""
     turns = _family(one) == _family(other)
     if one.n and other.n:
         turns = turns and one.w * other.n == other.w * one.n
-    return turns and not {_symmetric(one, k), _symmetric(other, m)} >= {True, False}
+    return turns and not {one.symmetric, other.symmetric} >= {True, False}
 
 
-def _family(own: Found) -> tuple[str, str]:
+def _family(own: Found) -> tuple[str, bool]:
     """Return what an attractor keeps where its period doubles or it becomes chaotic."""
     if own.kind in ("oscillation", "libration_chaos"):
-        return "swings", ""
+        return "swings", False
     if own.kind in ("rotation", "rotating_chaos", "quasiperiodic_rotation"):
-        backward = own.w < 0 or plain(own.name).endswith("-")
-        return "turns", "-" if backward else "+"
-    return own.kind, ""
-
-
-def _apart(one: Floats, other: Floats, *, circle: bool) -> float:
-    """Return the larger of the mean distances from the points of one set to the other."""
-    return max(distance(one, other, circle=circle), distance(other, one, circle=circle))
+        return "turns", own.w < 0
+    return own.kind, False

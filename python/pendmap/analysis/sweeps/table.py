@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 
+from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import coordinate
-from pendmap.analysis.orbit_table import plain
+from pendmap.analysis.orbit_table import DESCRIBED, described
 from pendmap.analysis.result import NO_YES, flag, variable
 from pendmap.analysis.sweeps.tiles import PLANES
 from pendmap.formatting import span
@@ -28,17 +29,7 @@ if TYPE_CHECKING:
     Numbers = Mapping[Place, Sequence[int]]
     """Number of the branch, from 0, of each attractor of each map."""
 
-KINDS: Final = (
-    "none",
-    "rest",
-    "inverted_rest",
-    "oscillation",
-    "rotation",
-    "quasiperiodic_rotation",
-    "libration_chaos",
-    "rotating_chaos",
-    "tumbling_chaos",
-)
+KINDS: Final = ("none", *_core.kinds())
 """Kinds of attractor by their number in the variable ``kind``."""
 MEASURES: Final = {
     "basin_entropy": ("basin_entropy", "nat", "mean entropy of the labels in boxes of 5 x 5 cells"),
@@ -130,18 +121,19 @@ def _table(
     dims = (*(axis.name for axis in axes), "attractor")
     shape = tuple(axis.values.size for axis in axes)
     count = 1 + max((k for own in numbers.values() for k in own), default=-1)
-    whole = {key: np.zeros((*shape, count), dtype=np.int32) for key in ("n", "w", "kind")}
+    whole = {key: np.zeros((*shape, count), dtype=np.int32) for key in ("kind", *DESCRIBED)}
     real = {key: np.full((*shape, count), np.nan) for key in ("exponent", "exponent_stderr")}
     fraction = np.zeros((*shape, count))
     closed = np.full((*shape, count, 2), np.nan)
     twin = np.zeros(count, dtype=np.int32)
-    called: dict[int, Counter[str]] = {}
+    called: dict[int, Counter[tuple[Any, ...]]] = {}
     first: dict[int, Place] = {}
     points: list[tuple[float, ...]] = []
     for at, place in enumerate(np.ndindex(*shape)):
         for own, k in zip(maps[place].found, numbers[place], strict=True):
             here = (*place, k)
-            whole["n"][here], whole["w"][here] = own.n, own.w
+            for key in DESCRIBED:
+                whole[key][here] = getattr(own, key)
             whole["kind"][here] = KINDS.index(own.kind)
             real["exponent"][here], real["exponent_stderr"][here] = (
                 own.exponent,
@@ -151,19 +143,18 @@ def _table(
             if own.n:
                 closed[here] = own.points[0]
             first.setdefault(k, place)
-            called.setdefault(k, Counter())[plain(own.name)] += 1
+            called.setdefault(k, Counter())[own.described] += 1
             if own.twin and not twin[k]:
                 twin[k] = numbers[place][own.twin - 1] + 1
             points += [(at, k + 1, *point) for point in own.points.tolist()]
     # What it is called in most of the models, the first of equally frequent names.
-    most = [called[k].most_common(1)[0][0] for k in range(count)]
-    names = _names(most, [first[k] for k in range(count)], axes)
+    most = [_core.Attractor(*called[k].most_common(1)[0][0]) for k in range(count)]
+    names = _names([one.name for one in most], [first[k] for k in range(count)], axes)
     flat = np.array(points, dtype=float).reshape(-1, 4)
     speed = np.asarray(units.given(flat[:, 3], VELOCITY))
     speeds = np.asarray(units.given(closed[..., 1], VELOCITY))
     rate, error = (np.asarray(units.given(one, RATE)) for one in real.values())
     exists = (whole["kind"] > 0).astype(np.int8)
-    none = "0: no meaning"
     kinds = dict(enumerate(KINDS))
     table = {
         "attractor": variable(
@@ -181,8 +172,8 @@ def _table(
         ),
         "exists": flag(dims, exists, "whether it exists", NO_YES),
         "kind": flag(dims, whole["kind"], "kind of attractor", kinds),
-        "n": variable(dims, whole["n"], "periods", "period n", none),
-        "w": variable(dims, whole["w"], "turns", "net turns w over a period"),
+        **{key: variable(dims, whole[key], *texts) for key, texts in DESCRIBED.items()},
+        **described(most, "attractor", "branch_"),
         **result.shares(dims, fraction, cells),
         "exponent": variable(dims, rate, units.of_rate, "largest Lyapunov exponent"),
         "exponent_stderr": variable(dims, error, units.of_rate, "standard error of the exponent"),

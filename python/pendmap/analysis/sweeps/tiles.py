@@ -17,6 +17,7 @@ import numpy as np
 from pendmap import _core
 from pendmap.analysis.fractality import uncertainty_exponent
 from pendmap.analysis.numerics import part
+from pendmap.analysis.orbit_table import DESCRIBED
 from pendmap.analysis.varied import with_values
 from pendmap.engine import Tile, pack, unpack
 from pendmap.errors import InputError, core_errors
@@ -213,20 +214,22 @@ class _Map:
 def _packed(maps: list[_Map]) -> bytes:
     """Return the maps of a block as a record."""
     every = [(k, a) for k, one in enumerate(maps) for a in one.attractors]
+    number = [k + 1 for one in maps for k in range(len(one.attractors))]
     kept = [_spread(a.points, a.n) for _, a in every]
     points = np.array([p for own in kept for p in own], dtype=float).reshape(-1, 2)
     columns = {
         name: np.array([getattr(a, name) for _, a in every])
-        for name in ("name", "kind", "exponent", "exponent_stderr", "fraction")
+        for name in ("kind", "exponent", "exponent_stderr", "fraction")
     }
     whole = {
         name: np.array([getattr(a, name) or 0 for _, a in every], dtype=np.int32)
-        for name in ("n", "w", "twin")
+        for name in (*DESCRIBED, "twin")
     }
     return pack(
         label=np.stack([one.label for one in maps]),
         measures=np.array([one.measures for one in maps]),
         owner=np.array([k for k, _ in every], dtype=np.int32),
+        number=np.array(number, dtype=np.int32),
         count=np.array([len(own) for own in kept], dtype=np.int32),
         points=points,
         **columns,
@@ -244,11 +247,14 @@ def _spread(points: Sequence[tuple[float, float]], n: int | None) -> Sequence[tu
 class Found:
     """An attractor of one of the models."""
 
-    name: str
     kind: str
     n: int
     """Period in forcing periods; 0 if meaningless."""
     w: int
+    lean: int
+    turn: int
+    number: int
+    """Number in its model, from 1."""
     twin: int
     """Number of the mirror image from 1, 0 if there is none."""
     exponent: float
@@ -256,6 +262,16 @@ class Found:
     fraction: float
     points: Floats
     """Stroboscopic points, shape (M, 2)."""
+
+    @property
+    def described(self) -> tuple[str, int, int, int, int]:
+        """What names it: kind, period, turns, side and turn."""
+        return self.kind, self.n, self.w, self.lean, self.turn
+
+    @property
+    def symmetric(self) -> bool | None:
+        """Whether it is its own mirror image, None if that is not known."""
+        return self.twin == self.number if self.twin else None
 
 
 @dataclasses.dataclass(frozen=True)
