@@ -57,7 +57,9 @@ def own_map(plane: str, cells: int, threads: int) -> dict[str, object]:
     model, p, omega = PLANES[plane]
     ranges = {"p": (*p, cells), "omega": (*omega, cells)}
     before = resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    found = pendmap.parameter_map(pendmap.Pendulum(**model), ranges, threads=threads)
+    found = pendmap.parameter_map(
+        pendmap.Pendulum(**model), ranges, run=pendmap.RunOptions(threads=threads)
+    )
     seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - before
     kinds = found["kind"].values
     parts = (found[f"entry_{part}"].values for part in ("cell", "kind", "n", "w"))

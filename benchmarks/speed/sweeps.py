@@ -87,7 +87,13 @@ def measure(one: Sweep, cells: int, rounds: int) -> tuple[str, ...]:
     known = plans(one, cells)
     whole, alone = [], []
     for _ in range(rounds):
-        whole.append(cpu(lambda: pendmap.sweep(one.pendulum, one.ranges, grid=cells, threads=1)))
+        whole.append(
+            cpu(
+                lambda: pendmap.sweep(
+                    one.pendulum, one.ranges, grid=cells, run=pendmap.RunOptions(threads=1)
+                )
+            )
+        )
         alone.append(cpu(lambda: [plan.label(0, cells * cells) for plan in known]))
     ratios = [a / b for a, b in zip(whole, alone, strict=True)]
     spans = [f"{name} {low:g}:{high:g}:{n}" for name, (low, high, n) in one.ranges.items()]

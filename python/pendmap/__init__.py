@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.melnikov import melnikov as melnikov
     from pendmap.analysis.orbits import orbit as orbit
     from pendmap.analysis.parameter_map import parameter_map as parameter_map
+    from pendmap.analysis.run import RunOptions as RunOptions
     from pendmap.analysis.tongues import tongues as tongues
     from pendmap.analysis.trajectories import advance as advance
     from pendmap.analysis.trajectory import simulate as simulate
@@ -88,6 +89,7 @@ ANALYSES = {
 _OTHERS = {
     "analysis.fractality": "BasinEntropy UncertaintyExponent basin_entropy uncertainty_exponent",
     "analysis.grid": "Axis Grid",
+    "analysis.run": "RunOptions",
     "analysis.trajectories": "advance",
     "analysis.varied": "pendulum_of",
     "comparison.experiment": "compare",

@@ -20,7 +20,7 @@ import pytest
 import xarray as xr
 
 import pendmap
-from pendmap import Grid, Pendulum
+from pendmap import Grid, Pendulum, RunOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,15 +35,15 @@ _STARTS = np.random.default_rng(1).uniform(-3, 3, (2, 1500))
 _CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, not of what
 
 CASES: dict[str, Callable[..., xr.Dataset]] = {
-    "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(83), **keep),
-    "chaos": lambda **keep: pendmap.basins(Pendulum(p=1.5, omega=1.1), Grid.square(103), **keep),
-    "slow": lambda **keep: pendmap.basins(_SLOW, Grid.square(163), **keep),
-    "map": lambda **keep: pendmap.parameter_map(Pendulum(), _WINDOW, starts=3, **keep),
-    "sweep": lambda **keep: pendmap.sweep(Pendulum(), {"p": (0.4, 1.6, 40)}, grid=16, **keep),
-    "plane": lambda **keep: pendmap.sweep(Pendulum(), _SMALL, grid=10, **keep),
-    "bifurcation": lambda **keep: pendmap.bifurcation(Pendulum(), {"p": (0.2, 2.0, 40)}, **keep),
-    "lifetime": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), starts=4000, **keep),
-    "list": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), *_STARTS, **keep),
+    "basins": functools.partial(pendmap.basins, _DRY, Grid.square(83)),
+    "chaos": functools.partial(pendmap.basins, Pendulum(p=1.5, omega=1.1), Grid.square(103)),
+    "slow": functools.partial(pendmap.basins, _SLOW, Grid.square(163)),
+    "map": functools.partial(pendmap.parameter_map, Pendulum(), _WINDOW, starts=3),
+    "sweep": functools.partial(pendmap.sweep, Pendulum(), {"p": (0.4, 1.6, 40)}, grid=16),
+    "plane": functools.partial(pendmap.sweep, Pendulum(), _SMALL, grid=10),
+    "bifurcation": functools.partial(pendmap.bifurcation, Pendulum(), {"p": (0.2, 2.0, 40)}),
+    "lifetime": functools.partial(pendmap.lifetime, Pendulum(p=1.7), starts=4000),
+    "list": functools.partial(pendmap.lifetime, Pendulum(p=1.7), *_STARTS),
 }
 """Analyses that are computed in tiles."""
 
@@ -51,14 +51,19 @@ CASES: dict[str, Callable[..., xr.Dataset]] = {
 @functools.cache
 def plain(name: str) -> xr.Dataset:
     """Return the result of one call, computed once in a process."""
-    return CASES[name]()
+    return case(name)
+
+
+def case(name: str, **keep: Any) -> xr.Dataset:  # noqa: ANN401 (of a run)
+    """Compute a case in a run with these options."""
+    return CASES[name](run=RunOptions(**keep))
 
 
 class StoppedError(Exception):
     """A run that is stopped by its progress."""
 
 
-def begun(run: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
+def begun(analysis: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
     """Begin a run in a store, and stop it at a share of its work, when a tile is kept."""
     part = str(store) if "://" in str(store) else f"{str(store).rstrip('/')}.part"
     system, folder = fsspec.core.url_to_fs(part)
@@ -71,7 +76,7 @@ def begun(run: Callable[..., Any], store: Path | str, share: float = 0.5, **keep
                 raise StoppedError
 
     with pytest.raises(StoppedError):
-        run(store=store, progress=stop, **keep)
+        analysis(run=RunOptions(store=store, progress=stop, **keep))
 
 
 def small_tiles() -> None:
@@ -111,5 +116,5 @@ if __name__ == "__main__":
     small_tiles()
     writes = [0]
     stopped(fault, int(at), place, writes)
-    CASES[name](store=place, resume=True)
+    case(name, store=place, resume=True)
     sys.stdout.write(f"{writes[0]}\n")

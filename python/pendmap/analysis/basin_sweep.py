@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from pendmap.analysis.basins import choices_of
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
-from pendmap.analysis.stored import Kept
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.sweeps import report
 from pendmap.analysis.sweeps.branches import branches
 from pendmap.analysis.sweeps.table import sweep_dataset
@@ -25,14 +25,12 @@ from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.along import Varied
-    from pendmap.analysis.numerics import Progress
     from pendmap.analysis.sweeps.table import Numbers
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
@@ -88,14 +86,8 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     tol: float = 1e-6,
     max_periods: int | None = None,
     layer_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
     check: bool = True,
-    store: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    chunks: Any = None,  # noqa: ANN401 (of xarray)
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Map the basins of attraction along one or two parameters, and match the attractors.
 
@@ -123,13 +115,13 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         result is the same for both directions, its coordinates rise.
     grid : Grid or int, optional
         As for :func:`pendmap.basins`, a whole number too; by default 100 cells on each side.
-    tol, max_periods, layer_periods, seed, threads
-        As for :func:`pendmap.basins`; blocks are computed at once on the threads.
+    tol, max_periods, layer_periods
+        As for :func:`pendmap.basins`.
     check : bool
         Whether to check a sample of the labels of the first map of each block with half the step
         and mirrored.
-    store, resume, executor, chunks, progress
-        As for :func:`pendmap.basins`; tiles are blocks.
+    run : RunOptions, optional
+        As for :func:`pendmap.basins`; tiles are blocks, computed at once on the threads.
 
     Returns
     -------
@@ -175,17 +167,13 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     bare, units = without_dimensions(pendulum)
     axes = varied.varied(pendulum, ranges, len(ranges))
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    kept = Kept(store, resume, executor, chunks)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run)
+    numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
-    workers = numerics.workers or _core.default_threads()
-    job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices, workers)
-    if executor is None:
-        job = job.on_threads(workers)
-    else:
-        job = job.on_threads(kept.threads(threads) or 1)
+    job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices)
+    job = job.on(*run.tiles(job.blocks))
     models = math.prod(job.shape)
-    if store is None:
+    if run.store is None:
         _core.reckon("starts", models * grid.cells, _BYTES)
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
@@ -218,15 +206,13 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         return dataset, ["label"]
 
     request = {
+        **numerics.request,
         "ranges": varied.requested(axes, ranges),
         "grid": grid,
-        "tol": numerics.tol,
-        "max_periods": numerics.max_periods,
         "layer_periods": layer_periods,
-        "seed": numerics.seed,
         "check": check,
     }
-    return kept.complete("sweep", pendulum, request, job, compute, progress)
+    return run.complete("sweep", pendulum, request, job, compute)
 
 
 def _layout(job: SweepTiles, axes: Sequence[Varied], grid: Grid) -> Layout:

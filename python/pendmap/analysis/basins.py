@@ -16,7 +16,7 @@ from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.result import Field, Found, Schema, none_below_0, variable
-from pendmap.analysis.stored import Kept
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import summarise
 from pendmap.engine import Work
 from pendmap.errors import MOST_PERIODS, check_flag
@@ -25,13 +25,11 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, VELOCITY
 
 if TYPE_CHECKING:
-    import os
     from types import SimpleNamespace
 
     from numpy.typing import ArrayLike
 
     from pendmap import _core
-    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
@@ -133,15 +131,9 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     tol: float = 1e-6,
     max_periods: int | None = None,
     layer_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
     check: bool = True,
     draws: int | None = None,
-    store: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    chunks: Any = None,  # noqa: ANN401 (of xarray)
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Compute the basins of attraction: the attractor on which each initial condition ends.
 
@@ -174,32 +166,15 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     layer_periods : int, optional
         Periods of the finite-time layers; by default those in which an exponent stretches one cell
         to the size of the plane.
-    threads : int, optional
-        Number of threads; by default one per processor. The result does not depend on it.
-    seed : int
-        Shifts the samples of starts, and draws the models of ``draws``.
     check : bool
         Whether to check labels of a sample with half the step and mirrored, and to measure the
         share of starts whose label changes nearby.
     draws : int, optional
-        Number of models drawn from the ``[covariance]`` of the model with ``seed``: the uncertainty
-        of the result. Each is mapped too, for the probability of each outcome in each cell.
-    store : str or path, optional
-        A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the map is
-        computed in tiles of about 2^20 starts, and each is stored as it is done. The result reads
-        its cells when they are used. A path holds an earlier result until the new one is complete,
-        which is at the path with ``.part`` until then; elsewhere an earlier result is removed.
-    resume : bool
-        Whether to go on with the store of a run that was stopped; the result is the same, bit for
-        bit. A store that another request began is refused.
-    executor : optional
-        Computes the tiles: a Dask client or any executor of :mod:`concurrent.futures`, like those
-        of joblib, mpi4py and submitit. Each tile has one thread unless ``threads`` says otherwise.
-    chunks : optional
-        As for :func:`xarray.open_zarr`: the result of a store has arrays of Dask, ``{}`` with the
-        tiles as chunks.
-    progress : callable, optional
-        Called repeatedly with the units of work done and in total.
+        Number of models drawn from the ``[covariance]`` of the model: the uncertainty of the
+        result. Each is mapped too, for the probability of each outcome in each cell.
+    run : RunOptions, optional
+        Threads, seed, progress, the store of the tiles and who computes them
+        (:class:`pendmap.RunOptions`); tiles are of about 2^20 starts.
 
     Returns
     -------
@@ -247,25 +222,20 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    kept = Kept(store, resume, executor, chunks)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run)
+    numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     if draws is not None:
-        kept.refuse("draws")
-        several = drawn(pendulum, draws, seed, progress)
+        several = drawn(pendulum, draws, run)
         same = partial(
-            basins,
-            grid=grid,
-            layer_periods=layer_periods,
-            **numerics.options,
+            basins, grid=grid, tol=tol, max_periods=max_periods, layer_periods=layer_periods
         )
-        own = same(pendulum, check=check, progress=several.first)
-        return basins_over(own, several, partial(same, check=False))
+        first = same(pendulum, check=check, run=several.first)
+        return basins_over(first, several, partial(same, check=False))
     starts_of = Starts(grid.bare(units))
-    cells = tile_of(grid.cells, TILE) if kept.tiled else None
-    rate = units.given(1.0, RATE)
-    of_tile = kept.threads(threads)
-    job = BasinTiles(bare, starts_of, choices, rate, cells, threads=of_tile)
+    cells = tile_of(grid.cells, TILE) if run.tiled else None
+    rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
+    job = BasinTiles(bare, starts_of, choices, rate, cells, threads=threads)
     angle, speed = grid.theta, grid.velocity
     said = f"initial velocity {units.derivative}"
 
@@ -282,14 +252,12 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         return _complete(dataset, raw, pendulum, numerics), [*cells]
 
     request = {
+        **numerics.request,
         "grid": grid,
-        "tol": numerics.tol,
-        "max_periods": numerics.max_periods,
         "layer_periods": layer_periods,
-        "seed": numerics.seed,
         "check": check,
     }
-    return kept.complete("basins", pendulum, request, job, compute, progress)
+    return run.complete("basins", pendulum, request, job, compute)
 
 
 def basins_of(  # noqa: PLR0913 (as for basins)
@@ -300,10 +268,8 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     tol: float = 1e-6,
     max_periods: int | None = None,
     layer_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
     check: bool = True,
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Find the attractor on which each start of a list ends.
 
@@ -313,7 +279,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
         The model; as for :func:`basins`.
     theta, velocity : array_like, shape (N,)
         Angles in rad and velocities at ``tau = 0``.
-    tol, max_periods, layer_periods, threads, seed, check, progress
+    tol, max_periods, layer_periods, check, run
         As for :func:`basins`.
 
     Returns
@@ -335,12 +301,15 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     array([1, 1], dtype=int16)
     """
     bare, units = without_dimensions(pendulum)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run).in_memory("a list of starts")
+    numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     angles, speeds = starts(theta, velocity)
     states = Starts(None, angles, units.bare(speeds, VELOCITY))
     job = BasinTiles(bare, states, choices, units.given(1.0, RATE))
-    return ends_of_list(job, Work(job, progress=progress), speeds, pendulum, numerics, check=check)
+    return ends_of_list(
+        job, Work(job, progress=run.progress), speeds, pendulum, numerics, check=check
+    )
 
 
 def ends_of_list(  # noqa: PLR0913 (the parts of a map)

@@ -9,12 +9,11 @@ import numpy as np
 import xarray as xr
 from scipy.ndimage import find_objects, label
 
-from pendmap import _core
 from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, matched
 from pendmap.analysis.result import Field, Schema, point, rows, summarised, variable
-from pendmap.analysis.stored import Kept
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.errors import InputError, check_number, core_errors, short_repr
@@ -24,14 +23,13 @@ from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap import _core
     from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
-    from pendmap.analysis.numerics import Progress
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Mask
@@ -73,13 +71,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
-    store: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    chunks: Any = None,  # noqa: ANN401 (of xarray)
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Compute the stroboscopic points of the attractors against one parameter.
 
@@ -103,10 +95,10 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
-    starts, box, tol, max_periods, threads, seed
+    starts, box, tol, max_periods
         As for :func:`pendmap.parameter_map`.
-    store, resume, executor, chunks, progress
-        As for :func:`pendmap.parameter_map`; tiles are 16 values.
+    run : RunOptions, optional
+        As for :func:`pendmap.basins`; tiles are 16 values.
 
     Returns
     -------
@@ -136,8 +128,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     (axis,) = varied.varied(pendulum, ranges, 1)
-    kept = Kept(store, resume, executor, chunks)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run)
+    numerics = Numerics(run, tol, max_periods)
     search = cell_search.CellSearch(starts, box, numerics)
     first = None
     if start is not None:
@@ -145,17 +137,13 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
             raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
-    initial = search.initial(units)
-    job = SurveyTiles(bare, (axis.kernel,), initial, *kept.threads_of_tiles(numerics))
+    limits = (numerics.tol, numerics.max_periods)
+    job = SurveyTiles(bare, (axis.kernel,), search.initial(units), limits)
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
         with core_errors():
-            if kept.tiled:
-                survey, blocks = job.run(work)
-                raw = survey.diagram(blocks, first)
-            else:
-                limits = numerics.limits
-                raw = _core.bifurcation(bare, axis.kernel, *initial, first, *limits, progress)
+            survey, blocks = job.run(work, run)
+            raw = survey.diagram(blocks, first)
         dataset = _dataset(raw, axis, units)
         values = {
             **search.attributes(raw, units),
@@ -170,7 +158,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         return dataset, []
 
     request = {"ranges": varied.requested([axis], ranges), "start": start, **search.request}
-    return kept.complete("bifurcation", pendulum, request, job, compute, progress)
+    return run.complete("bifurcation", pendulum, request, job, compute)
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:

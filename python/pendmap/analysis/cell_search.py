@@ -69,9 +69,7 @@ class CellSearch:
     @property
     def request(self) -> dict[str, Any]:
         """The arguments that determine the search."""
-        numerics = self.numerics
-        choices = {"tol": numerics.tol, "max_periods": numerics.max_periods, "seed": numerics.seed}
-        return {"starts": self.starts, "box": self.box, **choices}
+        return {"starts": self.starts, "box": self.box, **self.numerics.request}
 
     def within(self, units: Units) -> Grid:
         """Return the box, in these units; by default that of :func:`pendmap.basins`."""
@@ -79,7 +77,7 @@ class CellSearch:
 
     def initial(self, units: Units) -> tuple[Floats, Floats, int]:
         """Return initial conditions without dimensions, and how many of them each cell takes."""
-        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.seed)
+        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.run.seed)
         return theta, units.bare(velocity, VELOCITY), self.starts
 
     def attributes(self, raw: _core.ParameterMap, units: Units) -> dict[str, Any]:

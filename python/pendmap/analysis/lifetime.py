@@ -18,7 +18,7 @@ from pendmap.analysis.lifetime_summary import summary_of, summary_of_draws
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.orbit_table import chaotic
 from pendmap.analysis.result import Field, Found, Schema, flag, variable
-from pendmap.analysis.stored import Kept
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.files import facts
@@ -26,13 +26,10 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    import os
-
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.analysis.draws import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
 
@@ -119,14 +116,8 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     from_period: int | None = None,
     max_periods: int | None = None,
     tol: float = 1e-6,
-    threads: int | None = None,
-    seed: int = 0,
     draws: int | None = None,
-    store: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    chunks: Any = None,  # noqa: ANN401 (of xarray)
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Estimate the mean lifetime of transient chaos from the exponential tail of capture times.
 
@@ -155,11 +146,9 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     from_period : int, optional
         Period at which the exponential tail begins; by default twice the earliest from which two
         tests (of a Weibull shape, and of a rate that changes) find it exponential.
-    seed : int
-        Draws the starts, and the models of ``draws``.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the interval of the mean lifetime.
-    max_periods, tol, threads, store, resume, executor, chunks, progress
+    max_periods, tol, run
         As for :func:`pendmap.basins`.
 
     Returns
@@ -194,29 +183,26 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
-    kept = Kept(store, resume, executor, chunks)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run)
+    numerics = Numerics(run, tol, max_periods)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")
     if draws is not None:
-        kept.refuse("draws")
-        several = drawn(pendulum, draws, seed, progress)
-        same = partial(lifetime, from_period=from_period, **numerics.options)
-        own = same(pendulum, theta, velocity, starts=starts, progress=several.first)
-        again = partial(same, theta=own["start_theta"], velocity=own["start_velocity"])
-        return lifetime_over(own, several, again)
+        several = drawn(pendulum, draws, run)
+        same = partial(lifetime, from_period=from_period, tol=tol, max_periods=max_periods)
+        first = same(pendulum, theta, velocity, starts=starts, run=several.first)
+        again = partial(same, theta=first["start_theta"], velocity=first["start_velocity"])
+        return lifetime_over(first, several, again)
     request: dict[str, Any] = {
+        **numerics.request,
         "starts": starts,
         "from_period": from_period,
-        "tol": numerics.tol,
-        "max_periods": numerics.max_periods,
-        "seed": numerics.seed,
         "theta": None,
         "velocity": None,
     }
     window = ""
     if theta is None or velocity is None:
-        draw = np.random.default_rng(numerics.seed)
+        draw = np.random.default_rng(run.seed)
         reach = units.given(FASTEST, VELOCITY)
         theta = draw.uniform(-math.pi, math.pi, starts)
         velocity = draw.uniform(-reach, reach, starts)
@@ -226,15 +212,15 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         request |= {"theta": angles, "velocity": speeds}
     states = Starts(None, angles, units.bare(speeds, VELOCITY))
     choices = choices_of(numerics, None, check=False)
-    cells = tile_of(angles.size, TILE) if kept.tiled else None
-    rate, of_tile = units.given(1.0, RATE), kept.threads(threads)
-    job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=of_tile)
+    cells = tile_of(angles.size, TILE) if run.tiled else None
+    rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
+    job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=threads)
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
         found = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
         return _complete(found, pendulum, numerics, from_period, window), []
 
-    return kept.complete("lifetime", pendulum, request, job, compute, progress)
+    return run.complete("lifetime", pendulum, request, job, compute)
 
 
 def _complete(
@@ -257,7 +243,7 @@ def _complete(
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = survival.growth_on_saddle(found, fitted, bare, numerics.threads)
+    saddle = survival.growth_on_saddle(found, fitted, bare, numerics.run.workers)
     dataset = found.drop_dims("start").assign(
         {
             **_curves(found, times, censored, bound),
@@ -365,7 +351,7 @@ def _measures(
     }
 
 
-def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+def lifetime_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return a lifetime with the lifetimes of D draws from the same starts.
 
     Adds ``drawn_mean_periods`` and ``drawn_stderr`` (D), nan without transient chaos,
@@ -373,7 +359,7 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
     ``transient_share`` and ``persistent_share``.
     """
-    rows = [[float(one[key]) for key in _DRAWN] for one in draws.each(run)]
+    rows = [[float(one[key]) for key in _DRAWN] for one in draws.each(analysis)]
     mean, error, transient, persistent = np.array(rows).T
     _, _, low, high = interval(mean)
     lives, share = "mean lifetime of transient chaos", "share of the draws that"

@@ -12,6 +12,7 @@ from pendmap import _core
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised, variable
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.files import facts
@@ -20,7 +21,6 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
@@ -90,9 +90,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     precision: float = 1e-3,
     tol: float = 1e-6,
     max_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Compute the largest Lyapunov exponent of the attractor that a start reaches.
 
@@ -122,9 +120,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         Periods within which an attractor must capture the start, and for which each trajectory of
         an ensemble is followed at most; by default 4000, more where damping is small, and 20,000
         (without damping 2000).
-    seed : int
-        Chooses the trajectories on a chaotic attractor.
-    tol, threads, progress
+    tol, run
         As for :func:`pendmap.basins`.
 
     Returns
@@ -168,11 +164,12 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(
             f"precision must be a number above 0, up to {_MOST_PRECISION}, got {precision:g}"
         )
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run).in_memory("lyapunov")
+    numerics = Numerics(run, tol, max_periods)
     choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
-        raw = _core.lyapunov(bare, start, choices, progress)
+        raw = _core.lyapunov(bare, start, choices, run.progress)
     found, members = raw.attractor, raw.ensemble
     growth = np.empty((0, 0)) if members is None else members.growth
     exponent, stderr, regular = _value(raw, bare.period)

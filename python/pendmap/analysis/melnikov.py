@@ -15,6 +15,7 @@ from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Found, Schema, summarised, variable
+from pendmap.analysis.run import RunOptions
 from pendmap.errors import InputError, core_errors
 from pendmap.model import without_dimensions
 
@@ -161,7 +162,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         },
     )
     values = {
-        **Numerics().provenance(),
+        **Numerics(RunOptions()).provenance(),
         "own_p": bare.p,
         "own_omega": bare.omega,
         "p_melnikov": first,

@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from pendmap import _core
-from pendmap.errors import (
-    MOST_PERIODS,
-    MOST_SEED,
-    MOST_THREADS,
-    check_callable,
-    check_number,
-    check_whole,
-    instruction_set,
-)
+from pendmap.errors import MOST_PERIODS, check_number, check_whole, instruction_set
 from pendmap.files.dataset import FORMAT_VERSION
 
-Progress = Callable[[int, int], object]  # Called with units of work done and in total
+if TYPE_CHECKING:
+    from pendmap.analysis.run import RunOptions
 
-_STEPS = 10_000  # Number of progress steps of a part of a computation
 TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
 
 class Choices(TypedDict):
-    """Numerical choices as keyword arguments of analyses, or as passed to the core."""
+    """Numerical choices as passed to the core."""
 
     tol: float
     max_periods: int | None
-    threads: Any  # None for one per processor, 0 in the core
+    threads: int
     seed: int
 
 
@@ -38,47 +29,30 @@ class Choices(TypedDict):
 class Numerics:
     """Numerical choices of an analysis, checked on construction."""
 
+    run: RunOptions
     tol: float = TOL
     max_periods: int | None = None
-    threads: int | None = None
-    seed: int = 0
-    progress: Progress | None = None
     began: float = dataclasses.field(default_factory=time.perf_counter, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_number("tol", self.tol))
-        for name, least, most in (
-            ("max_periods", 1, MOST_PERIODS),
-            ("threads", 1, MOST_THREADS),
-            ("seed", 0, MOST_SEED),
-        ):
-            object.__setattr__(self, name, optional_whole(name, getattr(self, name), least, most))
-        check_callable("progress", self.progress)
+        bound = optional_whole("max_periods", self.max_periods, 1, MOST_PERIODS)
+        object.__setattr__(self, "max_periods", bound)
 
     @property
-    def workers(self) -> int:
-        """Number of threads as passed to the core: 0 for one per processor."""
-        return self.threads or 0
-
-    @property
-    def options(self) -> Choices:
-        """The choices as keyword arguments of another analysis."""
-        return {
-            "tol": self.tol,
-            "max_periods": self.max_periods,
-            "threads": self.threads,
-            "seed": self.seed,
-        }
+    def request(self) -> dict[str, Any]:
+        """The choices that determine numbers of a result."""
+        return {"tol": self.tol, "max_periods": self.max_periods, "seed": self.run.seed}
 
     @property
     def core(self) -> Choices:
         """The choices as passed to the core."""
-        return {**self.options, "threads": self.workers}
-
-    @property
-    def limits(self) -> tuple[float, int | None, int]:
-        """Tolerance, largest number of periods and threads, as passed to the core."""
-        return self.tol, self.max_periods, self.workers
+        return {
+            "tol": self.tol,
+            "max_periods": self.max_periods,
+            "threads": self.run.workers,
+            "seed": self.run.seed,
+        }
 
     def provenance(self) -> dict[str, Any]:
         """Return attributes on how a result was computed, with the time since ``began``."""
@@ -86,45 +60,11 @@ class Numerics:
             "tol": self.tol,
             "seconds": time.perf_counter() - self.began,
             "simd": instruction_set(),
-            "threads": self.workers or _core.default_threads(),
-            "seed": self.seed,
+            "threads": self.run.here,
+            "seed": self.run.seed,
             "pendmap_version": _core.__version__,
             "format_version": FORMAT_VERSION,
         }
-
-
-def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
-    """Return the progress of one of ``parts`` equal parts of a computation; it never falls."""
-    if progress is None:
-        return None
-    furthest = 0.0
-
-    def report(done: int, total: int) -> None:
-        nonlocal furthest
-        furthest = max(furthest, done / max(total, 1))
-        progress(round(_STEPS * (number + furthest)), _STEPS * parts)
-
-    return report
-
-
-def in_rounds(progress: Progress | None, typical: int) -> Progress | None:
-    """Return the progress of rounds whose number is not known: it rises with each, and never falls.
-
-    A round begins where the work done does not rise. After k rounds the share is k / (k +
-    ``typical``).
-    """
-    if progress is None:
-        return None
-    rounds, last = 0, 0
-
-    def report(done: int, total: int) -> None:
-        nonlocal rounds, last
-        rounds += done <= last
-        last = done
-        passed = rounds + done / max(total, 1)
-        progress(round(_STEPS * passed / (passed + typical)), _STEPS)
-
-    return report
 
 
 def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:

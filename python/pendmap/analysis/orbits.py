@@ -16,6 +16,7 @@ from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, named_alike, objects, points_of, table
 from pendmap.analysis.result import Field, Schema, flag, records, summarised, variable
+from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
 from pendmap.formatting import counted, with_error
@@ -23,8 +24,7 @@ from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from pendmap.analysis.draws import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.model import Pendulum, Rig
 
 
@@ -85,10 +85,8 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     w: int = 0,
     grid: Grid | None = None,
     *,
-    threads: int | None = None,
     draws: int | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Find all periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
 
@@ -117,9 +115,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws : int, optional
         As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
         and are stable.
-    seed : int
-        Draws the models of ``draws``.
-    threads, progress
+    run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
     Returns
@@ -145,16 +141,17 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
-    numerics = Numerics(threads=threads, seed=seed, progress=progress)
+    run = RunOptions.of(run).in_memory("orbit")
+    numerics = Numerics(run)
     grid = window(pendulum, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
     if draws is not None:
-        several = drawn(pendulum, draws, seed, progress)
-        same = partial(orbit, n=n, w=w, grid=grid, threads=threads)
-        return orbits_over(same(pendulum, progress=several.first), several, same)
+        several = drawn(pendulum, draws, run)
+        same = partial(orbit, n=n, w=w, grid=grid)
+        return orbits_over(same(pendulum, run=several.first), several, same)
     with core_errors():
         box = grid.bare(units)
-        raw = _core.orbits(bare, (n, w), *box, numerics.workers, progress)
+        raw = _core.orbits(bare, (n, w), *box, run.workers, run.progress)
         paths = _paths(bare, raw.orbits, units)
     found = raw.orbits
     residual = np.array([o.residual for o in found], dtype=float)
@@ -249,7 +246,7 @@ def _written(value: complex) -> str:
     return f"{value.real:.6g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.6g} i"
 
 
-def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+def orbits_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return K closed orbits with statistics of the orbits of D draws.
 
     Orbits are matched by name, and among those of one name by their points. Of each the point and
@@ -266,7 +263,7 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
     there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
     others = 0
-    for d, one in enumerate(draws.each(run)):
+    for d, one in enumerate(draws.each(analysis)):
         theirs = points_of(one, "orbit")
         alike = [orbit.plain for orbit in attractors_of(one)]
         for j, k in enumerate(named_alike(names, points, alike, theirs)):

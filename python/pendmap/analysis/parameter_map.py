@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from pendmap import _core
 from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.numerics import part as progress_part
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
-from pendmap.analysis.stored import Kept
+from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.analysis.tongues import tongues
@@ -26,15 +24,14 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap import _core
     from pendmap.analysis.along import Varied
-    from pendmap.analysis.draws import Draws, Run
+    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.analysis.grid import Grid
-    from pendmap.analysis.numerics import Progress
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
@@ -103,15 +100,9 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,
-    threads: int | None = None,
-    seed: int = 0,
     curves: bool = False,
     draws: int | None = None,
-    store: str | os.PathLike[str] | None = None,
-    resume: bool = False,
-    executor: Any = None,  # noqa: ANN401 (the protocol of concurrent.futures)
-    chunks: Any = None,  # noqa: ANN401 (of xarray)
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Find the set of attractors in every cell of a plane of two parameters.
 
@@ -154,14 +145,12 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     max_periods : int, optional
         Periods before the four windows of trajectories not captured; by default those in which
         damping shrinks a free motion by exp(-40), at least 64.
-    seed : int
-        Shifts the initial conditions, and draws the models of ``draws``.
     curves : bool
         Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
         ``omega`` (or ``Omega``): figures draw them over the map.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell.
-    threads, store, resume, executor, chunks, progress
+    run : RunOptions, optional
         As for :func:`pendmap.basins`; tiles are blocks of 16 x 16 cells.
 
     Returns
@@ -198,31 +187,32 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     columns, rows = varied.varied(pendulum, ranges, 2)
-    kept = Kept(store, resume, executor, chunks)
-    numerics = Numerics(tol, max_periods, threads, seed, progress)
+    run = RunOptions.of(run)
+    numerics = Numerics(run, tol, max_periods)
     search = cell_search.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)
     if draws is not None:
-        kept.refuse("draws")
-        several = drawn(pendulum, draws, seed, progress)
-        box = search.within(units)
-        same = partial(parameter_map, ranges=ranges, starts=starts, box=box, **numerics.options)
-        own = same(pendulum, curves=curves, progress=several.first)
-        return regimes_over(own, several, same)
+        several = drawn(pendulum, draws, run)
+        same = partial(
+            parameter_map,
+            ranges=ranges,
+            starts=starts,
+            box=search.within(units),
+            tol=tol,
+            max_periods=max_periods,
+        )
+        return regimes_over(same(pendulum, curves=curves, run=several.first), several, same)
     over: dict[str, Any] = {}
     if curves:
-        over = _curves(pendulum, columns, rows, progress_part(progress, 0, 2))
-        progress = progress_part(progress, 1, 2)
+        over = _curves(pendulum, columns, rows, run.part(0, 2))
+        run = run.part(1, 2)
     axes, initial = (columns.kernel, rows.kernel), search.initial(units)
-    job = SurveyTiles(bare, axes, initial, *kept.threads_of_tiles(numerics))
+    job = SurveyTiles(bare, axes, initial, (numerics.tol, numerics.max_periods))
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
         with core_errors():
-            if kept.tiled:
-                survey, blocks = job.run(work)
-                raw = survey.result(blocks)
-            else:
-                raw = _core.parameter_map(bare, axes, *initial, *numerics.limits, progress)
+            survey, blocks = job.run(work, run)
+            raw = survey.result(blocks)
         dataset = _dataset(raw, (columns, rows), units).assign(over)
         values = {
             **search.attributes(raw, units),
@@ -243,7 +233,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         **search.request,
         "curves": curves,
     }
-    return kept.complete("parameter_map", pendulum, request, job, compute, progress)
+    return run.complete("parameter_map", pendulum, request, job, compute)
 
 
 def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
@@ -292,7 +282,7 @@ def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units)
 
 
 def _curves(
-    model: Pendulum | Rig, columns: Varied, rows: Varied, progress: Progress | None
+    model: Pendulum | Rig, columns: Varied, rows: Varied, run: RunOptions
 ) -> dict[str, Any]:
     """Return the critical curves between the ends of the axes."""
     axes = (columns, rows)
@@ -308,7 +298,7 @@ def _curves(
     low, high = omega.bare[0] - half, omega.bare[-1] + half
     p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    found = tongues(model, frequency, p_max, inverted=False, refine=True, progress=progress)
+    found = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
     scale, sought = omega.values[-1] / omega.bare[-1], found["fold_sought"]
     return {
         "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
@@ -359,7 +349,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     return lines
 
 
-def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+def regimes_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return a map of M x N cells with the regimes of D draws of the other parameters.
 
     Adds, over ``outcome``, all regimes: ``outcome_has`` (as ``regime_has``), ``probability``
@@ -372,7 +362,7 @@ def regimes_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     counts: dict[tuple[str, ...], np.ndarray] = {}
     shares: list[dict[tuple[str, ...], float]] = []
     ranks: dict[str, tuple[int, ...]] = {}
-    for one in draws.each(run):
+    for one in draws.each(analysis):
         ranks |= {kind.pair: kind.rank for kind in attractors_of(one, "kind_")}
         own = [tuple(kinds) for kinds in sets(one)]
         shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))

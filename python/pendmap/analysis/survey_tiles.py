@@ -17,6 +17,7 @@ from pendmap.engine import Tile
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
+    from pendmap.analysis.run import RunOptions
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum
     from pendmap.signal import Floats
@@ -33,15 +34,19 @@ class SurveyTiles:
     pendulum: Pendulum
     axes: tuple[list[tuple[str, list[float]]], ...]
     initial: tuple[Floats, Floats, int]
-    limits: tuple[float, int | None, int]
-    """Tolerance, bound and threads as passed to the core: a block has one thread."""
-    at_once: int
+    limits: tuple[float, int | None]
+    """Tolerance and bound as passed to the core."""
+    threads: int = 1
+    """Threads of a block."""
+    at_once: int = 1
     """Number of blocks that this process computes at once."""
 
     def survey(self, state: bytes | None) -> _core.Survey:
         """Return the survey whose steps ``state`` has, or measure them."""
         with core_errors():
-            return _core.Survey(self.pendulum, self.axes, *self.initial, *self.limits, state)
+            return _core.Survey(
+                self.pendulum, self.axes, *self.initial, *self.limits, self.threads, state
+            )
 
     def inputs(self, store: Store, step: str, tile: int) -> dict[int, bytes]:
         """Return what the step before has found in a block and in those around it."""
@@ -68,10 +73,12 @@ class SurveyTiles:
             gained = survey.gained(number, tile, found or inputs[tile])
         return Tile(_GAINED[gained] + (found or b""))
 
-    def run(self, work: Work) -> tuple[_core.Survey, list[bytes]]:
+    def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
         """Compute the blocks that are missing; return the survey and the last result of each."""
         state = work.once("survey", lambda: self.survey(None).state)
         survey = self.survey(state)
+        threads, at_once = run.tiles(survey.blocks)
+        work.job = dataclasses.replace(self, threads=threads, at_once=at_once)
         every = range(survey.blocks)
         for _ in work.each(_SEARCH, "survey", every):
             pass

@@ -155,7 +155,7 @@ def growth_on_saddle(
     found: xr.Dataset,
     fitted: Tail | None,
     pendulum: Pendulum,
-    threads: int | None,
+    threads: int,
 ) -> tuple[float, float, int]:
     """Return exponent per period of starts before capture, its standard error, their number."""
     none = math.nan, math.nan, 0
@@ -180,7 +180,7 @@ def growth_on_saddle(
         int(end.max()),
         1,
         int(found.attrs["steps_per_period"]),
-        threads or 0,
+        threads,
     )
     each = np.arange(growth.shape[1])
     mine = (each >= _ALIGNED) & (each < end[:, None])

@@ -14,8 +14,9 @@ from pendmap.analysis import critical_curves, result
 from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
-from pendmap.analysis.numerics import Numerics, in_rounds
+from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
+from pendmap.analysis.run import RunOptions, in_rounds
 from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts
@@ -26,8 +27,7 @@ from pendmap.units import RATE
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from pendmap.analysis.draws import Draws, Run
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Mask
 
@@ -117,10 +117,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     plane: str = "omega-p",
     inverted: bool = True,
     refine: bool = False,
-    threads: int | None = None,
     draws: int | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> xr.Dataset:
     """Compute the critical curves of rest, exact, with folds and asymptotic curves.
 
@@ -162,9 +160,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         figures.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the band of each critical amplitude.
-    seed : int
-        Draws the models of ``draws``.
-    threads, progress
+    run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
     Returns
@@ -204,7 +200,8 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
             omega = 1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count))
     asked = grids.frequencies(omega)
     p_max = check_number("p_max", p_max)
-    numerics = Numerics(threads=threads, seed=seed, progress=progress)
+    run = RunOptions.of(run).in_memory("tongues")
+    numerics = Numerics(run)
     if plane not in PLANES:
         raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
     refine, inverted = check_flag("refine", refine), check_flag("inverted", inverted)
@@ -214,10 +211,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
             "the drive, and it never loses its stability"
         )
     if draws is not None:
-        several = drawn(pendulum, draws, seed, progress)
-        same = partial(tongues, p_max=p_max, inverted=inverted, threads=threads)
-        own = same(pendulum, asked, plane=plane, refine=refine, progress=several.first)
-        return tongues_over(own, several, partial(same, omega=own["omega"]))
+        several = drawn(pendulum, draws, run)
+        same = partial(tongues, p_max=p_max, inverted=inverted)
+        first = same(pendulum, asked, plane=plane, refine=refine, run=several.first)
+        return tongues_over(first, several, partial(same, omega=first["omega"]))
     frequencies, looked, (found, undamped, upright) = _solved(
         bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
@@ -267,10 +264,10 @@ def _solved(  # noqa: PLR0913 (as for tongues)
     """Return frequencies, where folds were sought, and rows: hanging, undamped, inverted rest."""
     free = dataclasses.replace(pendulum, gamma=0.0) if pendulum.gamma else None
 
-    moved = in_rounds(numerics.progress, _ROUNDS)
+    moved = in_rounds(numerics.run.progress, _ROUNDS)
 
     def solve(at: Floats, one: Pendulum, *, upright: bool, folds: bool = False) -> list[_Row]:
-        return _core.tongues(one, upright, at.tolist(), p_max, folds, numerics.workers, moved)
+        return _core.tongues(one, upright, at.tolist(), p_max, folds, numerics.run.workers, moved)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
         found = solve(at, pendulum, upright=False, folds=folds)
@@ -396,7 +393,7 @@ def _inverted(dataset: xr.Dataset, asked: Mask) -> list[str]:
     return [f"{rest} is stable at {count} of omega, {widest}."]
 
 
-def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+def tongues_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return K critical amplitudes with their 95 % bands over D draws.
 
     At each frequency ``Omega/w0`` the critical amplitudes of one multiplier are counted from the
@@ -406,7 +403,9 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     (D, parameter).
     """
     tables = _TABLES.values()
-    every = [{table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(run)]
+    every = [
+        {table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(analysis)
+    ]
     found = dataset
     for table, prefix in tables:
         mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]

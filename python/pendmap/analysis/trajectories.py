@@ -10,6 +10,7 @@ from pendmap import _core
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.result import variable
+from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_PERIODS, InputError, check_number, check_whole, core_errors
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.analysis.numerics import Progress
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
     from pendmap.units import Units
@@ -100,8 +100,7 @@ def advance(  # noqa: PLR0913
     *,
     tol: float = 1e-6,
     steps_per_period: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    run: RunOptions | None = None,
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Advance many starts by the same number of periods.
 
@@ -115,7 +114,7 @@ def advance(  # noqa: PLR0913
         Forcing periods (of ``2 pi`` where p = 0); 0 or more.
     steps_per_period : int, optional
         Steps a period; by default chosen by ``tol``.
-    tol, threads, progress
+    tol, run
         As for :func:`pendmap.basins`.
 
     Returns
@@ -139,7 +138,8 @@ def advance(  # noqa: PLR0913
     (array([1.318]), array([-0.27]))
     """
     pendulum, units = without_dimensions(pendulum)
-    numerics = Numerics(tol, threads=threads, progress=progress)
+    run = RunOptions.of(run).in_memory("advance")
+    numerics = Numerics(run, tol)
     angles, speeds = starts(theta, velocity)
     speeds = units.bare(speeds, VELOCITY)
     periods = check_whole("periods", periods, 0, MOST_PERIODS)
@@ -150,6 +150,6 @@ def advance(  # noqa: PLR0913
             sample = angles[::every].copy(), speeds[::every].copy()
             steps, _ = _core.choose_steps(pendulum, *sample, numerics.tol)
         end, speed, turns = _core.advance(
-            pendulum, angles, speeds, periods, steps, numerics.workers, progress
+            pendulum, angles, speeds, periods, steps, run.workers, run.progress
         )
     return end, units.given(speed, VELOCITY), turns

@@ -52,20 +52,25 @@ def analysis_command(
 
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
-            engine = [given.pop(key, None) for key in ("resume", "workers", "scheduler")]
-            pendulum, outputs = begin(given, name, going_on=bool(engine[0]))
+            resume, *workers = (given.pop(key, None) for key in ("resume", "workers", "scheduler"))
+            chosen = {key: given.pop(key) for key in ("threads", "seed") if key in given}
+            pendulum, outputs = begin(given, name, going_on=bool(resume))
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
             store = outputs.store if stored else None
             if arguments.get("draws") and not isinstance(store, Address):
                 store = None  # draws are written when all are computed
-            with _workers(*engine[1:], quiet=outputs.quiet) as executor, made_here():
-                if stored:
-                    arguments |= {"store": store, "resume": engine[0], "executor": executor}
-                with outputs.progress(name) as progress:
-                    if "progress" in parameters(path):
-                        arguments["progress"] = progress
-                    dataset = getattr(module, function)(pendulum, **arguments)
+            with (
+                _workers(*workers, quiet=outputs.quiet) as executor,
+                made_here(),
+                outputs.progress(name) as progress,
+            ):
+                if runs:
+                    from pendmap.analysis.run import RunOptions
+
+                    kept = {"store": store, "resume": bool(resume), "executor": executor}
+                    arguments["run"] = RunOptions(progress=progress, **kept, **chosen)
+                dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)
             else:
@@ -73,10 +78,11 @@ def analysis_command(
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
         own = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
-        threads = [options_of(path, "threads")] if "threads" in parameters(path) else []
+        runs = "run" in parameters(path)
+        chosen = [options_of("analysis.run.RunOptions", "threads seed")] if runs else []
         kept = [store_options] if stored else []
         files = output_options(stored=stored)
-        decorate = added(model, *own, *kept, *threads, simd_option, files)
+        decorate = added(model, *own, *kept, *chosen, simd_option, files)
         return new_command(name, *examples, text=text)(decorate(run))
 
     return make

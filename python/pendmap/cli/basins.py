@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @analysis_command(
     "basins",
     window_options("-pi:pi:1000", "-3:3:1000, in SI times w0"),
-    "tol max_periods seed layer_periods draws",
+    "tol max_periods layer_periods draws",
     example="--draws 100",
     examples=(
         "pendmap basins --p 1.7",

@@ -17,7 +17,7 @@ from pendmap.cli.parse.types import NUMBER
     "bifurcation",
     option("--theta", NUMBER, "Angle from which both sweeps start, rad.", group=START),
     option("--velocity", NUMBER, "Velocity of that start, in SI rad/s.", group=START),
-    "starts tol max_periods seed",
+    "starts tol max_periods",
     examples=(
         "pendmap bifurcation --vary p 0.9:2:2000",
         "pendmap bifurcation --p 0.9:2:500 --theta-r 0.02 --out bifurcation.pdf",

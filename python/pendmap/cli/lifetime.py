@@ -9,7 +9,7 @@ from pendmap.cli.analysis import analysis_command
 
 @analysis_command(
     "lifetime",
-    "starts from_period max_periods tol seed draws",
+    "starts from_period max_periods tol draws",
     example="--from-period 50 --draws 100",
     examples=(
         "pendmap lifetime --p 1.7",

@@ -9,7 +9,7 @@ from pendmap.cli.analysis import analysis_command
 
 @analysis_command(
     "lyapunov",
-    "theta velocity precision tol max_periods seed",
+    "theta velocity precision tol max_periods",
     examples=(
         "pendmap lyapunov --preset fig2b",
         "pendmap lyapunov --p 1.7 --theta 2 --json",

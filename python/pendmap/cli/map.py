@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @analysis_command(
     "map",
-    "curves draws starts tol max_periods seed",
+    "curves draws starts tol max_periods",
     example="--curves",
     examples=(
         "pendmap map --p 0.05:2.5:50 --omega 0.5:3:50 --curves",

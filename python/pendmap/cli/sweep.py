@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @analysis_command(
     "sweep",
     window_options("-pi:pi:100", "-3:3:100, in SI times w0"),
-    "tol max_periods layer_periods seed",
+    "tol max_periods layer_periods",
     example="--layer-periods 10",
     examples=("pendmap sweep --p 0.5:1.7:25 --grid 60",),
     model=varied_model_options,

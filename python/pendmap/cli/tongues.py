@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
         group=group("Frequencies", "--omega 0.5:3:200"),
     ),
-    "p_max plane draws seed",
+    "p_max plane draws",
     example="--p-max 6 --plane e-alpha2",
     examples=(
         "pendmap tongues --omega 0.5:3:200 --p-max 6",

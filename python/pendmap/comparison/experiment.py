@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 import pandas as pd
 
-from pendmap.analysis.numerics import part
+from pendmap.analysis.run import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
 from pendmap.comparison.free import MODEL, RunComparison, compare_free
 from pendmap.errors import (

@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from pendmap.analysis.numerics import in_rounds
+from pendmap.analysis.run import in_rounds
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import compute_gap
 from pendmap.comparison.replay import Reasons, compute_part

@@ -164,7 +164,8 @@ class Work:
                 stack.callback(stop.set)  # before the pool waits for its threads
                 found = results(pool, lambda tile: (compute, tile), tiles)
             for tile, one in found:
-                self.store.write(tile, one.cells)
+                if one.cells:
+                    self.store.write(tile, one.cells)
                 self.store.put(f"{step}/{tile}", one.record)
                 yield tile, one.record
 

@@ -59,7 +59,7 @@ def test_uneven_values_of_parameters_are_mapped_where_they_are(tmp_path: Path) -
     diagram = pendmap.bifurcation(Pendulum(), {"p": np.geomspace(0.1, 0.8, 4)}, starts=4)
     assert diagram.p.values == pytest.approx(np.geomspace(0.1, 0.8, 4))
     place = tmp_path / "map.zarr"
-    stored = pendmap.parameter_map(Pendulum(), one, starts=4, store=place)
+    stored = pendmap.parameter_map(Pendulum(), one, starts=4, run=pendmap.RunOptions(store=place))
     assert stored.regime.equals(found.regime)
     with pytest.raises(InputError, match="p must be ascending or descending values"):
         pendmap.bifurcation(Pendulum(), {"p": [0.4, 0.2, 0.3]})
@@ -71,9 +71,11 @@ def test_falling_values_give_the_result_of_rising_ones(tmp_path: Path) -> None:
         found = functools.partial(getattr(pendmap, name), Pendulum(), starts=4)
         rising = found({"p": (0.3, 0.9, 4), **more})
         assert found({"p": (0.9, 0.3, 4), **more}).drop_attrs().equals(rising.drop_attrs())
-        listed = found({"p": np.array(values[::-1]), **more}, store=tmp_path / f"{name}.zarr")
+        run = pendmap.RunOptions(store=tmp_path / f"{name}.zarr")
+        listed = found({"p": np.array(values[::-1]), **more}, run=run)
         assert listed.p.values.tolist() == values
-        again = found({"p": values, **more}, store=tmp_path / f"{name}.zarr", resume=True)
+        run = dataclasses.replace(run, resume=True)
+        again = found({"p": values, **more}, run=run)
         assert again.drop_attrs().equals(listed.drop_attrs())
 
 
@@ -167,16 +169,20 @@ def test_an_axis_may_be_any_curve(tmp_path: Path) -> None:
         {"any": curve, "gamma": [0.1, 0.14]},
         grid=20,
         check=False,
-        store=tmp_path / "a.zarr",
+        run=pendmap.RunOptions(store=tmp_path / "a.zarr"),
     )
     assert found.omega.dims == ("p",)
     for k in range(4):
         one = Pendulum(gamma=0.14, **{name: float(x[k]) for name, x in curve.items()})
         same_as_alone(found, {"p": k, "gamma": 1}, one)
-    diagram = pendmap.bifurcation(Pendulum(), curve, store=tmp_path / "b.zarr")
+    diagram = pendmap.bifurcation(
+        Pendulum(), curve, run=pendmap.RunOptions(store=tmp_path / "b.zarr")
+    )
     assert diagram.omega.values == pytest.approx(curve["omega"])
     turned = {name: own[::-1] for name, own in curve.items()}
-    again = pendmap.bifurcation(Pendulum(), {"c": turned}, store=tmp_path / "b.zarr", resume=True)
+    again = pendmap.bifurcation(
+        Pendulum(), {"c": turned}, run=pendmap.RunOptions(store=tmp_path / "b.zarr", resume=True)
+    )
     assert again.identical(diagram)
     map_ = pendmap.parameter_map(Pendulum(), {"c": curve, "gamma": [0.1]})
     kinds = sorted(map_.kind.values[map_.entry_kind.values])

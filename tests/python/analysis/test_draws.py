@@ -119,7 +119,7 @@ def test_a_boundary_that_shifts_with_a_normal_parameter_has_a_normal_distributio
     pendulum = Pendulum(gamma=gamma, p=0.0, torque=torque, effects=(tilt,), notes=notes)
     half = 0.2
     grid = Grid(Axis(edge - half, edge + half, 101), Axis(velocity - 1e-9, velocity + 1e-9, 1))
-    result = pendmap.basins(pendulum, grid, draws=count, seed=SEED)
+    result = pendmap.basins(pendulum, grid, draws=count, run=pendmap.RunOptions(seed=SEED))
     names = [str(name) for name in result.outcome.values]
     assert names == ["rest", "rotation 1:+1"]
     rests = result.probability.values[0, 0]

@@ -60,7 +60,7 @@ def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
     """Hanging rest attracts if its multipliers, by scipy, lie within the unit circle."""
     model = damped(0.2, 0.02)
     ranges = {"p": (0.14, 0.26, 7), "omega": (2.0, 2.0, 1)}
-    result = pendmap.parameter_map(model, ranges, draws=16, seed=SEED)
+    result = pendmap.parameter_map(model, ranges, draws=16, run=pendmap.RunOptions(seed=SEED))
     rests = result["outcome_has"].sel(outcome_kind="rest").values.astype(bool)
     probability = result.probability.values[rests].sum(axis=0)[0]
     gammas = result.drawn.values[:, 0]
@@ -75,7 +75,7 @@ def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
 
 def test_orbits_over_draws_have_the_multipliers_of_each_draw() -> None:
     model = damped(0.2, 0.02)
-    result = pendmap.orbit(model, 1, 0, draws=20, seed=SEED)
+    result = pendmap.orbit(model, 1, 0, draws=20, run=pendmap.RunOptions(seed=SEED))
     gammas = result.drawn.values[:, 0]
     rest = [str(name) for name in result.orbit.values].index("rest")
     pairs = result.drawn_multipliers.values[rest]
@@ -92,7 +92,7 @@ def test_orbits_over_draws_have_the_multipliers_of_each_draw() -> None:
 
 def test_an_orbit_is_missing_for_draws_beyond_its_bifurcation() -> None:
     """The oscillation of period 2 exists only if rest is unstable, here above p = 0.2."""
-    result = pendmap.orbit(damped(0.21, 0.02), 2, 0, draws=20, seed=SEED)
+    result = pendmap.orbit(damped(0.21, 0.02), 2, 0, draws=20, run=pendmap.RunOptions(seed=SEED))
     assert result.sizes["orbit"] == 1
     gammas = result.drawn.values[:, 0]
     # At omega = 2 rest loses stability toward larger p: the oscillation exists if rest is unstable.
@@ -103,7 +103,9 @@ def test_an_orbit_is_missing_for_draws_beyond_its_bifurcation() -> None:
 
 
 def test_the_band_of_a_critical_curve_has_the_quantiles_of_the_draws() -> None:
-    result = pendmap.tongues(damped(0.2, 0.02), [1.9, 2.0, 2.2], 1.0, draws=12, seed=SEED)
+    result = pendmap.tongues(
+        damped(0.2, 0.02), [1.9, 2.0, 2.2], 1.0, draws=12, run=pendmap.RunOptions(seed=SEED)
+    )
     gammas = result.drawn.values[:, 0]
     k = int(np.flatnonzero(result.critical_omega.values == 2.0)[0])
     exact = [brentq(lambda p, g=g: growth(g, p) - 1, 0.05, 0.5, xtol=1e-11) for g in gammas]
@@ -115,9 +117,11 @@ def test_the_band_of_a_critical_curve_has_the_quantiles_of_the_draws() -> None:
 
 def test_a_lifetime_has_the_interval_of_its_draws() -> None:
     model = damped(1.2, 0.005)
-    result = pendmap.lifetime(model, starts=1500, draws=4, seed=SEED)
+    result = pendmap.lifetime(model, starts=1500, draws=4, run=pendmap.RunOptions(seed=SEED))
     means = [
-        pendmap.lifetime(Pendulum(gamma=g, p=1.2), starts=1500, seed=SEED)["mean_periods"].item()
+        pendmap.lifetime(Pendulum(gamma=g, p=1.2), starts=1500, run=pendmap.RunOptions(seed=SEED))[
+            "mean_periods"
+        ].item()
         for g in result.drawn.values[:, 0]
     ]
     assert result.drawn_mean_periods.values == pytest.approx(means)
@@ -172,7 +176,9 @@ def test_results_report_a_model_that_misses_its_record(
 
 @pytest.mark.parametrize("layer", ["probability", "entropy"])
 def test_the_layers_over_draws_are_drawn(layer: str, tmp_path: Path) -> None:
-    result = pendmap.basins(damped(0.6, 0.01), Grid.square(12), draws=3, seed=SEED)
+    result = pendmap.basins(
+        damped(0.6, 0.01), Grid.square(12), draws=3, run=pendmap.RunOptions(seed=SEED)
+    )
     render.draw(result, tmp_path / "a.png", layer=layer, dpi=50)
     render.draw(result.isel(theta=slice(2, 9)), tmp_path / "b.png", layer=layer, dpi=50)
     with pytest.raises(InputError, match="no layer"):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import importlib
 import inspect
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import pendmap
-from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, render, viewer
+from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, RunOptions, render, viewer
 from pendmap.files import facts
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def test_every_result_is_the_same_in_both_units(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in RESULTS if name not in {"melnikov", "simulate"}])
 def test_no_result_depends_on_threads(name: str) -> None:
-    one, two, eight = (RESULTS[name](BARE, threads=n) for n in (1, 2, 8))
+    one, two, eight = (RESULTS[name](BARE, run=RunOptions(threads=n)) for n in (1, 2, 8))
     for other in (two, eight):
         assert one.drop_vars("seconds", errors="ignore").equals(
             other.drop_vars("seconds", errors="ignore")
@@ -123,10 +123,21 @@ def test_no_result_depends_on_threads(name: str) -> None:
 REFUSED = {
     "tol": (1.0, "tol must be a number from 1e-13 to 1e-2, got 1"),
     "max_periods": (0, "max_periods must be a whole number from 1 to .*, got 0"),
-    "threads": (0, "threads must be a whole number from 1 to 256, got 0"),
-    "seed": (-1, "seed must be a whole number from 0 to .*, got -1"),
-    "progress": (3, "progress must be a function of two numbers"),
+    "run": ({"seed": 1}, "run must be a RunOptions, like"),
 }
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"threads": 0}, "threads must be a whole number from 1 to 256, got 0"),
+        ({"seed": -1}, "seed must be a whole number from 0 to .*, got -1"),
+        ({"progress": 3}, "progress must be a function of two numbers"),
+    ],
+)
+def test_options_of_runs_are_checked(given: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        RunOptions(**given)
 
 
 @pytest.mark.parametrize("name", RESULTS)

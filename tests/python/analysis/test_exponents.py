@@ -118,7 +118,7 @@ def test_regular_motion_without_damping_has_the_growth_of_tau_and_no_error() -> 
 
 def test_the_seed_changes_the_sample(chaos: xr.Dataset) -> None:
     few = pendmap.lyapunov(CHAOS, precision=0.01)
-    other = pendmap.lyapunov(CHAOS, precision=0.01, seed=1)
+    other = pendmap.lyapunov(CHAOS, precision=0.01, run=pendmap.RunOptions(seed=1))
     assert few["largest_exponent"].item() != other["largest_exponent"].item()
     apart = few["largest_exponent"].item() - other["largest_exponent"].item()
     assert abs(apart) < 4 * math.hypot(

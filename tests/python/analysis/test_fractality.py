@@ -173,7 +173,9 @@ def test_the_boundary_of_an_undriven_pendulum_is_smooth(seed: int) -> None:
     """Without drive the boundary is a saddle's stable manifold: the exponent is 1."""
     draw = np.random.default_rng(seed)
     pendulum = Pendulum(gamma=draw.uniform(0.05, 0.2), p=0.0, torque=draw.uniform(0.3, 0.6))
-    found = pendmap.uncertainty_exponent(pendmap.basins(pendulum, Grid.square(400), seed=seed))
+    found = pendmap.uncertainty_exponent(
+        pendmap.basins(pendulum, Grid.square(400), run=pendmap.RunOptions(seed=seed))
+    )
     assert abs(found.value - 1) < 0.05
     assert found.ci95[1] - found.ci95[0] < 0.15
 
@@ -186,7 +188,7 @@ def test_three_basins_of_the_paper_s_kind_pass_the_log2_criterion() -> None:
     assert again.is_fractal
     assert "log 2 criterion" in result.attrs["summary"]
     assert "basin stability" in result.attrs["summary"]
-    threads = pendmap.basins(Pendulum(p=1.0), Grid.square(200), threads=1)
+    threads = pendmap.basins(Pendulum(p=1.0), Grid.square(200), run=pendmap.RunOptions(threads=1))
     assert threads["uncertainty_exponent"].item() == result["uncertainty_exponent"].item()
 
 

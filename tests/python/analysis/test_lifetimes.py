@@ -83,7 +83,10 @@ def test_against_the_reference(p: float, truths: dict[str, Any]) -> None:
 
 
 def test_the_error_is_the_spread_over_seeds() -> None:
-    found = [facts(pendmap.lifetime(Pendulum(p=1.2), starts=6000, seed=k)) for k in range(20)]
+    found = [
+        facts(pendmap.lifetime(Pendulum(p=1.2), starts=6000, run=pendmap.RunOptions(seed=k)))
+        for k in range(20)
+    ]
     means = np.array([a["mean_periods"] for a in found])
     errors = np.array([a["mean_periods_stderr"] for a in found])
     spread = (((means - np.average(means, weights=errors**-2)) / errors) ** 2).sum()
@@ -160,7 +163,7 @@ def test_the_result_depends_on_starts() -> None:
     same = pendmap.lifetime(model, one["start_theta"].values, one["start_velocity"].values)
     assert same["mean_periods"].item() == one["mean_periods"].item()
     assert not one["capture_period"].equals(
-        pendmap.lifetime(model, starts=2000, seed=1)["capture_period"]
+        pendmap.lifetime(model, starts=2000, run=pendmap.RunOptions(seed=1))["capture_period"]
     )
 
 

@@ -101,7 +101,11 @@ def test_other_threads_run_and_progress_is_reported() -> None:
     other = threading.Thread(target=tick)
     other.start()
     began = time.perf_counter()
-    pendmap.basins(Pendulum(p=1.7), Grid.square(300), progress=lambda *x: told.append(x))
+    pendmap.basins(
+        Pendulum(p=1.7),
+        Grid.square(300),
+        run=pendmap.RunOptions(progress=lambda *x: told.append(x)),
+    )
     ended = time.perf_counter()
     stop.set()
     other.join()
@@ -117,7 +121,7 @@ def test_an_error_in_the_callers_progress_ends_the_map() -> None:
         raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):
-        pendmap.basins(Pendulum(p=1.7), Grid.square(700), progress=fail)
+        pendmap.basins(Pendulum(p=1.7), Grid.square(700), run=pendmap.RunOptions(progress=fail))
 
 
 def test_ctrl_c_raises_keyboard_interrupt() -> None:
@@ -127,7 +131,7 @@ def test_ctrl_c_raises_keyboard_interrupt() -> None:
         "under_way = lambda *_: print('go', flush=True)\n"
         "try:\n"
         "    pendmap.basins(pendmap.Pendulum(p=1.7), pendmap.Grid.square(9000), "
-        "progress=under_way)\n"
+        "run=pendmap.RunOptions(progress=under_way))\n"
         "except KeyboardInterrupt:\n"
         "    sys.exit(42)\n"
     )

@@ -83,7 +83,9 @@ def test_a_long_search_reports_its_progress() -> None:
             raise StopError
 
     with pytest.raises(StopError):
-        pendmap.basins(Pendulum(gamma=1e-4, p=0.3), Grid.square(4), progress=progress)
+        pendmap.basins(
+            Pendulum(gamma=1e-4, p=0.3), Grid.square(4), run=pendmap.RunOptions(progress=progress)
+        )
 
 
 def held(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:

@@ -254,7 +254,7 @@ def test_curves_and_cells_move_one_progress() -> None:
         Pendulum(),
         {"p": (0.5, 1.0, 3), "omega": (1.8, 2.2, 3)},
         curves=True,
-        progress=lambda done, total: seen.append((done, total)),
+        run=pendmap.RunOptions(progress=lambda done, total: seen.append((done, total))),
     )
     shares = [done / total for done, total in seen]
     assert shares == sorted(shares)

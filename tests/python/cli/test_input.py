@@ -150,7 +150,9 @@ def test_a_map_without_decided_cells_has_a_short_summary() -> None:
     assert "100 % of the starts undecided within 1 period; --max-periods raises" in summary
     for words in ("agree", "sampled labels", "1 periods"):
         assert words not in summary
-    one = pendmap.basins(Pendulum(), Grid(Axis(0.5, 0.6, 1), Axis(0, 1, 1)), threads=1)
+    one = pendmap.basins(
+        Pendulum(), Grid(Axis(0.5, 0.6, 1), Axis(0, 1, 1)), run=pendmap.RunOptions(threads=1)
+    )
     assert "\n1 start, " in one.attrs["summary"]
     assert "on 1 thread (" in one.attrs["summary"]
 

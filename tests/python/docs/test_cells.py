@@ -99,7 +99,7 @@ def test_a_trajectory_is_a_table_over_time(cell: Cell) -> None:
 
 def test_maps_of_other_processes_are_those_of_this_one(cell: Cell) -> None:
     names = cell("Many maps with joblib")
-    own = pendmap.basins(names["models"][1], 40, threads=1)
+    own = pendmap.basins(names["models"][1], 40, run=pendmap.RunOptions(threads=1))
     np.testing.assert_array_equal(names["maps"][1].label, own.label)
 
 

@@ -41,7 +41,7 @@ def test_a_second_run_is_refused(tmp_path: Path) -> None:
         first.send_signal(signal.SIGSTOP)
         for keep in ({}, {"resume": True}):
             with pytest.raises(InputError) as refused:
-                tiled.CASES["basins"](store=store, **keep)
+                tiled.case("basins", store=store, **keep)
             assert f"is held by a run, process {first.pid} on " in str(refused.value)
         first.send_signal(signal.SIGCONT)
         assert first.wait(120) == 0
@@ -54,7 +54,7 @@ def test_a_killed_run_holds_nothing(tmp_path: Path) -> None:
     with running(store) as first:
         first.kill()
         first.wait(60)
-        tiled.assert_same(tiled.CASES["basins"](store=store, resume=True), tiled.plain("basins"))
+        tiled.assert_same(tiled.case("basins", store=store, resume=True), tiled.plain("basins"))
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
@@ -63,7 +63,7 @@ def test_threads_are_runs_too(tmp_path: Path) -> None:
 
     def run() -> None:
         try:
-            tiled.CASES["sweep"](store=tmp_path / "s.zarr", resume=True)
+            tiled.case("sweep", store=tmp_path / "s.zarr", resume=True)
         except InputError as error:
             refused.append(str(error))
 

@@ -94,5 +94,5 @@ def test_a_full_disk_keeps_what_is_done(
         with monkeypatch.context() as patch:
             patch.setattr("pendmap.analysis.basins.TILE", 2 * tiled.TILE)
             with pytest.raises(pendmap.InputError, match="was begun with tiles of"):
-                tiled.CASES[name](store=store, resume=True)
-    tiled.assert_same(tiled.CASES[name](store=store, resume=True), tiled.plain(name))
+                tiled.case(name, store=store, resume=True)
+    tiled.assert_same(tiled.case(name, store=store, resume=True), tiled.plain(name))

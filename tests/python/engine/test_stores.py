@@ -48,10 +48,10 @@ def test_a_store_may_be_in_an_object_store(bucket: str, name: str) -> None:
     store = f"{bucket}/{name}.zarr"
     tiled.begun(tiled.CASES[name], store)
     with pytest.raises(InputError, match="is an unfinished run: --resume"):
-        tiled.CASES[name](store=store)
+        tiled.case(name, store=store)
     with pytest.raises(InputError, match="is an unfinished run: its command"):
         pendmap.load(store)
-    tiled.assert_same(tiled.CASES[name](store=store, resume=True), tiled.plain(name))
+    tiled.assert_same(tiled.case(name, store=store, resume=True), tiled.plain(name))
     tiled.assert_same(pendmap.load(store), tiled.plain(name))
 
 
@@ -60,20 +60,20 @@ def test_a_folder_must_be_named_as_a_store(
     store: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for run in (tiled.CASES["basins"], tiled.CASES["bifurcation"]):
+    for name in ("basins", "bifurcation"):
         with pytest.raises(InputError, match=r"store must be a folder NAME\.zarr, or an address"):
-            run(store=store)
+            tiled.case(name, store=store)
     assert not [*tmp_path.iterdir()]
 
 
 def test_a_path_may_be_an_address(tmp_path: Path) -> None:
-    kept = tiled.CASES["basins"](store=f"file://{tmp_path}/map.zarr")
+    kept = tiled.case("basins", store=f"file://{tmp_path}/map.zarr")
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
     tiled.assert_same(kept, tiled.plain("basins"))
     with pytest.raises(FileNotFoundError, match="the folder does not exist"):
-        tiled.CASES["basins"](store=f"file://{tmp_path}/missing/map.zarr")
+        tiled.case("basins", store=f"file://{tmp_path}/missing/map.zarr")
     with pytest.raises(InputError, match=r"s4://maps/map\.zarr: Protocol not known: s4"):
-        tiled.CASES["basins"](store="s4://maps/map.zarr")
+        tiled.case("basins", store="s4://maps/map.zarr")
 
 
 def test_a_complete_store_is_replaced_only_on_request(pendmap_command: Run, tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_an_object_store_that_is_not_reached_is_told(
 
     monkeypatch.setattr("s3fs.S3FileSystem.exists", gone)
     with pytest.raises(OSError, match=r"s3://maps/x\.zarr: cannot be reached: no connection"):
-        tiled.CASES["basins"](store=f"{bucket}/x.zarr")
+        tiled.case("basins", store=f"{bucket}/x.zarr")
 
 
 def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,15 +106,15 @@ def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     def refused(said: str, model: Pendulum, grid: Grid, **other: float) -> None:
         with pytest.raises(InputError, match=said):
-            pendmap.basins(model, grid, store=store, resume=True, **other)
+            pendmap.basins(model, grid, run=pendmap.RunOptions(store=store, resume=True), **other)
 
     refused(r"was begun with model: p = '0.6', not '0.7'", Pendulum(p=0.7), grid)
     refused("was begun with grid = ", Pendulum(p=0.6), Grid.square(61))
     refused("was begun with tol = 1e-06, not 1e-07", Pendulum(p=0.6), grid, tol=1e-7)
     with pytest.raises(InputError, match="was begun by analysis basins, not lifetime"):
-        pendmap.lifetime(Pendulum(p=0.6), store=store, resume=True)
+        pendmap.lifetime(Pendulum(p=0.6), run=pendmap.RunOptions(store=store, resume=True))
     with pytest.raises(InputError, match=r"is an unfinished run: --resume \(resume=True\) goes on"):
-        pendmap.basins(Pendulum(p=0.6), grid, store=store)
+        pendmap.basins(Pendulum(p=0.6), grid, run=pendmap.RunOptions(store=store))
     monkeypatch.setenv("PENDMAP_SIMD", "portable")
     refused("was begun with an instruction set that rounds otherwise", Pendulum(p=0.6), grid)
 
@@ -125,18 +125,20 @@ def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         patch.setattr("pendmap._core.__version__", "0.0.1")
         tiled.begun(tiled.CASES["basins"], store)
     with pytest.raises(InputError, match=r"was begun by version of pendmap 0\.0\.1, not "):
-        tiled.CASES["basins"](store=store, resume=True)
+        tiled.case("basins", store=store, resume=True)
 
 
 def test_an_older_result_is_there_until_the_new_one_is(tmp_path: Path) -> None:
     store, model = tmp_path / "map.zarr", Pendulum(p=0.6)
-    old = pendmap.basins(model, Grid.square(40), store=store).load()
-    pendmap.basins(model, Grid.square(60), store=tmp_path / "other.zarr")
+    old = pendmap.basins(model, Grid.square(40), run=pendmap.RunOptions(store=store)).load()
+    pendmap.basins(model, Grid.square(60), run=pendmap.RunOptions(store=tmp_path / "other.zarr"))
     (tmp_path / "other.zarr").rename(tmp_path / "map.zarr.part")  # complete, not yet in its place
     assert pendmap.load(store).sizes["theta"] == 40
-    again = pendmap.basins(model, Grid.square(60), store=store, resume=True)
+    again = pendmap.basins(model, Grid.square(60), run=pendmap.RunOptions(store=store, resume=True))
     assert again.sizes["theta"] == 60
-    tiled.assert_same(pendmap.basins(model, Grid.square(40), store=store), old)
+    tiled.assert_same(
+        pendmap.basins(model, Grid.square(40), run=pendmap.RunOptions(store=store)), old
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
@@ -154,14 +156,16 @@ def test_what_is_no_store_is_kept(tmp_path: Path, kind: str) -> None:
     before = sorted(store.rglob("*"))
     for keep in ({}, {"resume": True}):
         with pytest.raises(InputError, match="must be a new folder, or a result of pendmap"):
-            tiled.CASES["basins"](store=store, **keep)
+            tiled.case("basins", store=store, **keep)
     assert sorted(store.rglob("*")) == before
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
 def test_bad_input_leaves_no_store(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the smallest error that steps can reach"):
-        pendmap.basins(Pendulum(p=1e6), Grid.square(30), store=tmp_path / "map.zarr")
+        pendmap.basins(
+            Pendulum(p=1e6), Grid.square(30), run=pendmap.RunOptions(store=tmp_path / "map.zarr")
+        )
     assert not [*tmp_path.iterdir()]
 
 

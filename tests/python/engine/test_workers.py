@@ -89,8 +89,8 @@ def two_processes() -> Iterator[Executor]:
 def test_processes_compute_the_same_bits(
     tmp_path: Path, name: str, two_processes: Executor
 ) -> None:
-    tiled.assert_same(tiled.CASES[name](executor=two_processes), tiled.plain(name))
-    kept = tiled.CASES[name](executor=two_processes, store=tmp_path / "map.zarr")
+    tiled.assert_same(tiled.case(name, executor=two_processes), tiled.plain(name))
+    kept = tiled.case(name, executor=two_processes, store=tmp_path / "map.zarr")
     tiled.assert_same(kept, tiled.plain(name))
 
 
@@ -100,9 +100,9 @@ def test_executors_compute_the_same_bits(
     executors: Callable[[], AbstractContextManager[Executor]],
 ) -> None:
     with executors() as executor:
-        kept = tiled.CASES["map"](executor=executor, store=tmp_path / "map.zarr")
+        kept = tiled.case("map", executor=executor, store=tmp_path / "map.zarr")
         tiled.assert_same(kept, tiled.plain("map"))
-        tiled.assert_same(tiled.CASES["chaos"](executor=executor), tiled.plain("chaos"))
+        tiled.assert_same(tiled.case("chaos", executor=executor), tiled.plain("chaos"))
 
 
 def test_workers_start_where_the_port_of_dask_is_taken() -> None:
@@ -118,7 +118,7 @@ def test_workers_start_where_the_port_of_dask_is_taken() -> None:
 def test_separate_processes_compute_the_same_bits(tmp_path: Path) -> None:
     with separate_processes(tmp_path) as client:
         for name in tiled.CASES:
-            kept = tiled.CASES[name](executor=client, store=tmp_path / f"{name}.zarr")
+            kept = tiled.case(name, executor=client, store=tmp_path / f"{name}.zarr")
             tiled.assert_same(kept, tiled.plain(name))
 
 
@@ -138,7 +138,7 @@ def test_workers_that_are_killed_cost_only_their_tiles(tmp_path: Path) -> None:
         thread.start()
         try:
             for name in ("basins", "map", "chaos"):
-                kept = tiled.CASES[name](executor=client, store=tmp_path / f"{name}.zarr")
+                kept = tiled.case(name, executor=client, store=tmp_path / f"{name}.zarr")
                 tiled.assert_same(kept, tiled.plain(name))
         finally:
             over.set()
@@ -162,14 +162,19 @@ def test_workers_that_are_gone_are_an_error_that_keeps_the_tiles(tmp_path: Path)
             return self.executor.submit(*call)  # type: ignore[arg-type]
 
     with pool() as executor, pytest.raises(OSError, match="the workers are gone") as gone:
-        tiled.CASES["basins"](executor=Fewer(executor), store=store)
+        tiled.case("basins", executor=Fewer(executor), store=store)
     assert "--resume goes on" in str(gone.value)
-    tiled.assert_same(tiled.CASES["basins"](store=store, resume=True), tiled.plain("basins"))
+    tiled.assert_same(tiled.case("basins", store=store, resume=True), tiled.plain("basins"))
 
 
 def test_an_error_of_a_worker_is_that_of_the_call() -> None:
     with pool() as executor, pytest.raises(pendmap.InputError, match="tol must be"):
-        pendmap.basins(pendmap.Pendulum(), pendmap.Grid.square(50), tol=1.0, executor=executor)
+        pendmap.basins(
+            pendmap.Pendulum(),
+            pendmap.Grid.square(50),
+            tol=1.0,
+            run=pendmap.RunOptions(executor=executor),
+        )
 
 
 @pytest.mark.parametrize(
@@ -186,11 +191,11 @@ def test_bad_input_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises((pendmap.InputError, OSError), match=said):
-        tiled.CASES["basins"](**keep)
+        tiled.case("basins", **keep)
     assert not [*tmp_path.iterdir()]
 
 
 def test_lazy_results_are_arrays_of_dask(tmp_path: Path) -> None:
-    lazy = tiled.CASES["basins"](store=tmp_path / "map.zarr", chunks={})
+    lazy = tiled.case("basins", store=tmp_path / "map.zarr", chunks={})
     assert lazy.label.chunks[0][:2] == (15, 15)
     tiled.assert_same(lazy, tiled.plain("basins"))

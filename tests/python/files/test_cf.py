@@ -158,7 +158,7 @@ def test_the_history_is_reproducible(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_other_tools_open_a_store_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("zarr")
     grid = Grid.square(8)
-    one = pendmap.basins(BARE, grid, store=tmp_path / "one.zarr")
+    one = pendmap.basins(BARE, grid, run=pendmap.RunOptions(store=tmp_path / "one.zarr"))
     pendmap.save(one, tmp_path / "other.zarr")
     for name in ("one.zarr", "other.zarr"):  # a warning is an error in tests
         with xr.open_zarr(tmp_path / name, chunks=None) as found:

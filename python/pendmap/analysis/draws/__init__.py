@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.numerics import part
 from pendmap.analysis.result import Field, indices, variable
 from pendmap.analysis.varied import with_values
-from pendmap.errors import MOST_DRAWS, MOST_SEED, InputError, check_whole, short_repr
+from pendmap.errors import MOST_DRAWS, InputError, check_whole, short_repr
 from pendmap.formatting import counted
 from pendmap.model.covariance import covariance_of
 
@@ -24,12 +23,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.numerics import Progress
+    from pendmap.analysis.run import RunOptions
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
-    Run = Callable[..., xr.Dataset]
-    """Function that computes the result of a model and reports to the keyword ``progress``."""
+    Analysis = Callable[..., xr.Dataset]
+    """Function that computes the result of a model, with the keyword ``run``."""
 
 
 _TRIES: Final = 1000  # Largest number of successive draws outside the allowed values
@@ -46,28 +45,27 @@ class Draws:
     values: Floats
     """Parameters of each draw in the units of the model, shape (N, K)."""
     models: tuple[Pendulum | Rig, ...]
-    seed: int
-    progress: Progress | None = None
-    """Progress of the results of the model itself and of all draws."""
+    run: RunOptions
+    """Options of the results of the model itself and of all draws."""
 
     def __len__(self) -> int:
         return len(self.models)
 
     @property
-    def first(self) -> Progress | None:
-        """Progress of the result of the model itself."""
-        return part(self.progress, 0, len(self) + 1)
+    def first(self) -> RunOptions:
+        """Options of the result of the model itself."""
+        return self.run.part(0, len(self) + 1)
 
-    def each(self, run: Run) -> Iterator[xr.Dataset]:
+    def each(self, analysis: Analysis) -> Iterator[xr.Dataset]:
         """Yield the result of each drawn model."""
         for k, model in enumerate(self.models, 1):
-            yield run(model, progress=part(self.progress, k, len(self) + 1))
+            yield analysis(model, run=self.run.part(k, len(self) + 1))
 
     def complete(self, found: xr.Dataset, lines: Iterable[str]) -> xr.Dataset:
         """Return a result with the drawn parameters, and with summary lines on the draws."""
         names = ", ".join(self.names)
         head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
-        found.attrs |= {"draws": len(self), "draws_seed": self.seed}
+        found.attrs |= {"draws": len(self), "draws_seed": self.run.seed}
         found.attrs["summary"] = "\n".join([found.attrs["summary"], head, *lines])
         text, comment = "parameters of each draw", "each in the units of the model"
         found = found.assign(
@@ -91,9 +89,7 @@ def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
     return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
 
-def drawn(
-    model: Pendulum | Rig, count: object, seed: int, progress: Progress | None = None
-) -> Draws:
+def drawn(model: Pendulum | Rig, count: object, run: RunOptions) -> Draws:
     """Return models drawn from the Gaussian of a model's ``[covariance]``.
 
     ``x = m + A z``, ``A A^T`` the covariance with the variance between runs, ``m`` the model's own
@@ -122,7 +118,7 @@ def drawn(
     brakes = (effect for effect in model.effects if effect.brakes)
     sizes = {f"{effect.name}.{size}" for effect in brakes for size in effect.sizes}
     signs = np.where([name in sizes for name in known.names], np.sign(middle), 0.0)
-    source = np.random.default_rng(check_whole("seed", seed, 0, MOST_SEED))
+    source = np.random.default_rng(run.in_memory("draws").seed)
     values, models = [], []
     for _ in range(number):
         for _ in range(_TRIES):
@@ -141,7 +137,7 @@ def drawn(
             )
         values.append(x)
         models.append(one)
-    return Draws(known.names, np.array(values), tuple(models), seed, progress)
+    return Draws(known.names, np.array(values), tuple(models), run)
 
 
 def interval(values: Floats) -> tuple[Floats, ...]:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pendmap.analysis.draws import Draws, Run
+    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.signal import Floats, Mask
 
 
@@ -41,7 +41,7 @@ _DOUBT: Final = ("doubt_start", "doubt_parameters")  # Variables over boxes, and
 _UNKNOWN: Final = ("undecided", "failed")  # Outcomes of the labels 0 and -1
 
 
-def basins_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
+def basins_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return a basin map of M x N cells with statistics of the maps of D draws.
 
     Adds, over ``outcome``, all outcomes of starts by name: ``probability`` (outcome, M, N),
@@ -52,7 +52,7 @@ def basins_over(dataset: xr.Dataset, draws: Draws, run: Run) -> xr.Dataset:
     ``doubt_parameters_mean``; ``drawn`` (D, parameter); ``sure_cells``, the share of the cells with
     a certainty of 95 % or more.
     """
-    ends, start, known = _counted(dataset, draws.each(run))
+    ends, start, known = _counted(dataset, draws.each(analysis))
     found = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
     means = {f"{name}_mean": found[name].mean(keep_attrs=True) for name in _DOUBT}
     found = found.assign(means)

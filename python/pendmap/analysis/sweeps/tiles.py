@@ -16,8 +16,8 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.analysis.fractality import uncertainty_exponent
-from pendmap.analysis.numerics import part
 from pendmap.analysis.orbit_table import DESCRIBED
+from pendmap.analysis.run import part
 from pendmap.analysis.varied import with_values
 from pendmap.engine import Tile, pack, unpack
 from pendmap.errors import InputError, core_errors
@@ -76,13 +76,12 @@ class SweepTiles:
     """Names and values of the parameters along each axis, as passed to the core."""
     axes: Axes
     choices: _core._Choices
-    at_once: int
+    at_once: int = 1
     """Number of blocks that this process computes at once."""
 
-    def on_threads(self, threads: int) -> SweepTiles:
-        """Return the job with these threads: blocks at once, then threads of a block."""
-        at_once = min(threads, self.blocks)
-        choices: _core._Choices = {**self.choices, "threads": threads // at_once}
+    def on(self, threads: int, at_once: int) -> SweepTiles:
+        """Return the job with these threads of a block, and blocks at once."""
+        choices: _core._Choices = {**self.choices, "threads": threads}
         return dataclasses.replace(self, choices=choices, at_once=at_once)
 
     @property

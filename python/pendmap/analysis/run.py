@@ -1,4 +1,4 @@
-"""Runs that are kept in a store: what they were asked for, how they go on."""
+"""How an analysis is computed: threads, random numbers, progress, the store of its tiles."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import importlib.util
 import os
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,33 +20,87 @@ from pendmap.engine import (
     executor_of,
     rounding,
 )
-from pendmap.errors import InputError, check_flag, short_repr
+from pendmap.errors import (
+    MOST_SEED,
+    MOST_THREADS,
+    InputError,
+    check_callable,
+    check_flag,
+    check_type,
+    check_whole,
+    short_repr,
+)
 from pendmap.model import model_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     import xarray as xr
 
-    from pendmap.analysis.numerics import Numerics, Progress
     from pendmap.model import Pendulum, Rig
 
     Compute = Callable[[Work], tuple[xr.Dataset, list[str]]]
     """Function that computes a result, and names its variables that are cells of the store."""
 
+Progress = Callable[[int, int], object]  # Called with units of work done and in total
+
 _DIGEST: Final = "sha256 "
+_STEPS: Final = 10_000  # Number of progress steps of a part of a computation
 
 
 @dataclasses.dataclass(frozen=True)
-class Kept:
-    """Where a result is kept, and who computes it."""
+class RunOptions:
+    """How an analysis is computed. Of these only ``seed`` changes a number of the result.
 
+    Parameters
+    ----------
+    threads : int, optional
+        Number of threads; by default one per processor.
+    seed : int
+        Shifts the samples of starts, and draws starts and models.
+    progress : callable, optional
+        Called repeatedly with the units of work done and in total: a :class:`pendmap.ProgressBar`.
+    store : str or path, optional
+        A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the result is
+        computed in tiles, and each is stored as it is done. The result reads its cells when they
+        are used. A path holds an earlier result until the new one is complete, which is at the path
+        with ``.part`` until then; elsewhere an earlier result is removed.
+    resume : bool
+        Whether to go on with the store of a run that was stopped; the result is the same, bit for
+        bit. A store that another request began is refused.
+    executor : optional
+        Computes the tiles: a Dask client or any executor of :mod:`concurrent.futures`, like those
+        of joblib, mpi4py and submitit. Each tile has one thread unless ``threads`` says otherwise.
+    chunks : optional
+        As for :func:`xarray.open_zarr`: the result of a store has arrays of Dask, ``{}`` with the
+        tiles as chunks.
+
+    Raises
+    ------
+    InputError
+        If a value is outside its range, or ``resume`` or ``chunks`` are given without a store.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> run = pendmap.RunOptions(threads=2, seed=1)
+    >>> pendmap.basins(pendmap.Pendulum(p=0.6), 20, run=run).attrs["seed"]
+    1
+    """
+
+    threads: int | None = None
+    seed: int = 0
+    progress: Progress | None = None
     store: str | os.PathLike[str] | None = None
     resume: bool = False
     executor: Any = None
     chunks: Any = None
 
     def __post_init__(self) -> None:
+        if self.threads is not None:
+            check_whole("threads", self.threads, 1, MOST_THREADS)
+        object.__setattr__(self, "seed", check_whole("seed", self.seed, 0, MOST_SEED))
+        check_callable("progress", self.progress)
         if self.store is not None:
             _address(self.store)
         check_flag("resume", self.resume)
@@ -55,45 +110,64 @@ class Kept:
         if self.chunks is not None and importlib.util.find_spec("dask") is None:
             raise InputError("chunks need the extra pendmap[dask]")
 
+    @classmethod
+    def of(cls, run: RunOptions | None) -> RunOptions:
+        """Return what is given for ``run``, by default the defaults."""
+        if run is None:
+            return cls()
+        check_type("run", run, cls, "RunOptions(threads=2)")
+        return run
+
+    @property
+    def workers(self) -> int:
+        """Number of threads as passed to the core: 0 for one per processor."""
+        return self.threads or 0
+
+    @property
+    def here(self) -> int:
+        """Number of threads of this process."""
+        return self.threads or _core.default_threads()
+
     @property
     def tiled(self) -> bool:
         """Whether the result is computed in tiles."""
         return self.store is not None or self.executor is not None
 
-    def refuse(self, name: str) -> None:
-        """Refuse an argument that needs a result in the memory of this process."""
+    def in_memory(self, what: str) -> RunOptions:
+        """Return the options, refused where ``what`` needs the memory of this process."""
         if self.tiled:
-            raise InputError(f"{name} must be given without a store or an executor, got both")
+            raise InputError(f"{what} must be given without a store or an executor, got both")
+        return self
 
-    @staticmethod
-    def threads_of_tiles(numerics: Numerics) -> tuple[tuple[float, int | None, int], int]:
-        """Return limits of a tile with one thread, and how many tiles this process has at once."""
-        tol, bound, threads = numerics.limits
-        return (tol, bound, 1), threads or _core.default_threads()
+    def part(self, number: int, parts: int) -> RunOptions:
+        """Return the options of one of ``parts`` equal parts of a computation."""
+        return dataclasses.replace(self, progress=part(self.progress, number, parts))
 
-    def threads(self, threads: int | None) -> int | None:
-        """Return the threads of a tile that an executor computes: by default one."""
-        return None if self.executor is None else threads or 1
+    def tiles(self, count: int) -> tuple[int, int]:
+        """Return the threads of each of ``count`` tiles, and how many tiles run at once here."""
+        if self.executor is not None:
+            return self.threads or 1, 1
+        at_once = min(self.here, count)
+        return self.here // at_once, at_once
 
-    def complete(  # noqa: PLR0913, PLR0917 (a request and how it is computed)
+    def complete(
         self,
         name: str,
         model: Pendulum | Rig,
         arguments: Mapping[str, Any],
         job: Any,  # noqa: ANN401 (of the analysis)
         compute: Compute,
-        progress: Progress | None,
     ) -> xr.Dataset:
         """Return the result of ``compute``, or of the store if it is complete there."""
         with executor_of(executor=self.executor) as executor:
             if self.store is None:
-                return compute(Work(job, MemoryStore(), executor, progress))[0]
+                return compute(Work(job, MemoryStore(), executor, self.progress))[0]
             store = ZarrStore(_address(self.store))
             mark = _request(name, model, arguments)
             with store.held():
                 if self._begin(store, mark):
                     return store.result(self.chunks, again=True)
-                work = Work(job, store, executor, progress)
+                work = Work(job, store, executor, self.progress)
                 try:
                     with work.named(store.unfinished):
                         dataset, cells = compute(work)
@@ -178,3 +252,37 @@ def _flat(mark: Mapping[str, Any]) -> dict[str, Any]:
     """Return arguments and lines of the model of a request by their names."""
     lines = (line.partition(" = ") for line in mark["model"].splitlines())
     return {**{f"model: {k}": v for k, _, v in lines}, **mark["arguments"]}
+
+
+def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
+    """Return the progress of one of ``parts`` equal parts of a computation; it never falls."""
+    if progress is None:
+        return None
+    furthest = 0.0
+
+    def report(done: int, total: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done / max(total, 1))
+        progress(round(_STEPS * (number + furthest)), _STEPS * parts)
+
+    return report
+
+
+def in_rounds(progress: Progress | None, typical: int) -> Progress | None:
+    """Return the progress of rounds whose number is not known: it rises with each, and never falls.
+
+    A round begins where the work done does not rise. After k rounds the share is k / (k +
+    ``typical``).
+    """
+    if progress is None:
+        return None
+    rounds, last = 0, 0
+
+    def report(done: int, total: int) -> None:
+        nonlocal rounds, last
+        rounds += done <= last
+        last = done
+        passed = rounds + done / max(total, 1)
+        progress(round(_STEPS * passed / (passed + typical)), _STEPS)
+
+    return report
