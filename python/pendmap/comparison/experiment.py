@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.comparison.forced import Statistic
-    from pendmap.comparison.steady import Steady
+    from pendmap.comparison.steady import Cycle, Steady
     from pendmap.formatting import Table
     from pendmap.records import Experiment, Run
     from pendmap.records.read import Records
@@ -311,24 +311,16 @@ def _forced(one: ForcedComparison) -> dict[str, Any]:
     }
 
 
+def _cycle(cycle: Cycle) -> dict[str, Any]:
+    return {"name": cycle.name, "kind": cycle.attractor.kind, "n": cycle.n, "w": cycle.w}
+
+
 def _steady(found: Steady) -> dict[str, Any]:
     return {
-        "name": found.measured.name,
-        "kind": found.measured.attractor.kind,
-        "n": found.measured.n,
-        "w": found.measured.w,
+        **_cycle(found.measured),
         "cycles": found.cycles,
         "amplitude": found.measured.amplitude,
-        "model": [
-            {
-                "name": one.cycle.name,
-                "kind": one.cycle.attractor.kind,
-                "n": one.cycle.n,
-                "w": one.cycle.w,
-                "share": one.share,
-            }
-            for one in found.reached
-        ],
+        "model": [_cycle(one.cycle) | {"share": one.share} for one in found.reached],
         "rms_theta": found.rms,
         "rms_velocity": found.rms_velocity,
         "amplitude_error_percent": 100 * found.overestimate,

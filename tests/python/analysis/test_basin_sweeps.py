@@ -183,8 +183,8 @@ def test_json_holds_every_map(line: xr.Dataset) -> None:
 def model_of(points: list[float], *, twin: int = 0) -> Mapped:
     """Return a map with chaos at these angles, which no orbit leads to."""
     found = [
-        Found("tumbling chaos", "tumbling_chaos", 0, 0, twin, 0.1, 0.0, 0.5, np.array([[x, 0.0]]))
-        for x in points
+        Found("tumbling_chaos", 0, 0, 0, 0, k, twin, 0.1, 0.0, 0.5, np.array([[x, 0.0]]))
+        for k, x in enumerate(points, 1)
     ]
     return Mapped({"steps": 10.0}, found)
 

@@ -122,12 +122,6 @@ def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> Non
         pendmap.parameter_map(Pendulum(), {"p": (0.5, 1, 2), "omega": (2, 2.1, 2)}, **given)
 
 
-def test_without_damping_all_cells_are_undecided() -> None:
-    found = pendmap.parameter_map(Pendulum(gamma=0.0), {"p": (0.1, 0.2, 2), "omega": (2, 2.1, 2)})
-    assert drawn.sets(found)[0] == ["undecided"]
-    assert np.allclose(found["undecided"], 1)
-
-
 def test_names_of_attractors() -> None:
     assert Attractor("rotation", 2, -2).name == "rotation 2:-2"
     assert Attractor("rotation", 2, -2).pair == "rotation 2:2"

@@ -59,7 +59,7 @@ ROWS = {
     "basins": {"attractors": {"id", "name", "kind", "n", "w", "multipliers", "fraction"}},
     "map": {"regimes": {"kinds", "share"}},
     "sweep": {"maps": {"attractors", "undecided"}},
-    "bifurcation": {"branches": {"kind", "w", "first", "last"}},
+    "bifurcation": {"branches": {"name", "kind", "n", "w", "first", "last"}},
     "orbit": {"orbits": {"n", "w", "theta", "velocity", "multipliers", "stable"}},
     "tongues": {"curves": {"omega", "p", "multiplier", "stable_above"}},
 }
