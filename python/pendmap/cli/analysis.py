@@ -46,7 +46,9 @@ def analysis_command(
     ``stored`` is computed in tiles, by workers if they are given, and kept in a store if ``--out``
     names one.
     """
-    kind, function = next((k, own[0]) for k, (which, own, _) in ANALYSES.items() if which == name)
+    kind, function = next(
+        (k, functions[0]) for k, (which, functions, _) in ANALYSES.items() if which == name
+    )
     path = f"analysis.{kind}.{function}"
     own_group = group("Analysis", example)
 
@@ -72,11 +74,11 @@ def analysis_command(
                 show(dataset, dataclasses.replace(outputs, out=None), module.SCHEMA, [str(store)])
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
-        own = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
+        chosen = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
         threads = [options_of(path, "threads")] if "threads" in parameters(path) else []
-        kept = [store_options] if stored else []
+        tiles = [store_options] if stored else []
         files = output_options(stored=stored)
-        decorate = added(model, *own, *kept, *threads, simd_option, files)
+        decorate = added(model, *chosen, *tiles, *threads, simd_option, files)
         return new_command(name, *examples, text=text)(decorate(run))
 
     return make
