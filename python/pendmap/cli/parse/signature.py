@@ -101,8 +101,9 @@ def _declared(node: ast.FunctionDef | ast.ClassDef) -> Iterator[tuple[str, str, 
         pairs = zip(names, defaults, strict=True)
         fields = [(one.arg, one.annotation, default) for one, default in pairs]
     for name, annotation, value in fields:
-        literal = isinstance(value, ast.Constant | ast.UnaryOp | ast.Tuple)
-        default = ast.literal_eval(value) if literal else None if value is None else ...
+        default = None if value is None else ...
+        if isinstance(value, ast.Constant | ast.UnaryOp | ast.Tuple):
+            default = ast.literal_eval(value)
         yield name, "" if annotation is None else ast.unparse(annotation), default
 
 
