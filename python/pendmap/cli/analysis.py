@@ -46,7 +46,9 @@ def analysis_command(
     ``stored`` is computed in tiles, by workers if they are given, and kept in a store if ``--out``
     names one.
     """
-    kind, function = next((k, own[0]) for k, (which, own, _) in ANALYSES.items() if which == name)
+    kind, function = next(
+        (k, functions[0]) for k, (which, functions, _) in ANALYSES.items() if which == name
+    )
     path = f"analysis.{kind}.{function}"
     own_group = group("Analysis", example)
 
@@ -77,12 +79,12 @@ def analysis_command(
                 show(dataset, dataclasses.replace(outputs, out=None), module.SCHEMA, [str(store)])
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
-        own = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
+        shown = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
         runs = "run" in parameters(path)
         chosen = [options_of("analysis.run.RunOptions", "threads seed")] if runs else []
-        kept = [store_options] if stored else []
+        tiles = [store_options] if stored else []
         files = output_options(stored=stored)
-        decorate = added(model, *own, *kept, *chosen, simd_option, files)
+        decorate = added(model, *shown, *tiles, *chosen, simd_option, files)
         return new_command(name, *examples, text=text)(decorate(run))
 
     return make

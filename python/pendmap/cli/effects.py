@@ -51,10 +51,10 @@ def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json
     from pendmap.model import load_formulas
     from pendmap.model.effects import definition, effects
 
-    own = [] if path is None else load_formulas(path)
-    known = {formula.name: formula for formula in own}
+    formulas = [] if path is None else load_formulas(path)
+    known = {formula.name: formula for formula in formulas}
     wanted = {name if name in known else definition(name).name for name in names}
-    listed = effects() if path is None else [formula.definition for formula in own]
+    listed = effects() if path is None else [formula.definition for formula in formulas]
     shown = [effect for effect in listed if not wanted or effect.name in wanted]
     if as_json:
         write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})

@@ -130,9 +130,9 @@ class Outputs:
                 wanted["out"] = suffix
         elif "rerun" in wanted and importlib.util.find_spec("rerun") is None:
             taken["left_out"] = name + wanted.pop("rerun")
-        free, kept = free_name(name, wanted.values(), overwrite=overwrite)
+        free, there = free_name(name, wanted.values(), overwrite=overwrite)
         taken |= {f: default_file(free + end) for f, end in wanted.items()}
-        outputs = cls(**taken, kept=kept)
+        outputs = cls(**taken, kept=there)
         keep_inputs(reads, outputs, options)
         if not overwrite and not going_on:
             keep_files(options)

@@ -40,9 +40,9 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n\n".join(click.style(first, bold=True) + end + rest for first, end, rest in parts)
 
 
-def first_of_all(found: Readable, first: Collection[str]) -> Iterator[str]:
+def first_of_all(result: Readable, first: Collection[str]) -> Iterator[str]:
     """Yield lines, then the tables and the other lines of a result's text."""
     yield from first
-    tables, lines = found.text_parts()
+    tables, lines = result.text_parts()
     yield from (table(head, rows) for head, rows in tables if rows)
     yield from (line for line in lines if line not in first)

@@ -224,12 +224,12 @@ def average_blocks(run: FitRun) -> FitRun:
         return run
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
-        found = _block_means(run.time, run.theta, weights, size)
-        if _dense(*found[:3]):
+        blocks = _block_means(run.time, run.theta, weights, size)
+        if _dense(*blocks[:3]):
             break
     else:
         return run
-    time, theta, weight, variance = found
+    time, theta, weight, variance = blocks
     good = weight > 0
     # Excluded blocks must not bend the parabolas of their neighbours.
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))

@@ -72,9 +72,9 @@ class Comparison(Saved):
     def __repr__(self) -> str:
         every = self.every
         worst = max(one.rms / one.sigma for one in every)
-        each = f"rms up to {worst:.3g} times the noise"
+        rms = f"rms up to {worst:.3g} times the noise"
         runs = counted(len(every), "run")
-        return f"<Comparison {self.experiment.path.name}: {runs}, {each}; {self.model.title}>"
+        return f"<Comparison {self.experiment.path.name}: {runs}, {rms}; {self.model.title}>"
 
     @property
     def every(self) -> tuple[RunComparison | ForcedComparison, ...]:
@@ -98,9 +98,9 @@ class Comparison(Saved):
             rows.append((name, "residual", one.sigma, one.rms, *[math.nan] * 4, "rad"))
             if isinstance(one, RunComparison):
                 for r in one.table.rows:
-                    told, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
+                    quantity, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
                     unit = _UNITS[r.what]
-                    rows.append((name, told, r.measured, *[math.nan] * 4, error, unit))
+                    rows.append((name, quantity, r.measured, *[math.nan] * 4, error, unit))
             else:
                 rows += [
                     (name, e.name, e.measured, e.median, *e.ci95, e.chance, math.nan, e.unit)
@@ -210,8 +210,8 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
         except (FitDiverged, InputError) as error:  # the other runs are still compared
             out.append((run.name, str(error)))
     if not free and not forced:
-        said = "; ".join(": ".join(each) for each in out)
-        raise InputError(f"{experiment.path}: no run can be compared: {said}")
+        reasons = "; ".join(": ".join(pair) for pair in out)
+        raise InputError(f"{experiment.path}: no run can be compared: {reasons}")
     return Comparison(model, experiment, tuple(free), tuple(forced), tuple(out))
 
 
@@ -248,12 +248,12 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
                 "noise": one.sigma,
                 "rms": one.rms,
                 **(_forced(one) if isinstance(one, ForcedComparison) else _free(one)),
-                "findings": [found.text for found in one.run.findings],
+                "findings": [finding.text for finding in one.run.findings],
             }
             for one in comparison.every
         ],
         "left_out": [{"name": name, "why": why} for name, why in comparison.left_out],
-        "findings": [found.text for found in comparison.experiment.findings],
+        "findings": [finding.text for finding in comparison.experiment.findings],
     }
 
 
@@ -298,14 +298,14 @@ def _forced(one: ForcedComparison) -> dict[str, Any]:
         "spread": one.ensemble.spread,
         "statistics": [
             {
-                "what": each.name,
-                "unit": each.unit or "1",
-                "measured": each.measured,
-                "median": each.median,
-                "ci95": each.ci95,
-                "chance": each.chance,
+                "what": statistic.name,
+                "unit": statistic.unit or "1",
+                "measured": statistic.measured,
+                "median": statistic.median,
+                "ci95": statistic.ci95,
+                "chance": statistic.chance,
             }
-            for each in one.statistics
+            for statistic in one.statistics
         ],
         "steady": None if one.steady is None else _steady(one.steady),
     }
@@ -315,15 +315,15 @@ def _cycle(cycle: Cycle) -> dict[str, Any]:
     return {"name": cycle.name, "kind": cycle.attractor.kind, "n": cycle.n, "w": cycle.w}
 
 
-def _steady(found: Steady) -> dict[str, Any]:
+def _steady(steady: Steady) -> dict[str, Any]:
     return {
-        **_cycle(found.measured),
-        "cycles": found.cycles,
-        "amplitude": found.measured.amplitude,
-        "model": [_cycle(one.cycle) | {"share": one.share} for one in found.reached],
-        "rms_theta": found.rms,
-        "rms_velocity": found.rms_velocity,
-        "amplitude_error_percent": 100 * found.overestimate,
+        **_cycle(steady.measured),
+        "cycles": steady.cycles,
+        "amplitude": steady.measured.amplitude,
+        "model": [_cycle(one.cycle) | {"share": one.share} for one in steady.reached],
+        "rms_theta": steady.rms,
+        "rms_velocity": steady.rms_velocity,
+        "amplitude_error_percent": 100 * steady.overestimate,
     }
 
 
@@ -356,15 +356,15 @@ def _forced_table(runs: Sequence[ForcedComparison]) -> Table:
     rows = []
     for one in runs:
         rows.append([_name(one.run), "", "", "", ""])
-        for each in one.statistics:
-            low, high = each.ci95
+        for statistic in one.statistics:
+            low, high = statistic.ci95
             rows.append(
                 [
-                    f"  {each.name}" + (f" ({each.unit})" if each.unit else ""),
-                    written(each, each.measured),
-                    written(each, each.median),
-                    f"{written(each, low)} to {written(each, high)}",
-                    f"{each.chance:.2g}",
+                    f"  {statistic.name}" + (f" ({statistic.unit})" if statistic.unit else ""),
+                    written(statistic, statistic.measured),
+                    written(statistic, statistic.median),
+                    f"{written(statistic, low)} to {written(statistic, high)}",
+                    f"{statistic.chance:.2g}",
                 ]
             )
     return head, rows
@@ -382,9 +382,9 @@ def in_short(comparison: Comparison) -> list[str]:
     every = comparison.every
     others = [one.run.name for one in every if one.rms > FITS * one.sigma]
     count = f"{len(every) - len(others)} of {counted(len(every), 'run')}"
-    said = f"The model describes {count} (residual up to {FITS:g} times the noise)"
-    said += f"; not {', '.join(others)}." if others else "."
-    return [*doubt_lines(comparison.experiment, *(one.run for one in every)), said]
+    text = f"The model describes {count} (residual up to {FITS:g} times the noise)"
+    text += f"; not {', '.join(others)}." if others else "."
+    return [*doubt_lines(comparison.experiment, *(one.run for one in every)), text]
 
 
 def _lines(comparison: Comparison) -> Iterator[str]:
@@ -394,8 +394,8 @@ def _lines(comparison: Comparison) -> Iterator[str]:
         for row in one.table.rows:
             unit = _UNITS[row.what]
             error = row.errors.get(MODEL, math.nan)
-            said = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
-            yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {said}"
+            text = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
+            yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {text}"
         if one.table.left_out:
             yield f"{one.run.name}: {one.table.left_out}"
         for reason in one.table.lost.values():
@@ -418,31 +418,31 @@ def _forced_lines(one: ForcedComparison) -> Iterator[str]:
         yield f"{name}: the drive's phase is not given: {one.phase.value:.4g} rad was fitted"
     if one.steady is not None:
         yield f"{name}: {_steady_line(one.steady)}"
-    for each in one.unlike:
-        unit = f" {each.unit}" if each.unit and math.isfinite(each.measured) else ""
+    for statistic in one.unlike:
+        unit = f" {statistic.unit}" if statistic.unit and math.isfinite(statistic.measured) else ""
         yield (
-            f"{name}: {each.name}: {written(each, each.measured)}{unit} is improbable under the "
-            f"model (p-value {each.chance:.2g})"
+            f"{name}: {statistic.name}: {written(statistic, statistic.measured)}{unit} is "
+            f"improbable under the model (p-value {statistic.chance:.2g})"
         )
     if one.lost:
         yield f"{name}: {one.lost} of {one.ensemble.members} members overflowed"
 
 
-def _steady_line(found: Steady) -> str:
+def _steady_line(steady: Steady) -> str:
     """Return the text on the steady states of a record and of the model."""
     ends = [
-        f"{one.cycle.name} from {percent(100 * one.share)} of the starts" for one in found.reached
+        f"{one.cycle.name} from {percent(100 * one.share)} of the starts" for one in steady.reached
     ]
-    share = sum(one.share for one in found.reached)
+    share = sum(one.share for one in steady.reached)
     if share < 1 - 1e-9:
         ends.append(f"no cycle from {percent(100 * (1 - share))}")
-    head = f"settles on {found.measured.name}; the model on {', '.join(ends)}"
-    if found.model is None:
+    head = f"settles on {steady.measured.name}; the model on {', '.join(ends)}"
+    if steady.model is None:
         return f"{head}: not on the measured one"
     more = ""
-    if math.isfinite(found.overestimate):
-        more = f", in amplitude by {100 * found.overestimate:+.2g} %"
+    if math.isfinite(steady.overestimate):
+        more = f", in amplitude by {100 * steady.overestimate:+.2g} %"
     return (
-        f"{head}. Over a cycle they differ by {found.rms:.2g} rad and {found.rms_velocity:.2g} "
+        f"{head}. Over a cycle they differ by {steady.rms:.2g} rad and {steady.rms_velocity:.2g} "
         f"rad/s rms{more}"
     )

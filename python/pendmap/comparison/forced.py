@@ -266,23 +266,23 @@ def compare_forced(
     time, measured = _evenly(run, given, start.time)
     period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
-    own = Itineraries.of(measured[None], ruler)
+    record = Itineraries.of(measured[None], ruler)
     starts = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
     simulated = functools.partial(simulated_readings, given, model, threads=threads)
-    made, kept = _members(simulated, starts, time, ruler, progress)
-    if not kept.any():
+    made, finite = _members(simulated, starts, time, ruler, progress)
+    if not finite.any():
         raise InputError(f"{run.name}: the model overflows from every start")
-    starts = starts[:, kept]
+    starts = starts[:, finite]
     statistics = tuple(
-        Statistic(name, unit, float(getattr(own, key)[0]), getattr(made, key).astype(float))
+        Statistic(name, unit, float(getattr(record, key)[0]), getattr(made, key).astype(float))
         for name, unit, key in _STATISTICS
     )
     place = _example(statistics)
     reading = simulated(starts[:, [place]], time)[0]
-    found = None
-    if period is not None and own.n[0]:
-        closes, since = (int(own.n[0]), int(own.w[0])), time[0] + float(own.settled[0])
-        found = steady.compared(
+    cycles = None
+    if period is not None and record.n[0]:
+        closes, since = (int(record.n[0]), int(record.w[0])), time[0] + float(record.settled[0])
+        cycles = steady.compared(
             steady.folded(time, measured, period, closes, since),
             steady.reached(simulated, start.time, starts[:, :_FOLLOWED], period, model.c_over_m),
         )
@@ -297,9 +297,9 @@ def compare_forced(
         measured=measured,
         velocity=ruler.velocity(measured),
         example=(reading, ruler.velocity(reading)),
-        lost=int((~kept).sum()),
+        lost=int((~finite).sum()),
         statistics=statistics,
-        steady=found,
+        steady=cycles,
         ensemble=ensemble,
     )
 
@@ -325,16 +325,16 @@ def _members(
     """Return the itineraries of the members, and which members stayed finite."""
     draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
     count, many = starts.shape[1], max(1, _AT_ONCE // time.size)
-    parts, kept = [], np.zeros(count, dtype=bool)
+    parts, finite = [], np.zeros(count, dtype=bool)
     for first in range(0, count, many):
-        own = slice(first, first + many)
-        reading = simulated(starts[:, own], time)
-        kept[own] = np.isfinite(reading).all(axis=1)
+        block = slice(first, first + many)
+        reading = simulated(starts[:, block], time)
+        finite[block] = np.isfinite(reading).all(axis=1)
         noise = draw.normal(0.0, ruler.sigma, reading.shape)
-        parts.append(Itineraries.of((reading + noise)[kept[own]], ruler))
+        parts.append(Itineraries.of((reading + noise)[finite[block]], ruler))
         if progress is not None:
             progress(min(first + many, count), count)
-    return Itineraries.joined(parts), kept
+    return Itineraries.joined(parts), finite
 
 
 def _example(statistics: tuple[Statistic, ...]) -> int:

@@ -95,12 +95,12 @@ def compare_forecasts(
     """Return the forecast errors of free and of forced runs."""
     swing = math.tau / base.fitted.model.w0
     every = [s for place in range(len(data.held)) for s in _stretches(data, place, swing)]
-    found = []
+    forecasts = []
     for kind in ("free", "forced"):
-        own = [s for s in every if s.run.forced == (kind == "forced")]
-        compute = functools.partial(_forecast, kind, own, base, best, swing)
-        found.append(compute_part(reasons, f"forecast.{kind}", compute, None))
-    return tuple(forecast for forecast in found if forecast is not None)
+        stretches = [s for s in every if s.run.forced == (kind == "forced")]
+        compute = functools.partial(_forecast, kind, stretches, base, best, swing)
+        forecasts.append(compute_part(reasons, f"forecast.{kind}", compute, None))
+    return tuple(forecast for forecast in forecasts if forecast is not None)
 
 
 def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
@@ -132,7 +132,7 @@ def _forecast(
     if not launches:
         return None
     noise = [one.stretch.run.sigmas[one.ahead] for one in launches]
-    floors = [float(np.mean(each**2)) if each.size else math.nan for each in noise]
+    floors = [float(np.mean(sigmas**2)) if sigmas.size else math.nan for sigmas in noise]
     before, after = (_errors(model, launches, swing, count) for model in (base, best))
     middles = (np.arange(count) + 0.5) * reach / count
     floor = math.sqrt(float(np.nanmean(floors)))
@@ -145,15 +145,15 @@ def _launches(stretch: _Stretch, reach: float, swing: float, count: int) -> list
     if room < 0:
         return []
     starts = min(STARTS, 1 + int(room / (swing / 2)))
-    found = []
+    launches = []
     for at in np.linspace(stretch.earliest, stretch.earliest + room, starts):
         later = stretch.run.time - at
         behind = stretch.good & (later > -swing) & (later <= 0)
         ahead = stretch.held & (later > 0) & (later <= reach)
         bins = np.minimum((later[ahead] / reach * count).astype(np.intp), count - 1)
         if np.count_nonzero(behind) >= FEWEST:
-            found.append(_Launch(stretch, behind, ahead, bins))
-    return found
+            launches.append(_Launch(stretch, behind, ahead, bins))
+    return launches
 
 
 def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> Floats:
@@ -177,9 +177,9 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
         return np.sqrt(squares / np.where(samples > 0, samples, math.nan))
 
 
-def _samples(run: FitRun, kept: Mask) -> FitRun:
+def _samples(run: FitRun, chosen: Mask) -> FitRun:
     """Return a run with only the selected samples."""
-    sigma, time, theta = run.sigmas[kept], run.time[kept], run.theta[kept]
+    sigma, time, theta = run.sigmas[chosen], run.time[chosen], run.theta[chosen]
     return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=None)
 
 
@@ -265,7 +265,7 @@ class Cycles:
 
 def compare_cycles(data: DataSplit, base: Fits, best: Fits, reasons: Reasons) -> tuple[Cycles, ...]:
     """Return the errors in each free run with a full cycle, held-out runs first."""
-    found = []
+    cycles = []
     for k, (run, reading) in enumerate(zip(data.runs, data.readings, strict=True)):
         # An angle computed from an acceleration is too inaccurate.
         if run.kind != "free" or run.accelerometer is not None:
@@ -282,8 +282,8 @@ def compare_cycles(data: DataSplit, base: Fits, best: Fits, reasons: Reasons) ->
             if simulated is not None:
                 errors[name] = errors_of(name, peaks, *simulated)
         if errors:
-            found.append(Cycles(run.name, k not in data.fitted_of, peaks, errors))
-    return tuple(sorted(found, key=lambda one: not one.held_out))
+            cycles.append(Cycles(run.name, k not in data.fitted_of, peaks, errors))
+    return tuple(sorted(cycles, key=lambda one: not one.held_out))
 
 
 def _simulated_peaks(

@@ -124,17 +124,19 @@ def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
     for cycle in range(1, LONGEST + 1):
         shift = cycle * ruler.period / ruler.tick
         whole, part = int(shift), shift - int(shift)
-        kept = size - whole - 1
+        pairs = size - whole - 1
         least = math.ceil(_HELD * ruler.period / ruler.tick)
         free = n == 0
-        if kept < least or not free.any():
+        if pairs < least or not free.any():
             break
-        own = reading[free]
-        later = (1 - part) * own[:, whole : whole + kept] + part * own[:, whole + 1 :][:, :kept]
-        apart = later - own[:, :kept]
+        readings = reading[free]
+        later = (1 - part) * readings[:, whole : whole + pairs] + part * readings[:, whole + 1 :][
+            :, :pairs
+        ]
+        apart = later - readings[:, :pairs]
         turns = np.round(apart[:, -least:].mean(axis=-1) / math.tau)
         since = _last(np.abs(apart - math.tau * turns[:, None]) > ruler.near) + 1
-        held = kept - since >= least
+        held = pairs - since >= least
         which = np.flatnonzero(free)[held]
         n[which], w[which] = cycle, turns[held].astype(np.int64)
         settled[which] = since[held] * ruler.tick
@@ -144,5 +146,5 @@ def repeats(reading: Floats, ruler: Ruler) -> tuple[Whole, Whole, Floats]:
 def _last(true: Mask) -> Whole:
     """Return the last true index of each row, -1 if there is none."""
     size = true.shape[-1]
-    found = size - 1 - np.argmax(true[:, ::-1], axis=-1)
-    return np.where(true.any(axis=-1), found, -1).astype(np.int64)
+    last = size - 1 - np.argmax(true[:, ::-1], axis=-1)
+    return np.where(true.any(axis=-1), last, -1).astype(np.int64)

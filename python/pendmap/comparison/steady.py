@@ -200,8 +200,8 @@ def _closed(row: Floats, period: float) -> Cycle | None:
 def compared(measured: tuple[Cycle, int], ends: tuple[Reached, ...]) -> Steady:
     """Return the comparison of a record's cycle with the nearest one of a model."""
     cycle, cycles = measured
-    found = [one.cycle.nearest(cycle) for one in ends]
-    rms, model = min(found, key=lambda pair: pair[0], default=(math.inf, cycle))
+    pairs = [one.cycle.nearest(cycle) for one in ends]
+    rms, model = min(pairs, key=lambda pair: pair[0], default=(math.inf, cycle))
     if not math.isfinite(rms):
         return Steady(cycle, cycles, ends, None, math.nan, math.nan)
     off = math.sqrt(float(np.mean((model.velocity - cycle.velocity) ** 2)))

@@ -14,7 +14,7 @@ from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.fitted_model import settles
 from pendmap.diagnosis.named import name_effects
-from pendmap.diagnosis.result import MOST_EFFECTS, Discrepancy
+from pendmap.diagnosis.result import Discrepancy
 from pendmap.diagnosis.scores import Scores
 from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
@@ -42,7 +42,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     records: Records | Sequence[Records],
     *,
     model: Rig | None = None,
-    max_effects: int = MOST_EFFECTS,
+    max_effects: int = 3,
     without: Collection[str] = (),
     effects: Sequence[Formula] = (),
     thresholds: Thresholds | None = None,

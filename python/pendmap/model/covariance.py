@@ -70,8 +70,8 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
         )
     for name, deviation in between.items():
         matrix[names.index(name), names.index(name)] += check_number(name, deviation) ** 2
-    kept = [k for k, name in enumerate(names) if "[" not in name and name not in ("bias", "tilt")]
-    return Covariance(tuple(names[k] for k in kept), matrix[np.ix_(kept, kept)])
+    places = [k for k, name in enumerate(names) if "[" not in name and name not in ("bias", "tilt")]
+    return Covariance(tuple(names[k] for k in places), matrix[np.ix_(places, places)])
 
 
 def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
@@ -83,15 +83,15 @@ def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
     if known is None or not set(known.names) & set(exact):
         return dict(notes)
     table, names = notes["covariance"], notes["covariance"]["names"]
-    kept = [k for k, name in enumerate(names) if name not in exact]
+    places = [k for k, name in enumerate(names) if name not in exact]
     parts = {
         key: {name: part for name, part in table[key].items() if name not in exact}
         for key in ("ci95", "between_runs")
         if isinstance(table.get(key), dict)
     }
     cut = {
-        "names": [names[k] for k in kept],
-        "matrix": [[table["matrix"][j][k] for k in kept] for j in kept],
+        "names": [names[k] for k in places],
+        "matrix": [[table["matrix"][j][k] for k in places] for j in places],
     }
     return {**notes, "covariance": table | cut | parts}
 

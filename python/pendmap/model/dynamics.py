@@ -86,9 +86,9 @@ class Dynamics(abc.ABC):
                [-1.5, -0.1]])
         """
         _, by_theta, by_velocity = self._rates(t, theta, v)
-        found = np.zeros((*by_theta.shape, 2, 2))
-        found[..., 0, 1], found[..., 1, 0], found[..., 1, 1] = 1.0, by_theta, by_velocity
-        return found
+        numbers = np.zeros((*by_theta.shape, 2, 2))
+        numbers[..., 0, 1], numbers[..., 1, 0], numbers[..., 1, 1] = 1.0, by_theta, by_velocity
+        return numbers
 
     def rhs(self, t: float, y: ArrayLike) -> Floats:
         """Return ``[th', th'']`` of a state, for ``scipy.integrate.solve_ivp``.
@@ -140,11 +140,11 @@ class Dynamics(abc.ABC):
         scaled = units.bare(arrays[0], TIME), arrays[1], units.bare(arrays[2], VELOCITY)
         flat = [np.ascontiguousarray(np.broadcast_to(array, shape)).ravel() for array in scaled]
         with core_errors():
-            found = _core.rates(bare, *flat)
+            numbers = _core.rates(bare, *flat)
         powers = (ACCELERATION, ACCELERATION, ACCELERATION - VELOCITY)
         return [
             units.given(values.reshape(shape), power)
-            for values, power in zip(found, powers, strict=True)
+            for values, power in zip(numbers, powers, strict=True)
         ]
 
 

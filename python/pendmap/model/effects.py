@@ -117,8 +117,8 @@ class EffectDefinition:
     def of(cls, entry: dict[str, Any]) -> EffectDefinition:
         """Return the definition of an entry of the Rust core."""
         parameters = [
-            EffectParameter(**each | {key: tuple(each[key]) for key in ("range", "typical")})
-            for each in entry["parameters"]
+            EffectParameter(**part | {key: tuple(part[key]) for key in ("range", "typical")})
+            for part in entry["parameters"]
         ]
         return cls(**entry | {"parameters": tuple(parameters)})
 
@@ -129,7 +129,7 @@ class EffectDefinition:
     @property
     def opposing(self) -> str | None:
         """Name of the size if the effect is damping whose size is 0 or more."""
-        size = next((each for each in self.parameters if each.role == "size"), None)
+        size = next((parameter for parameter in self.parameters if parameter.role == "size"), None)
         opposes = size is not None and self.group == "damping" and size.typical[0] >= 0
         return size.name if size is not None and opposes else None
 
@@ -216,7 +216,9 @@ class Effect:
         given = _mapping(f"{self.name}: parameters", self.parameters, names)
         missing = [name for name in names if name not in given]
         if missing:
-            needed = ", ".join(f"{each.name} ({each.unit})" for each in self.definition.parameters)
+            needed = ", ".join(
+                f"{parameter.name} ({parameter.unit})" for parameter in self.definition.parameters
+            )
             raise InputError(f"{self.name}: {missing[0]} is missing: it needs {needed}")
         values = {name: check_number(f"{self.name}: {name}", given[name]) for name in names}
         object.__setattr__(self, "parameters", values)
@@ -245,15 +247,19 @@ class Effect:
     def blank(cls, name: str, units: Units) -> Effect:
         """Return an effect as the start of a search: smallest typical size, middle shape."""
         values = {
-            each.name: float(f"{each.middle:.1g}") if each.is_shape else each.typical[0]
-            for each in definition(name).parameters
+            parameter.name: float(f"{parameter.middle:.1g}")
+            if parameter.is_shape
+            else parameter.typical[0]
+            for parameter in definition(name).parameters
         }
         return cls(name, values).given(units)
 
     @property
     def sizes(self) -> list[str]:
         """Names of the parameters that are its strength or the phase at which it acts."""
-        return [each.name for each in self.definition.parameters if not each.is_shape]
+        return [
+            parameter.name for parameter in self.definition.parameters if not parameter.is_shape
+        ]
 
     @property
     def values(self) -> list[float]:
@@ -288,12 +294,16 @@ class Effect:
     def title(self, units: Units, without: Collection[str] = ()) -> str:
         """Return name and parameters, those of ``without`` (``EFFECT.PARAMETER``) left out."""
         shown = []
-        for each in self.definition.parameters:
-            if f"{self.name}.{each.name}" in without:
+        for parameter in self.definition.parameters:
+            if f"{self.name}.{parameter.name}" in without:
                 continue
-            said = units.si or (each.power_of_w0 == 0 and each.power_of_w0_less is None)
-            unit = each.unit if said and each.unit != "1" else ""
-            shown.append(f"{each.name} = {self.parameters[each.name]:.4g} {unit}".rstrip())
+            has_unit = units.si or (
+                parameter.power_of_w0 == 0 and parameter.power_of_w0_less is None
+            )
+            unit = parameter.unit if has_unit and parameter.unit != "1" else ""
+            shown.append(
+                f"{parameter.name} = {self.parameters[parameter.name]:.4g} {unit}".rstrip()
+            )
         return f"{self.name} ({', '.join(shown)})" if shown else self.name
 
     def given(self, units: Units) -> Effect:
@@ -307,8 +317,9 @@ class Effect:
     def _scaled(self, scale: Any) -> Effect:  # noqa: ANN401 (a method of Units)
         # Exponents have the power 0: they are the same in all units.
         powers = {
-            each.name: each.power_of_w0 - self.parameters.get(each.power_of_w0_less or "", 0)
-            for each in self.definition.parameters
+            parameter.name: parameter.power_of_w0
+            - self.parameters.get(parameter.power_of_w0_less or "", 0)
+            for parameter in self.definition.parameters
         }
         return dataclasses.replace(
             self,

@@ -142,10 +142,10 @@ class Formula:
         key = FormulaKey(self.name, self.term, self.revealed_by, parts)
         with core_errors():
             entry, proportional = _core.formula(key)
-        kept = dict(zip(names, tables, strict=True))
+        described = dict(zip(names, tables, strict=True))
         definition = EffectDefinition.of(entry)
-        found = {"key": key, "definition": definition, "proportional": proportional}
-        for what, value in (found | {"parameters": kept}).items():
+        fields = {"key": key, "definition": definition, "proportional": proportional}
+        for what, value in (fields | {"parameters": described}).items():
             object.__setattr__(self, what, value)
 
     def __hash__(self) -> int:
@@ -181,13 +181,13 @@ def each_table(
 
 def formulas_of(tables: object) -> dict[str, Formula]:
     """Return the formulas of a file's tables ``[[formula]]`` by name, each name once."""
-    found: dict[str, Formula] = {}
+    formulas: dict[str, Formula] = {}
     for where, table in each_table("formula", tables, FORMULA, _EXAMPLES):
         formula = Formula(**table)
-        if formula.name in found:
+        if formula.name in formulas:
             raise InputError(f"{where}: each name must occur once, {formula.name} occurs twice")
-        found[formula.name] = formula
-    return found
+        formulas[formula.name] = formula
+    return formulas
 
 
 def load_formulas(path: str | os.PathLike[str]) -> list[Formula]:
@@ -230,11 +230,11 @@ def _parameter(
     """Return a parameter as passed to the core, and as a table without defaults."""
     if not isinstance(name, str):
         raise InputError(f"parameter must be a name, got {short_repr(name)}")
-    said = given if isinstance(given, Mapping) else {"power": given}
-    check_keys(f"parameter '{name}': ", said, PARAMETER)
-    if "power" not in said:
+    entry = given if isinstance(given, Mapping) else {"power": given}
+    check_keys(f"parameter '{name}': ", entry, PARAMETER)
+    if "power" not in entry:
         raise InputError(f"parameter '{name}': power is missing: the power of w0 in its unit")
-    power, less = _power(name, said["power"], names)
+    power, less = _power(name, entry["power"], names)
     unit = f"s^{-power:g}" if power != 0 else "1"
     defaults = {
         "typical": _TYPICAL,
@@ -243,15 +243,15 @@ def _parameter(
         "meaning": "",
         "role": None,
     }
-    found: dict[str, Any] = dict(defaults)
+    values: dict[str, Any] = dict(defaults)
     for what in ("unit", "meaning", "typical", "range", "role"):
-        if what in said:
-            found[what] = _checked(
-                f"parameter '{name}': {what}", what, said[what], first=name == names[0]
+        if what in entry:
+            values[what] = _checked(
+                f"parameter '{name}': {what}", what, entry[what], first=name == names[0]
             )
-    kept = {key: value for key, value in found.items() if value != defaults[key]}
-    table = {key: list(v) if isinstance(v, tuple) else v for key, v in kept.items()}
-    key = ParameterKey(name=name, power=power, less=less, **found)
+    changed = {key: value for key, value in values.items() if value != defaults[key]}
+    table = {key: list(v) if isinstance(v, tuple) else v for key, v in changed.items()}
+    key = ParameterKey(name=name, power=power, less=less, **values)
     return key, {"power": power if less is None else f"2 - {names[less]}"} | table
 
 

@@ -56,8 +56,8 @@ def unit_of(
     parameter: str, definition: Callable[[str], EffectDefinition] = effects.definition
 ) -> str:
     """Return the SI unit, with raised digits, of ``w0``, ``phi[2]`` or ``EFFECT.PARAMETER``."""
-    effect, _, own = parameter.partition("[")[0].rpartition(".")
-    if not effect and own not in LABELS:
+    effect, _, name = parameter.partition("[")[0].rpartition(".")
+    if not effect and name not in LABELS:
         return ""
-    unit = definition(effect)[own].unit if effect else LABELS[own].unit
+    unit = definition(effect)[name].unit if effect else LABELS[name].unit
     return "" if unit == "1" else re.sub(r"\^(\d)", lambda m: m[1].translate(_RAISED), unit)

@@ -90,8 +90,8 @@ class Pendulum(Dynamics):
                 raise InputError(f"{name} must be 0 or more, got {getattr(self, name):g}")
         if self.omega <= 0:
             raise InputError(f"omega must be a number above 0, got {self.omega:g}")
-        own = {name: (name, getattr(self, name)) for name in self.numbers()}
-        object.__setattr__(self, "effects", checked_effects(self.effects, own))
+        parameters = {name: (name, getattr(self, name)) for name in self.numbers()}
+        object.__setattr__(self, "effects", checked_effects(self.effects, parameters))
         if self.effects:
             _ = self.period  # the core refuses effects that occur twice or are outside their range
 
@@ -140,7 +140,9 @@ class Pendulum(Dynamics):
         return title_of(self, names, {"gamma", "p"})
 
 
-def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tuple[Effect, ...]:
+def checked_effects(
+    effects: object, parameters: Mapping[str, tuple[str, float]]
+) -> tuple[Effect, ...]:
     """Return effects as a tuple; refuse one that repeats a parameter of a model.
 
     ``own`` has the model's name and value of each parameter of a :class:`Pendulum`.
@@ -153,8 +155,8 @@ def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tu
             continue
         # The only parameter of an effect that duplicates one of the model has its name.
         names = [parameter.name for parameter in effect.definition.parameters]
-        if len(names) == 1 and names[0] in own:
-            called, value = own[names[0]]
+        if len(names) == 1 and names[0] in parameters:
+            called, value = parameters[names[0]]
             if value != 0:
                 raise InputError(
                     f"{called} is {value:g}, the same term as the effect {effect.name}: "
@@ -195,9 +197,9 @@ def attributes_of(
     except (TypeError, ValueError):  # notes that no file can hold
         text = model_text(dataclasses.replace(model, notes={}))
     angle = {"angle": "line"} if pendulum.counts_turns else {}
-    found = {"units": model.units.name} | numbers | bare | {"model": text} | angle
+    facts = {"units": model.units.name} | numbers | bare | {"model": text} | angle
     ratio = misses(model.notes)
-    return found | ({"misses_record": ratio} if math.isfinite(ratio) else {})
+    return facts | ({"misses_record": ratio} if math.isfinite(ratio) else {})
 
 
 def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
@@ -223,9 +225,9 @@ def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
 
 def _table(effect: Effect) -> dict[str, Any]:
     """Return an effect as a table without empty keys."""
-    said = {key: getattr(effect, key) for key in EFFECT}
-    said["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
-    return {key: value for key, value in said.items() if value is not None}
+    entries = {key: getattr(effect, key) for key in EFFECT}
+    entries["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
+    return {key: value for key, value in entries.items() if value is not None}
 
 
 def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:

@@ -97,8 +97,8 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
         if not ways["Omega"]:
             raise InputError(f"{name} needs a frequency: Omega or frequency_hz must be given")
         omega = one("Omega", ways["Omega"])
-        said = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
-        ways["p"][f"Y Omega^2/g of {said}"] = amplitude(checked[name] * metre, omega, gravity)
+        others = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
+        ways["p"][f"Y Omega^2/g of {others}"] = amplitude(checked[name] * metre, omega, gravity)
     result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
     return result | {name: one(name, known) for name, known in ways.items() if known}
 
@@ -108,9 +108,9 @@ def one(name: str, ways: Mapping[str, float]) -> float:
     (first, value), *others = ways.items()
     for other, second in others:
         if abs(second - value) > _AGREE * max(abs(value), abs(second)):
-            said = f"{name} is {value:.6g}" + ("" if first == name else f" by {first}")
+            stated = f"{name} is {value:.6g}" + ("" if first == name else f" by {first}")
             raise InputError(
-                f"{said}, but {second:.6g} by {other}: they contradict, one of them must be left "
+                f"{stated}, but {second:.6g} by {other}: they contradict, one of them must be left "
                 "out"
             )
     return value

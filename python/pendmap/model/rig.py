@@ -106,8 +106,8 @@ class Rig(Dynamics):
             stroke = check_number("given_stroke", self.given_stroke)
             if not self.Omega or self.p != quantities.amplitude(stroke, self.Omega, self.gravity):
                 object.__setattr__(self, "given_stroke", None)
-        own = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
-        object.__setattr__(self, "effects", checked_effects(self.effects, own))
+        parameters = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
+        object.__setattr__(self, "effects", checked_effects(self.effects, parameters))
         if self.Omega == 0 and (self.p != 0 or any(effect.drives for effect in self.effects)):
             raise InputError("Omega must be a number above 0 where something is driven, got 0")
         try:

@@ -38,7 +38,7 @@ def schema() -> dict[str, Any]:
     rig = {name: _labelled(LABELS[name]) for name in SI_KEYS}
     bare = {name: _labelled(LABELS[name]._replace(unit="")) for name in BARE_KEYS}
     name = _TEXT | {"not": {"enum": [*library()]}}
-    own = _of_effect("An effect by a formula of this file", name, _values(_NUMBER))
+    by_formula = _of_effect("An effect by a formula of this file", name, _values(_NUMBER))
     given = [{"required": [name]} for name in ("w0", "length_m")]
     parts: dict[str, Any] = {
         "pendulum": {
@@ -47,7 +47,7 @@ def schema() -> dict[str, Any]:
         "formula": {"type": "array", "items": _formula()},
         "effect": {
             "type": "array",
-            "items": {"anyOf": [*map(_effect, library().values()), own]},
+            "items": {"anyOf": [*map(_effect, library().values()), by_formula]},
         },
         "covariance": {"type": "object", "description": "Uncertainty of the fitted parameters"},
         "provenance": {"type": "object", "description": "Origin of the numbers"},
@@ -69,8 +69,8 @@ def _labelled(label: Label) -> dict[str, Any]:
 def _effect(effect: EffectDefinition) -> dict[str, Any]:
     """Return the schema of an effect of the library."""
     numbers = {
-        each.name: _NUMBER | {"description": f"{each.meaning}, {each.unit} in SI"}
-        for each in effect.parameters
+        parameter.name: _NUMBER | {"description": f"{parameter.meaning}, {parameter.unit} in SI"}
+        for parameter in effect.parameters
     }
     parameters = _table(effect.formula, numbers, numbers)
     return _of_effect(effect.name, {"const": effect.name}, parameters)

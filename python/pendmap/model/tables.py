@@ -104,7 +104,7 @@ def _own_name(name: str) -> str:
     """Return the name in a :class:`Rig` of a typed quantity."""
     if name in COUNTERPARTS:
         return COUNTERPARTS[name][0]
-    return next((own for own, ways in quantities.GROUPS.items() if name in ways), name)
+    return next((si for si, ways in quantities.GROUPS.items() if name in ways), name)
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:
@@ -154,6 +154,6 @@ def effects_in(content: Mapping[str, Any]) -> tuple[Effect, ...]:
             effects.append(Effect(**table, formula=formula))
         except InputError as error:
             unknown = formula is None and formulas and str(error).startswith("name must be")
-            own = f", and this file's [[formula]] are {', '.join(formulas)}" if unknown else ""
-            raise InputError(f"{where}: {error}{own}") from None
+            others = f", and this file's [[formula]] are {', '.join(formulas)}" if unknown else ""
+            raise InputError(f"{where}: {error}{others}") from None
     return tuple(effects)

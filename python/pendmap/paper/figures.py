@@ -151,16 +151,16 @@ def printed_table() -> tuple[list[str], list[list[str]]]:
     return ["the paper's own", *_PRINTED_HEAD], rows
 
 
-def write_table(found: IdentificationReport, path: str | os.PathLike[str]) -> Path:
+def write_table(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
     """Write table 1 as CSV, in percent; a cell is empty if the simulation is at rest by then."""
-    names = [name for name, each in found.methods.items() if each.applicable]
+    names = [name for name, method in report.methods.items() if method.applicable]
     with (
         whole_file(path, [".csv"]) as part,
         part.open("w", encoding="utf-8", newline="") as file,
     ):
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["what", "measured", "unit", *(f"{name}_percent" for name in names)])
-        for row in found.table.rows:
+        for row in report.table.rows:
             errors = [row.errors.get(name, float("nan")) for name in names]
             cells = ["" if error != error else repr(float(error)) for error in errors]  # noqa: PLR0124
             unit = "s" if row.what == "period" else "rad"

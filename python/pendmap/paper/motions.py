@@ -57,13 +57,13 @@ def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
     from pendmap.analysis.grid import Axis, Grid  # noqa: PLC0415
 
     grid = Grid(Axis(-math.pi, math.pi, _CELLS), Axis(-_FASTEST, _FASTEST, _CELLS))
-    found = basins(model, grid, check=False)
-    own = (found["kind"] == kind) & (found["n"] == n) & (found["w"] == w)
-    here = np.isin(found["label"].values, found["id"].values[own.values])
+    result = basins(model, grid, check=False)
+    wanted = (result["kind"] == kind) & (result["n"] == n) & (result["w"] == w)
+    here = np.isin(result["label"].values, result["id"].values[wanted.values])
     # The angle is periodic: the map is tiled three times and the middle copy is used.
     deep = distance_transform_edt(np.tile(here, 3))[:, _CELLS : 2 * _CELLS]
     row, column = np.unravel_index(int(np.argmax(deep)), deep.shape)
-    return float(found["theta"].values[column]), float(found["velocity"].values[row])
+    return float(result["theta"].values[column]), float(result["velocity"].values[row])
 
 
 def _beside(

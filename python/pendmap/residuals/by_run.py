@@ -62,17 +62,17 @@ def parameters_by_run(
     runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise, level: float
 ) -> RunByRun:
     """Return first-order estimates of each run's parameters (Cochran 1954, Biometrics 10, 101)."""
-    found = sensitivities(fit, runs, (), fit.model)
-    sizes = np.linalg.norm(found.columns, axis=0)
-    columns = found.columns / np.where(sizes > 0, sizes, 1.0)
-    wanted: dict[str, list[tuple[float, float]]] = {name: [] for name in found.names}
+    slopes = sensitivities(fit, runs, (), fit.model)
+    sizes = np.linalg.norm(slopes.columns, axis=0)
+    columns = slopes.columns / np.where(sizes > 0, sizes, 1.0)
+    wanted: dict[str, list[tuple[float, float]]] = {name: [] for name in slopes.names}
     q, degrees = 0.0, -_rank(columns.T @ columns)
     for k in range(len(runs)):
-        own = columns[found.run == k]
-        pull, information = own.T @ found.residual[found.run == k], own.T @ own
+        rows = columns[slopes.run == k]
+        pull, information = rows.T @ slopes.residual[slopes.run == k], rows.T @ rows
         q += float(pull @ np.linalg.pinv(information, rcond=BLIND, hermitian=True) @ pull)
         degrees += _rank(information)
-        for place, name in enumerate(found.names):
+        for place, name in enumerate(slopes.names):
             own_information = float(information[place, place])
             value = fit.estimates[name].value
             if own_information <= BLIND:

@@ -91,19 +91,19 @@ def calm_responses(
     every, growth = [], []
     for window in windows:
         run = runs[window.run]
-        kept = np.flatnonzero(window.weight > 0)
-        if kept.size < KEPT:
+        weighted = np.flatnonzero(window.weight > 0)
+        if weighted.size < KEPT:
             continue
-        time = run.time[window.first + kept]
-        states, residual = window.states[kept], window.residual[kept]
+        time = run.time[window.first + weighted]
+        states, residual = window.states[weighted], window.residual[weighted]
         basis, _ = np.linalg.qr(states)
-        angles = states / window.weight[kept, None]
+        angles = states / window.weight[weighted, None]
         a, b = angles.T
         wronskian = np.exp(damping * (time[0] - time))
         every.append(
             Response(
                 time=run.lab_time_s + time,
-                cosine=np.cos(run.theta[window.first + kept]),
+                cosine=np.cos(run.theta[window.first + weighted]),
                 residual=residual - basis @ (basis.T @ residual),
                 states=states,
                 kernel=np.stack([-b, a], axis=1) / wronskian[:, None],
@@ -112,17 +112,17 @@ def calm_responses(
         )
         growth.append(float(np.abs(angles).max()))
     least = GROWTH * min(growth, default=0.0)
-    return [own for own, by in zip(every, growth, strict=True) if by <= least]
+    return [response for response, by in zip(every, growth, strict=True) if by <= least]
 
 
 def instants(responses: Sequence[Response]) -> list[float]:
     """Return the laboratory times, s, of the impulses with the greatest gains."""
     time, gain = [], []
-    for own in responses:
-        pull, information = own.pull(own.residual), own.information()
+    for response in responses:
+        pull, information = response.pull(response.residual), response.information()
         score = np.divide(pull**2, information, out=np.zeros_like(pull), where=information > 0)
         peaks = (score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])
-        time.append(own.time[1:-1][peaks])
+        time.append(response.time[1:-1][peaks])
         gain.append(score[1:-1][peaks])
     return _greatest(np.concatenate(time), np.concatenate(gain), 0.0)
 
@@ -133,9 +133,9 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
     Each window has its products ``P`` with ``exp(i w t)`` in its own time, and their moments from
     noise, ``E |P|^2`` and ``E P^2``; they are shifted in phase to laboratory time and summed.
     """
-    first = min(own.time[0] for own in responses)
-    span = max(own.time[-1] for own in responses) - first
-    longest = max(float(np.ptp(own.time)) for own in responses)
+    first = min(response.time[0] for response in responses)
+    span = max(response.time[-1] for response in responses) - first
+    longest = max(float(np.ptp(response.time)) for response in responses)
     spacing = 0.5 * np.pi / most
     size = 1 << math.ceil(math.log2(FINE * (longest / spacing + 2)))
     coarse = 2 * np.pi * np.fft.rfftfreq(size, spacing)
@@ -147,13 +147,13 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
         return []
     rng = np.random.default_rng(0)
     pull, square, both = (np.zeros(omega.size, complex) for _ in range(3))
-    for own in responses:
-        place = ((own.time - own.time[0]) / spacing).astype(np.int64)
-        step = np.gradient(own.time) * own.cosine
-        values = np.stack([own.residual, *(own.noise(rng) for _ in range(DRAWS))])
-        binned = [np.bincount(place, own.pull(v) * step, place[-1] + 1) for v in values]
+    for response in responses:
+        place = ((response.time - response.time[0]) / spacing).astype(np.int64)
+        step = np.gradient(response.time) * response.cosine
+        values = np.stack([response.residual, *(response.noise(rng) for _ in range(DRAWS))])
+        binned = [np.bincount(place, response.pull(v) * step, place[-1] + 1) for v in values]
         products = np.conj(np.fft.rfft(binned, size))
-        turn = np.exp(1j * omega * (own.time[0] - first))
+        turn = np.exp(1j * omega * (response.time[0] - first))
         pull += turn * np.interp(omega, coarse, products[0])
         square += turn**2 * np.interp(omega, coarse, np.mean(products[1:] ** 2, axis=0))
         both += np.interp(omega, coarse, np.mean(np.abs(products[1:]) ** 2, axis=0))
@@ -171,17 +171,19 @@ def frequencies(responses: Sequence[Response], most: float) -> list[float]:
 def _exact_gain(responses: Sequence[Response], omega: float) -> float:
     """Return the gain of a pivot sway of one frequency, without simulated noise."""
     pull, information = np.zeros(2), np.zeros((2, 2))
-    for own in responses:
-        columns = own.answer(np.exp(1j * omega * own.time) * own.cosine * np.gradient(own.time))
-        pull += columns.T @ own.residual
+    for response in responses:
+        columns = response.answer(
+            np.exp(1j * omega * response.time) * response.cosine * np.gradient(response.time)
+        )
+        pull += columns.T @ response.residual
         information += columns.T @ columns
     return float(pull @ np.linalg.pinv(information, hermitian=True) @ pull)
 
 
 def _greatest(values: Floats, gains: Floats, apart: float) -> list[float]:
     """Return the values with the greatest gains that are more than ``apart`` from each other."""
-    kept: list[float] = []
+    chosen: list[float] = []
     for k in np.argsort(-gains):
-        if len(kept) < KEPT and all(abs(values[k] - other) > apart for other in kept):
-            kept.append(float(values[k]))
-    return kept
+        if len(chosen) < KEPT and all(abs(values[k] - other) > apart for other in chosen):
+            chosen.append(float(values[k]))
+    return chosen

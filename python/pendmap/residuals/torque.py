@@ -94,7 +94,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
         for window, place in zip(windows, places, strict=True)
     ]
     further, residual = project_out(runs, windows, columns)
-    found: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
     torques, errors, _ = _solved(further, residual)
     # The noise level is at least the sum of squares over the effective number of readings.
@@ -104,10 +104,10 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     first = 0
     for name, edge in edges.items():
         lows, highs = edge[:-1], edge[1:]
-        own = slice(first, first + lows.size)
-        gains[name] = _solved(further[:, own], residual)[2]
-        columns_of = (lows, highs, torques[own], errors[own])
-        found[name] = [
+        part = slice(first, first + lows.size)
+        gains[name] = _solved(further[:, part], residual)[2]
+        columns_of = (lows, highs, torques[part], errors[part])
+        rows[name] = [
             {
                 "over": name,
                 "unit": OVER[name],
@@ -120,8 +120,8 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
             }
             for low, high, torque, error in np.stack(columns_of, axis=1).tolist()
         ]
-        first = own.stop
-    return Torque(found, gains, noise)
+        first = part.stop
+    return Torque(rows, gains, noise)
 
 
 def window_derivatives(
@@ -141,11 +141,11 @@ def project_out(
     Excluded samples are set to 0, also in ``windows``.
     """
     parts = []
-    for window, own in zip(windows, columns, strict=True):
+    for window, part in zip(windows, columns, strict=True):
         lost = ~runs[window.run].counted[window.first : window.first + len(window.residual)]
-        for values in (own, window.columns, window.states, window.residual):
+        for values in (part, window.columns, window.states, window.residual):
             values[lost] = 0.0
-        parts.append(window.freed(own))
+        parts.append(window.freed(part))
     base, further, residual = (np.concatenate([p[k] for p in parts]) for k in range(3))
     sizes = np.linalg.norm(base, axis=0)
     u, s, _ = np.linalg.svd(base[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
@@ -161,8 +161,8 @@ def outstanding_bins(torque: Torque) -> list[dict[str, Any]]:
 
 def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, Floats]:
     """Return the quantities of OVER at each sample of a window."""
-    own = slice(window.first, window.first + len(window.residual))
-    theta, velocity = (row[own] for row in fit.curves[window.run])
+    part = slice(window.first, window.first + len(window.residual))
+    theta, velocity = (row[part] for row in fit.curves[window.run])
     energy = 1 - np.cos(theta) + 0.5 * (velocity / fit.model.w0) ** 2
     amplitude = np.where(
         energy > 2,  # noqa: PLR2004 (of the inverted pendulum at rest)
@@ -172,14 +172,14 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
     phase = np.full(theta.shape, math.nan)
     drive = fit.drive_of(run, window.run)
     if drive:
-        turned = (drive.get("Omega") or 0.0) * run.time[own] + (drive["phi"] or 0.0)
+        turned = (drive.get("Omega") or 0.0) * run.time[part] + (drive["phi"] or 0.0)
         phase = np.angle(np.exp(1j * turned))
     return {
         "angle": np.angle(np.exp(1j * theta)),
         "velocity": velocity,
         "amplitude": amplitude,
         "drive_phase": phase,
-        "lab_time": run.lab_time_s + run.time[own],
+        "lab_time": run.lab_time_s + run.time[part],
     }
 
 
@@ -199,8 +199,8 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 
     ``torques`` are per moment of inertia at the window's samples, rad/s^2, shape (n, k).
     """
-    own = slice(window.first, window.first + len(window.residual))
-    time = run.time[own]
+    part = slice(window.first, window.first + len(window.residual))
+    time = run.time[part]
     if time.size < 3:  # noqa: PLR2004 (no slope)
         return np.zeros(torques.shape)
     weight = window.weight

@@ -164,15 +164,15 @@ class WindowFit:
 
     def _nearest_root(self, ascending: Floats) -> float | None:
         # Newton's method from the middle nearly always converges and is faster than all roots.
-        found = _newton(ascending.tolist())
-        if found is None:
+        root = _newton(ascending.tolist())
+        if root is None:
             roots = np.roots(ascending[::-1])
             real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
             real = real[np.abs(real) < 1]
             if real.size == 0:
                 return None
-            found = float(real[np.argmin(np.abs(real))])
-        return self.centre + self.half * found
+            root = float(real[np.argmin(np.abs(real))])
+        return self.centre + self.half * root
 
 
 def _newton(ascending: list[float]) -> float | None:

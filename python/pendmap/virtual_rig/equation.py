@@ -76,14 +76,14 @@ class Equation:
         lab, pivot = self.lab[run] + time, self.drive.at(run, time)
         return Motion(time, lab, theta, velocity, direction, side, *pivot, self.parameters.w0)
 
-    def smooth(self, m: Motion, own: Floats) -> Floats:
+    def smooth(self, m: Motion, states: Floats) -> Floats:
         """Return the acceleration without dry friction, rad/s^2, shape (L, K), for unit inertia."""
         p = self.parameters
         total = -p.c_over_m * m.velocity - p.w0**2 * (1 + m.vertical) * m.sin
         if not isinstance(m.lateral, float):
             total -= p.w0**2 * m.lateral * m.cos
         for effect, part in zip(self.effects, self._own, strict=True):
-            total = total + effect.reaction(m, own[..., part])
+            total = total + effect.reaction(m, states[..., part])
         return total
 
     def friction(self, m: Motion) -> Floats | float:
@@ -93,17 +93,17 @@ class Equation:
             level = level + effect.friction(m)
         return level
 
-    def rates(self, m: Motion, own: Floats) -> tuple[Floats, Floats]:
+    def rates(self, m: Motion, states: Floats) -> tuple[Floats, Floats]:
         """Return accelerations, 0 for sticking lanes, and rates of the effects' state variables."""
-        force = self.smooth(m, own) - m.direction * self.friction(m)
+        force = self.smooth(m, states) - m.direction * self.friction(m)
         inertia: Floats | float = 1.0
         for effect in self.effects:
             inertia = inertia + effect.inertia(m)
         acceleration = np.where(m.direction == 0, 0.0, force / inertia)
         if not self.states:
-            return acceleration, own
+            return acceleration, states
         parts = [
-            effect.rates(m, own[..., part], acceleration)
+            effect.rates(m, states[..., part], acceleration)
             for effect, part in zip(self.effects, self._own, strict=True)
         ]
         return acceleration, np.concatenate(parts, axis=-1)
@@ -116,5 +116,5 @@ class Equation:
     def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
         """Return times since the run began, s, and velocity jumps at them, rad/s."""
         lab = float(self.lab[run])
-        found = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
-        return sorted((time - lab, jump) for time, jump in found)
+        kicks = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
+        return sorted((time - lab, jump) for time, jump in kicks)

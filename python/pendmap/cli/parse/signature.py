@@ -101,8 +101,9 @@ def _declared(node: ast.FunctionDef | ast.ClassDef) -> Iterator[tuple[str, str, 
         pairs = zip(names, defaults, strict=True)
         fields = [(one.arg, one.annotation, default) for one, default in pairs]
     for name, annotation, value in fields:
-        literal = isinstance(value, ast.Constant | ast.UnaryOp | ast.Tuple)
-        default = ast.literal_eval(value) if literal and value is not None else None
+        default = None if value is None else ...
+        if isinstance(value, ast.Constant | ast.UnaryOp | ast.Tuple):
+            default = ast.literal_eval(value)
         yield name, "" if annotation is None else ast.unparse(annotation), default
 
 
@@ -126,7 +127,8 @@ def options_of(
         annotation = parameter.annotation.split(" |")[0]
         written = f"--{typed.replace('_', '-')} {name}"
         kind, home = kinds.get(name, _TYPES.get(annotation, TEXT)), _GROUPS.get(name, group)
-        assert home is not None  # noqa: S101 (of our own sources)
+        # The default of an option must be a literal in the source.
+        assert home is not None and parameter.default is not ..., name  # noqa: S101, PT018
         if annotation == "bool":
             written = f"--no-{typed} {name}" if parameter.default else written
             options.append(flag(written, parameter.help, group=home, default=parameter.default))

@@ -181,13 +181,13 @@ class Effect:
         """Return the initial values of the effect's state variables, shape (L, K, states)."""
         return np.zeros((*motion.theta.shape, self.states))
 
-    def reaction(self, motion: Motion, own: Floats) -> Floats:
+    def reaction(self, motion: Motion, states: Floats) -> Floats:
         """Return the acceleration, rad/s^2, with the effect's state variables ``own``."""
         return np.asarray(self.acceleration(motion))
 
-    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
+    def rates(self, motion: Motion, states: Floats, acceleration: Floats) -> Floats:
         """Return the time derivatives of the state variables, shape (L, K, states)."""
-        return np.zeros_like(own)
+        return np.zeros_like(states)
 
     def alter(self, drive: Drive) -> Drive:
         """Return the actual drive, given the nominal one."""
@@ -211,14 +211,14 @@ def effect(
     group: str,
     formula: str,
     of: type[Effect] = Effect,
-    **said: Any,  # noqa: ANN401 (parameters and class variables)
+    **fields: Any,  # noqa: ANN401 (parameters and class variables)
 ) -> Callable[[Callable[..., Any]], type[Effect]]:
     """Return an Effect class, named after the function that implements its one ``method``.
 
     The function takes the method's arguments, then the effect's parameters. ``said`` holds these,
     made by :func:`size` and :func:`shape`, and class variables; a variant has those ``of`` another.
     """
-    parameters = [name for name, value in said.items() if isinstance(value, dataclasses.Field)]
+    parameters = [name for name, value in fields.items() if isinstance(value, dataclasses.Field)]
 
     def make(function: Callable[..., Any]) -> type[Effect]:
         def term(self: Effect, *given: Any) -> Any:  # noqa: ANN401 (those of the method)
@@ -233,7 +233,7 @@ def effect(
             "formula": formula,
             method: term,
         }
-        return type(function.__name__, (of,), body | said)
+        return type(function.__name__, (of,), body | fields)
 
     return make
 

@@ -121,11 +121,11 @@ class DahlFriction(Effect):
     f: float = size(0.012, 0.05, "rad/s^2")
     zc: float = shape(0.02, 0.1, "rad", least=1e-3)
 
-    def reaction(self, motion: Motion, own: Floats) -> Floats:
-        return -self.f / self.zc * own[..., 0]
+    def reaction(self, motion: Motion, states: Floats) -> Floats:
+        return -self.f / self.zc * states[..., 0]
 
-    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        slip = motion.velocity - motion.speed * own[..., 0] / self.zc
+    def rates(self, motion: Motion, states: Floats, acceleration: Floats) -> Floats:
+        slip = motion.velocity - motion.speed * states[..., 0] / self.zc
         return slip[..., np.newaxis]
 
 

@@ -29,7 +29,7 @@ def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
     everything = np.concatenate([time, turns])
     order = np.argsort(everything, kind="stable")
     seen = Reading(everything[order], path.angle(everything[order]), path)
-    for acting in sorted(effects, key=lambda each: each.order):
+    for acting in sorted(effects, key=lambda one: one.order):
         seen = seen._replace(angle=acting.distort(seen))
     result = np.empty_like(seen.angle)
     result[order] = seen.angle

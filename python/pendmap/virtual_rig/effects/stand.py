@@ -23,10 +23,10 @@ from pendmap.virtual_rig.effects.base import (
 _drive: Final = functools.partial(effect, "alter", "drive", needs="forced")
 
 
-def _recoil(motion: Motion, own: Floats, mode: tuple[float, float, float]) -> Floats:
+def _recoil(motion: Motion, states: Floats, mode: tuple[float, float, float]) -> Floats:
     """Return ``-2 z wx x' - wx^2 x + mu v^2 sin th``, the lateral mode's ``x''`` without th''."""
     mu, wx, z = mode
-    x, rate = own[..., 0], own[..., 1]
+    x, rate = states[..., 0], states[..., 1]
     return np.asarray(-2 * z * wx * rate - wx**2 * x + mu * motion.velocity**2 * motion.sin)
 
 
@@ -48,24 +48,24 @@ class PivotCompliance(Effect):
     def begin(self, motion: Motion) -> Floats:
         # Deflected by the force of the rod, and at rest.
         pull = motion.sin * (motion.w0**2 * (1 + motion.vertical) * motion.cos + motion.velocity**2)
-        own = np.zeros((*motion.theta.shape, self.states))
+        state = np.zeros((*motion.theta.shape, self.states))
         for k, (mu, wx, _) in enumerate(self._modes()):
-            own[..., 2 * k] = mu * pull / wx**2
-        return own
+            state[..., 2 * k] = mu * pull / wx**2
+        return state
 
-    def reaction(self, motion: Motion, own: Floats) -> Floats:
+    def reaction(self, motion: Motion, states: Floats) -> Floats:
         total = np.zeros_like(motion.theta)
         for k, mode in enumerate(self._modes()):
-            total -= _recoil(motion, own[..., 2 * k : 2 * k + 2], mode) * motion.cos
+            total -= _recoil(motion, states[..., 2 * k : 2 * k + 2], mode) * motion.cos
         return total
 
     def inertia(self, motion: Motion) -> Floats:
         return -sum(mode[0] for mode in self._modes()) * motion.cos**2
 
-    def rates(self, motion: Motion, own: Floats, acceleration: Floats) -> Floats:
-        result = np.empty_like(own)
+    def rates(self, motion: Motion, states: Floats, acceleration: Floats) -> Floats:
+        result = np.empty_like(states)
         for k, mode in enumerate(self._modes()):
-            pair = own[..., 2 * k : 2 * k + 2]
+            pair = states[..., 2 * k : 2 * k + 2]
             pull = mode[0] * acceleration * motion.cos
             result[..., 2 * k] = pair[..., 1]
             result[..., 2 * k + 1] = _recoil(motion, pair, mode) - pull
@@ -129,13 +129,13 @@ class ImpulseTrain(Effect):
     def kicks(self, begin: float, end: float) -> list[tuple[float, float]]:
         # The pattern has its own random stream, so that all parts of a run share it.
         rng = np.random.default_rng(int(self.pattern))
-        found, time = [], 0.0
+        kicks, time = [], 0.0
         while time < end:
             time += self.every * float(rng.uniform(0.3, 1.7))
             jump = self.J * float(rng.choice((-1.0, 1.0)))
             if begin < time < end:
-                found.append((time, jump))
-        return found
+                kicks.append((time, jump))
+        return kicks
 
 
 @_drive("p (1 + e)", signed=True, e=size(0.0015, 0.006, "", most=0.9))
