@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pendmap.analysis.result import point, records, variable
+from pendmap.analysis.result import point, records
+from pendmap.files.variables import variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:

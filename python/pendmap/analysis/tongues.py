@@ -15,10 +15,11 @@ from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics, in_rounds
-from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts
+from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted
 from pendmap.model import effects_of, without_dimensions
 from pendmap.units import RATE

@@ -82,7 +82,7 @@ def command(  # noqa: PLR0913 (the options above)
     name = PurePath(file).stem if at_address else str(PurePath(file).with_suffix(""))
     outputs = Outputs.take(given, name, reads=[] if at_address else [Path(file)], default=["plot"])
 
-    from pendmap.files.saved import load
+    from pendmap.files.dataset import load
 
     result = load(file)
     look |= {"layer": layer, "dpi": dpi, "colormap": colormap}

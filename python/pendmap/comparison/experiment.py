@@ -22,12 +22,13 @@ from pendmap.errors import (
 )
 from pendmap.files.saved import Saved
 from pendmap.formatting import counted, percent
+from pendmap.identification.results import ARRAYS, OF_MODEL
 from pendmap.model import Rig
 from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from pendmap.comparison.forced import Statistic
     from pendmap.comparison.steady import Steady
@@ -61,7 +62,33 @@ class Comparison(Saved):
     """
 
     KIND: ClassVar[str] = "comparison"
+    ARRAYS = ARRAYS | {
+        "RunComparison.curve": OF_MODEL,
+        "RunComparison.residual": ("reading", "rad", "reading less model; 0 if excluded"),
+        "ForcedComparison.time": ("instant", "s", "equal times of a forced run"),
+        "ForcedComparison.measured": ("instant", "rad", "record at these times"),
+        "ForcedComparison.velocity": ("instant", "rad/s", "velocity of the record"),
+        "ForcedComparison.example": {
+            "theta": ("instant", "rad", "reading of a member of the ensemble"),
+            "velocity": ("instant", "rad/s", "its velocity"),
+        },
+        "Statistic.ensemble": ("member", "1", "statistic of a member, in its unit"),
+        "Cycle.time": ("phase", "s", "time from a whole number of periods of the drive"),
+        "Cycle.theta": ("phase", "rad", "angle in a cycle, not wrapped"),
+        "Cycle.velocity": ("phase", "rad/s", "velocity in a cycle"),
+    }
     ROWS: ClassVar[str] = "row"
+    COLUMNS: ClassVar[Mapping[str, str]] = {
+        "run": "name of a run",
+        "quantity": "what is compared",
+        "record": "value of the record",
+        "model": "value of the model; of an ensemble the median",
+        "low": "lower end of 95 % of the ensemble",
+        "high": "upper end of 95 % of the ensemble",
+        "chance": "p-value of the record in the ensemble",
+        "error_percent": "absolute error of the model, percent",
+        "unit": "unit of a value; empty for a pure number",
+    }
 
     model: Rig
     experiment: Experiment
@@ -107,7 +134,8 @@ class Comparison(Saved):
                     for e in one.statistics
                 ]
         columns = ["run", "quantity", "record", "model", "low", "high", "chance", "error_percent"]
-        return pd.DataFrame(rows, columns=[*columns, "unit"]).set_index(columns[:2])
+        table = pd.DataFrame(rows, columns=[*columns, "unit"])
+        return table.astype({"unit": "string"}).set_index(columns[:2])
 
     def text_parts(self) -> tuple[list[Table], list[str]]:
         """Return the tables and the lines that ``pendmap compare`` prints."""

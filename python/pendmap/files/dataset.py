@@ -20,6 +20,7 @@ import pendmap.files.accessor  # noqa: F401 (dataset.pendmap)
 from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
 from pendmap.files import check_regular, sealed, whole_file, whole_folder
+from pendmap.files.fields import unpacked
 from pendmap.files.hdf5 import check_alone
 from pendmap.files.sealed import MARK
 
@@ -81,9 +82,8 @@ def save(
     'melnikov.nc'
     """
     target = Path(os.fspath(path).removeprefix("file://"))
-    if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
-        own: Path = dataset.save(target)
-        return own
+    if hasattr(type(dataset), "KIND"):  # what was found in records
+        dataset = dataset.to_dataset()
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
@@ -192,45 +192,82 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
     attributes: Any = {}
     with contextlib.suppress(InputError, LookupError, TypeError):
         attributes = dict(sealed.metadata(target)[0]["attributes"])
-    if not attributes.keys() >= _MARKS or attributes["kind"] not in [*KINDS]:
+    known = "content" in attributes or attributes.get("kind") in [*KINDS]
+    if not (attributes.keys() >= _MARKS and known):
         raise InputError(f"{target}: {wanted}; the folder does not contain a result")
     for name in sealed.foreign(target):
         raise InputError(f"{target}: {wanted}; it contains {name!r}, no part of a result")
 
 
-def load(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Return the dataset of a file or a store; raises as :func:`pendmap.load`."""
+def load(path: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a dataset, or any other result)
+    """Read a result back into memory.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that :func:`pendmap.save` or a result's own ``save`` wrote, or a store (``store=``)
+        at a path or an address.
+
+    Returns
+    -------
+    xarray.Dataset, IdentificationReport, Discrepancy or Comparison
+        The result as it was, with the same numbers.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, of a later format, or not yet complete; for a result of
+        records, also if another version of pendmap wrote it in another form.
+    OSError
+        If it cannot be read.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
+    >>> pendmap.load(path).attrs["kind"]
+    'melnikov'
+    """
     name = os.fspath(path).removeprefix("file://")
     source = name if "://" in name else Path(name)
+    _check_source(source)
+    try:
+        if PurePath(source).suffix.lower() == ".zarr":
+            mark = _check_complete(source)
+            store = sealed.open_store(source)
+            with open_zarr(source, store=store) as opened:
+                dataset = _loaded(opened, source)
+            sealed.check_digest(source, mark, store.digest())
+            dataset.attrs.pop(MARK, None)
+        else:
+            check_alone(Path(source))
+            with _ONE, _NETCDF(source) as opened:
+                dataset = _loaded(opened, source)
+        if "content" not in dataset.attrs:
+            return dataset
+        arrays = {str(name): one.to_numpy() for name, one in dataset.variables.items()}
+        return unpacked(dataset.attrs["content"], arrays)
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file may raise any error
+        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_source(source: Path | str) -> None:
+    """Raise InputError or OSError for what is no file or store by its name and kind."""
     suffix = PurePath(source).suffix.lower()
-    if isinstance(source, str) and suffix != ".zarr":
-        raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
-    if isinstance(source, Path) and not source.exists():
+    if isinstance(source, str):
+        if suffix != ".zarr":
+            raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
+        return
+    if not source.exists():
         if source.with_name(f"{source.name}.part").exists():
             raise InputError(f"{source}: {_UNFINISHED}")
         raise FileNotFoundError(2, "no such file", str(source))
     if suffix not in SUFFIXES:
         raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}")
-    if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
+    if not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
-    try:
-        stored = isinstance(source, str) or suffix == ".zarr"
-        if stored:
-            mark = _check_complete(source)
-            store = sealed.open_store(source)
-        else:
-            check_alone(Path(source))
-        with _ONE, open_zarr(source, store=store) if stored else _NETCDF(source) as opened:
-            _check_result(opened, source)
-            dataset = restored(opened.load())
-        if stored:
-            sealed.check_digest(source, mark, store.digest())
-        dataset.attrs.pop(MARK, None)
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file may raise any error
-        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
-    return dataset
 
 
 def restored(dataset: xr.Dataset) -> xr.Dataset:
@@ -267,7 +304,8 @@ def _check_complete(source: Path | str) -> dict[str, Any]:
     return mark
 
 
-def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
+def _loaded(dataset: xr.Dataset, source: Path | str) -> xr.Dataset:
+    """Return an opened result in memory, as it was; InputError for what is none or too large."""
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
@@ -280,6 +318,7 @@ def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
     if dataset.nbytes > _memory() / 2:
         size = f"{dataset.nbytes / 2**20:.0f} MiB"
         raise InputError(f"{source}: must unpack to half of this memory at most, got {size}")
+    return restored(dataset.load())
 
 
 def _memory() -> float:

@@ -1,24 +1,27 @@
-"""Results of records in files: a table for other tools, and all the rest for pendmap."""
+"""Results of records in files: tables and arrays as named variables, all else as JSON."""
 
 from __future__ import annotations
 
 import abc
-import importlib.metadata
-import json
-import os
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray as xr
 
+from pendmap import _core
 from pendmap.errors import InputError
 from pendmap.files import dataset as files
-from pendmap.files.tree import Packed, unpacked
+from pendmap.files.fields import Packed
+from pendmap.files.variables import CONVENTIONS, variable
 from pendmap.formatting import Readable
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
     from pathlib import Path
 
     import pandas as pd
+
+    from pendmap.files.fields import About
 
 
 class Saved(Readable):
@@ -28,16 +31,50 @@ class Saved(Readable):
     """Its kind in files."""
     ROWS: ClassVar[str]
     """The dimension of its table in files."""
+    COLUMNS: ClassVar[Mapping[str, str]]
+    """Meaning of each column of its table; units are in the column ``unit``."""
+
+    ARRAYS: ClassVar[Mapping[str, About]]
+    """Arrays of its parts that are variables, by class and field."""
 
     @abc.abstractmethod
     def to_dataframe(self) -> pd.DataFrame:
         """Return the result as a table."""
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the whole result, which :meth:`load` reads back with the same numbers.
+    def further(self) -> dict[str, Any]:
+        """Return further variables of the dataset."""
+        return {}
 
-        The file has the table of :meth:`to_dataframe` over its rows for other tools, and in
-        ``content`` (JSON) and ``array_0``, ... all the rest for this version of pendmap.
+    def to_dataset(self) -> xr.Dataset:
+        """Return the result as a dataset, as files have it.
+
+        Variables are the columns of :meth:`to_dataframe`, and the arrays of records, fits and
+        statistics by name; those of several runs stand one after the other along one dimension. The
+        attribute ``content`` is JSON of all that is no array.
+        """
+        summary, further = str(self), self.further()
+        packed = Packed(self, self.ARRAYS)
+        data: dict[str, Any] = {**packed.variables(), **further}
+        table = self.to_dataframe().reset_index()
+        for name, column in table.items() if len(table) else ():
+            values = column.to_numpy()
+            values = values if values.dtype.kind in "biuf" else values.astype(str)
+            data[str(name)] = variable(self.ROWS, values, "", self.COLUMNS[str(name)])
+        attributes = {
+            "Conventions": CONVENTIONS,
+            "kind": self.KIND,
+            "format_version": files.FORMAT_VERSION,
+            "title": repr(self),
+            "summary": summary,
+            "source": f"pendmap {_core.__version__}",
+            "pendmap_version": _core.__version__,
+            "content": packed.content,
+        }
+        return xr.Dataset(data, attrs=attributes)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the dataset of :meth:`to_dataset`; :meth:`load` returns the same numbers.
+
         :func:`pendmap.save_model` writes a model alone, as TOML.
 
         Parameters
@@ -52,25 +89,7 @@ class Saved(Readable):
         OSError
             If the file cannot be written.
         """
-        packed = Packed(self)
-        data: dict[str, Any] = {"content": ((), json.dumps(packed.tree))}
-        table = self.to_dataframe().reset_index()
-        for name, column in table.items() if len(table) else ():
-            values = column.to_numpy()
-            data[str(name)] = (
-                self.ROWS,
-                values.astype(str) if values.dtype == object else values,
-            )
-        for name, values in packed.arrays.items():
-            data[name] = ([f"{name}_{k}" for k in range(values.ndim)], values)
-        attributes = {
-            "kind": self.KIND,
-            "format_version": files.FORMAT_VERSION,
-            "title": repr(self),
-            "pendmap_version": importlib.metadata.version("pendmap"),
-        }
-        with files.made_by(f"{type(self).__name__}.save"):
-            return files.save(xr.Dataset(data, attrs=attributes), path)
+        return files.save(self, path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -83,48 +102,8 @@ class Saved(Readable):
         OSError
             If it cannot be read.
         """
-        found = load(path)
-        if not isinstance(found, cls):
-            given = found.KIND if isinstance(found, Saved) else found.attrs["kind"]
-            raise InputError(f"{os.fspath(path)}: kind must be {cls.KIND}, got {given}")
-        return found
-
-
-def load(path: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a dataset, or any other result)
-    """Read a result back into memory.
-
-    Parameters
-    ----------
-    path : str or path
-        A file that :func:`pendmap.save` or a result's own ``save`` wrote, or a store (``store=``)
-        at a path or an address.
-
-    Returns
-    -------
-    xarray.Dataset, IdentificationReport, Discrepancy or Comparison
-        The result as it was, with the same numbers.
-
-    Raises
-    ------
-    InputError
-        If it is not a result of pendmap, of a later format, or not yet complete; for a result of
-        records, also if another version of pendmap wrote it in another form.
-    OSError
-        If it cannot be read.
-
-    Examples
-    --------
-    >>> import pendmap
-    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
-    >>> pendmap.load(path).attrs["kind"]
-    'melnikov'
-    """
-    dataset = files.load(path)
-    kind = dataset.attrs["kind"]
-    if kind in files.KINDS or "content" not in dataset:
-        return dataset
-    try:
-        arrays = {str(name): each.to_numpy() for name, each in dataset.variables.items()}
-        return unpacked(json.loads(dataset["content"].item()), arrays)
-    except Exception as error:  # a damaged file may raise any error
-        raise InputError(f"{os.fspath(path)}: cannot be read as {kind}: {error}") from error
+        result = files.load(path)
+        if not isinstance(result, cls):
+            kind = result.KIND if isinstance(result, Saved) else result.attrs["kind"]
+            raise InputError(f"{path}: kind must be {cls.KIND}, got {kind}")
+        return result

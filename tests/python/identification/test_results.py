@@ -140,14 +140,14 @@ def test_a_damaged_file_is_refused_on_one_line(
     report: IdentificationReport, tmp_path: Path
 ) -> None:
     dataset = xr.open_dataset(report.save(tmp_path / "identify.nc")).load()
-    tree = dataset["content"].item()
+    content = dataset.attrs["content"]
     for old, new, complaint in (
         ("pendmap.records.experiment:Run", "os:system", "'os:system' is no class of pendmap"),
         ("pendmap.records.experiment:Run", "pendmap.files.atomic:os", "cannot be read as"),
         ('"lab_time_s"', '"lab"', "Run lacks lab_time_s: another version of pendmap wrote it"),
-        ("{", "", "cannot be read as identification"),
+        ("{", "", "cannot be read as a result of pendmap"),
     ):
-        bad = dataset.assign(content=((), tree.replace(old, new)))
+        bad = dataset.assign_attrs(content=content.replace(old, new))
         with pytest.raises(InputError, match=complaint) as error:
             IdentificationReport.load(pendmap.save(bad, tmp_path / "bad.nc"))
         assert "\n" not in str(error.value)

@@ -11,8 +11,8 @@ import xarray as xr
 from pendmap.analysis import result
 from pendmap.analysis.grid import coordinate
 from pendmap.analysis.orbit_table import plain
-from pendmap.analysis.result import NO_YES, flag, variable
 from pendmap.analysis.sweeps.tiles import PLANES
+from pendmap.files.variables import NO_YES, flag, variable
 from pendmap.formatting import span
 from pendmap.units import RATE, VELOCITY
 
