@@ -17,7 +17,7 @@ from pendmap.errors import (
     check_whole,
     instruction_set,
 )
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.files.variables import FORMAT_VERSION
 
 Progress = Callable[[int, int], object]  # Called with units of work done and in total
 

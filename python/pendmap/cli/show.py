@@ -218,7 +218,9 @@ class Outputs:
         if self.out is not None and save is not None:
             yield save, self.out
         if self.whole is not None:
-            yield result.save, self.whole
+            from pendmap.files.dataset import save
+
+            yield functools.partial(save, result), self.whole
         for path, module, write in (
             (self.plot, "render", "draw"),
             (self.report, "render", "write_report"),

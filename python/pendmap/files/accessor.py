@@ -43,8 +43,8 @@ class Accessor:
         whole = self._dataset.reset_coords(drop=True)
         some = {one.dims for one in whole.data_vars.values() if one.dims and one.size}
         first = next(one.dims for one in whole.data_vars.values() if one.dims in some)
-        rows = (_ROWS.get(whole.attrs["kind"], ""),)
-        rows = rows if rows in some else first
+        other = (_ROWS.get(whole.attrs["kind"], ""),)
+        rows = other if other in some else first
         columns = {}
         for name, values in whole.data_vars.items():
             further = [dim for dim in values.dims if dim not in rows]

@@ -20,16 +20,16 @@ import pendmap.files.accessor  # noqa: F401 (dataset.pendmap)
 from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
 from pendmap.files import check_regular, sealed, whole_file, whole_folder
-from pendmap.files.fields import unpacked
 from pendmap.files.hdf5 import check_alone
+from pendmap.files.saved import Saved, unpacked
 from pendmap.files.sealed import MARK
+from pendmap.files.variables import FORMAT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
     from pendmap.files.strict import StrictStore
 
-FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
@@ -57,7 +57,7 @@ def save(
     Parameters
     ----------
     dataset : xarray.Dataset or other result
-        A result of pendmap, of records too.
+        A result of pendmap, of records too; :func:`pendmap.save_model` writes a model alone.
     path : str or path
         Its suffix chooses the format: .nc (NetCDF 4) or .zarr.
 
@@ -82,7 +82,7 @@ def save(
     'melnikov.nc'
     """
     target = Path(os.fspath(path).removeprefix("file://"))
-    if hasattr(type(dataset), "KIND"):  # what was found in records
+    if isinstance(dataset, Saved):
         dataset = dataset.to_dataset()
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}

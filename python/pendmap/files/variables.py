@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping
 
 CONVENTIONS: Final = "CF-1.11"
+FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 NO_YES: Final = {0: "no", 1: "yes"}  # Meanings of a flag
 _UDUNITS: Final = re.compile(r"(1|rad|m|mm|s|Hz)(/(rad|s)\d?)?")  # Units that UDUNITS-2 has too
 _NOT_IN_FLAGS: Final = re.compile(r"[^\w@.+-]", re.ASCII)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from pendmap.files.fields import About
+    from pendmap.files.saved import About
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
@@ -64,8 +64,8 @@ ARRAYS: Final[dict[str, About]] = {
     "FitRun.theta": ("reading", "rad", "reading, unwrapped; of a rod sensor over its gain"),
     "FitRun.sigma": ("reading", "rad", "standard error of a reading"),
     "FitRun.trusted": ("reading", "", "whether a reading is included"),
-    "Reading.each": ("reading", "rad", "standard error of a reading"),
-    "Reading.shift": ("reading", "rad", "bias by timing jitter, subtracted"),
+    "Reading.each": ("recorded", "rad", "standard error of a reading"),
+    "Reading.shift": ("recorded", "rad", "bias by timing jitter, subtracted"),
     "TrajectoryFit.curves": OF_MODEL,
     "TrajectoryFit.residuals": ("reading", "rad", "reading less model; 0 if excluded"),
     "TrajectoryFit.white": ("reading", "1", "residual of unit variance"),
@@ -195,6 +195,22 @@ class FitResult(Parameters):
         """Units of the readings of each fitted run."""
         sensors = (run.rod_sensor for run in self.followed().runs)
         return ["rad" if sensor is None else sensor.unit for sensor in sensors]
+
+    def further(self) -> dict[str, Any]:
+        """Return the covariance, and time and run of each reading that is fitted."""
+        try:
+            _, fitted, runs = self.followed()
+        except InputError:
+            return super().further()
+        pairs = zip(fitted, runs, strict=True)
+        times = [given.time + _begin(given, run) for given, run in pairs]
+        owner = np.repeat(np.arange(len(runs), dtype=np.int16), [time.size for time in times])
+        names = {k: run.name for k, run in enumerate(runs)}
+        text = "time of a reading on the clock of its run"
+        return super().further() | {
+            "time": variable("reading", np.concatenate(times), "s", text),
+            "reading_of": variable("reading", owner, "", "run of a reading", flags=names),
+        }
 
     @property
     def residual(self) -> dict[str, xr.DataArray]:

@@ -69,6 +69,12 @@ def test_a_dataset_has_records_and_residuals_run_by_run(
         theta = dataset["runs_theta"].values[dataset["sample_of"].values == 1]
         assert np.array_equal(theta, made("b", 1.0, 2).theta)
         assert dataset.attrs["summary"] == str(result)
+        if isinstance(result, pendmap.identification.IdentificationReport):
+            one = dataset.isel(reading=dataset["reading_of"].values == 1)
+            assert dataset["reading_of"].attrs["flag_meanings"] == "a b"
+            assert np.array_equal(one["time"], result.runs[1].time)
+            known = result.residual["b"].notnull().values
+            assert np.array_equal(one["residuals"][known], result.residual["b"][known])
 
 
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
