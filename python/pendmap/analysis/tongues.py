@@ -431,9 +431,8 @@ def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], fl
     numbered = {}
     names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
     for index, multiplier, p in result.rows(dataset, *names):
-        which = index, multiplier
-        seen[which] = seen.get(which, -1) + 1
-        numbered[*which, seen[which]] = p
+        number = seen[index, multiplier] = seen.get((index, multiplier), -1) + 1
+        numbered[index, multiplier, number] = p
     return numbered
 
 

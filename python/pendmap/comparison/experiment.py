@@ -11,7 +11,7 @@ import pandas as pd
 
 from pendmap.analysis.numerics import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
-from pendmap.comparison.free import MODEL, RunComparison, compare_free
+from pendmap.comparison.free import ARRAYS, COLUMNS, MODEL, RunComparison, compare_free
 from pendmap.errors import (
     MOST_THREADS,
     FitDiverged,
@@ -22,13 +22,12 @@ from pendmap.errors import (
 )
 from pendmap.files.saved import Saved
 from pendmap.formatting import counted, percent
-from pendmap.identification.results import ARRAYS, OF_MODEL
 from pendmap.model import Rig
 from pendmap.records import experiment_of
 from pendmap.records.summary import doubt_lines, doubts, finding_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.comparison.forced import Statistic
     from pendmap.comparison.steady import Steady
@@ -62,33 +61,9 @@ class Comparison(Saved):
     """
 
     KIND: ClassVar[str] = "comparison"
-    ARRAYS = ARRAYS | {
-        "RunComparison.curve": OF_MODEL,
-        "RunComparison.residual": ("reading", "rad", "reading less model; 0 if excluded"),
-        "ForcedComparison.time": ("instant", "s", "equal times of a forced run"),
-        "ForcedComparison.measured": ("instant", "rad", "record at these times"),
-        "ForcedComparison.velocity": ("instant", "rad/s", "velocity of the record"),
-        "ForcedComparison.example": {
-            "theta": ("instant", "rad", "reading of a member of the ensemble"),
-            "velocity": ("instant", "rad/s", "its velocity"),
-        },
-        "Statistic.ensemble": ("member", "1", "statistic of a member, in its unit"),
-        "Cycle.time": ("phase", "s", "time from a whole number of periods of the drive"),
-        "Cycle.theta": ("phase", "rad", "angle in a cycle, not wrapped"),
-        "Cycle.velocity": ("phase", "rad/s", "velocity in a cycle"),
-    }
+    ARRAYS = ARRAYS
     ROWS: ClassVar[str] = "row"
-    COLUMNS: ClassVar[Mapping[str, str]] = {
-        "run": "name of a run",
-        "quantity": "what is compared",
-        "record": "value of the record",
-        "model": "value of the model; of an ensemble the median",
-        "low": "lower end of 95 % of the ensemble",
-        "high": "upper end of 95 % of the ensemble",
-        "chance": "p-value of the record in the ensemble",
-        "error_percent": "absolute error of the model, percent",
-        "unit": "unit of a value; empty for a pure number",
-    }
+    COLUMNS = COLUMNS
 
     model: Rig
     experiment: Experiment
@@ -97,11 +72,10 @@ class Comparison(Saved):
     left_out: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self) -> str:
-        every = self.every
-        worst = max(one.rms / one.sigma for one in every)
-        each = f"rms up to {worst:.3g} times the noise"
-        runs = counted(len(every), "run")
-        return f"<Comparison {self.experiment.path.name}: {runs}, {each}; {self.model.title}>"
+        worst = max(one.rms / one.sigma for one in self.every)
+        rms = f"rms up to {worst:.3g} times the noise"
+        runs = counted(len(self.every), "run")
+        return f"<Comparison {self.experiment.path.name}: {runs}, {rms}; {self.model.title}>"
 
     @property
     def every(self) -> tuple[RunComparison | ForcedComparison, ...]:
@@ -125,9 +99,8 @@ class Comparison(Saved):
             rows.append((name, "residual", one.sigma, one.rms, *[math.nan] * 4, "rad"))
             if isinstance(one, RunComparison):
                 for r in one.table.rows:
-                    told, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
-                    unit = _UNITS[r.what]
-                    rows.append((name, told, r.measured, *[math.nan] * 4, error, unit))
+                    what, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
+                    rows.append((name, what, r.measured, *[math.nan] * 4, error, _UNITS[r.what]))
             else:
                 rows += [
                     (name, e.name, e.measured, e.median, *e.ci95, e.chance, math.nan, e.unit)
