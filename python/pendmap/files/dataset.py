@@ -113,7 +113,7 @@ def stored_form(dataset: xr.Dataset) -> tuple[xr.Dataset, dict[Hashable, dict[st
     texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
     dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
     # Coordinates have no missing values.
-    floats = (name for name, each in dataset.coords.items() if each.dtype.kind == "f")
+    floats = (name for name, one in dataset.coords.items() if one.dtype.kind == "f")
     return dataset, {name: {"_FillValue": None} for name in floats}
 
 
@@ -205,7 +205,7 @@ def load(path: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a dataset, or an
     Parameters
     ----------
     path : str or path
-        A file that :func:`pendmap.save` or a result's own ``save`` wrote, or a store (``store=``)
+        A file that :func:`pendmap.save` wrote, or a store (``store=``)
         at a path or an address.
 
     Returns
@@ -276,15 +276,15 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in dataset.attrs.items()
     }
-    for each in dataset.variables.values():
-        missing = each.attrs.pop("_FillValue", None)
-        if missing is not None and each.dtype.kind in "iu":
-            each.attrs["_FillValue"] = each.dtype.type(missing)
-        if "flag_values" in each.attrs:  # one alone, or a list, became another type
-            flags = np.atleast_1d(each.attrs["flag_values"]).astype(each.dtype)
-            each.attrs["flag_values"] = flags
-        if "bounds" in each.encoding:
-            each.attrs["bounds"] = each.encoding.pop("bounds")
+    for one in dataset.variables.values():
+        missing = one.attrs.pop("_FillValue", None)
+        if missing is not None and one.dtype.kind in "iu":
+            one.attrs["_FillValue"] = one.dtype.type(missing)
+        if "flag_values" in one.attrs:  # one alone, or a list, became another type
+            flags = np.atleast_1d(one.attrs["flag_values"]).astype(one.dtype)
+            one.attrs["flag_values"] = flags
+        if "bounds" in one.encoding:
+            one.attrs["bounds"] = one.encoding.pop("bounds")
     texts = {f"{name}{_TEXT}": name for name in dataset.dims if f"{name}{_TEXT}" in dataset}
     named = {
         name: (name, dataset[text].values, dataset[text].attrs) for text, name in texts.items()

@@ -132,9 +132,9 @@ class _Packed:
         kind = f"{type(value).__module__}:{type(value).__qualname__}"
         if not (dataclasses.is_dataclass(value) and kind.startswith(_PACKAGE)):
             raise InputError(f"a result with {short_repr(value)} cannot be saved")
-        own = type(value).__name__
+        holder = type(value).__name__
         state = {
-            name: self._plain(part, (*path, name), label, self._table.get(f"{own}.{name}"))
+            name: self._plain(part, (*path, name), label, self._table.get(f"{holder}.{name}"))
             for name, part in vars(value).items()
         }
         return {"is": kind, "of": state, "at": place}
@@ -146,8 +146,8 @@ class _Packed:
         items = []
         for k, part in enumerate(values):
             name = getattr(part, "name", getattr(getattr(part, "run", None), "name", None))
-            own = name if isinstance(name, str) else f"{label} {k}".strip()
-            items.append(self._plain(part, path, own, about))
+            place = name if isinstance(name, str) else f"{label} {k}".strip()
+            items.append(self._plain(part, path, place, about))
         return items
 
     def _array(
@@ -156,7 +156,10 @@ class _Packed:
         """Return the place of an array in a variable, or its values if the table lacks it."""
         if isinstance(about, Mapping) and value.size:
             pairs = zip(value, about.items(), strict=True)
-            rows = [self._array(row, (*path, name), label, own) for row, (name, own) in pairs]
+            rows = [
+                self._array(row, (*path, name), label, described)
+                for row, (name, described) in pairs
+            ]
             return {"is": "rows", "of": rows}
         node = {"is": "array", "shape": list(value.shape), "dtype": value.dtype.str}
         if not isinstance(about, tuple) or not value.size:
@@ -233,14 +236,14 @@ def _values(node: Mapping[str, Any], values: Any) -> NDArray[Any]:  # noqa: ANN4
 
 def _instance(name: str, state: dict[str, Any]) -> Any:  # noqa: ANN401 (any class)
     """Return an instance of a dataclass of the package with this state."""
-    module, _, own = name.partition(":")
+    module, _, short = name.partition(":")
     if not module.startswith(_PACKAGE):
         raise InputError(f"{short_repr(name)} is no class of pendmap")
-    kind = getattr(importlib.import_module(module), own)
+    kind = getattr(importlib.import_module(module), short)
     fields = {field.name for field in dataclasses.fields(kind)}
     if not fields <= state.keys():
         lacking = ", ".join(sorted(fields - state.keys()))
-        raise InputError(f"{own} lacks {lacking}: another version of pendmap wrote it")
+        raise InputError(f"{short} lacks {lacking}: another version of pendmap wrote it")
     value = object.__new__(kind)
     value.__dict__.update(state)
     return value
