@@ -15,6 +15,7 @@ sys.path[:0] = [str(HERE), str(HERE / "_ext")]
 
 import commands  # noqa: E402 (of _ext)
 import effects_pages  # noqa: E402
+import results  # noqa: E402
 
 project = "pendmap"
 author = "the pendmap authors"
@@ -65,5 +66,6 @@ bibtex_default_style = "plain"
 def setup(_: Sphinx) -> dict[str, Any]:
     """Write the generated pages before they are read."""
     commands.write()
+    results.write()
     effects_pages.write()
     return {"parallel_read_safe": True}

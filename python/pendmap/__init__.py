@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from pendmap.engine.bar import ProgressBar as ProgressBar
     from pendmap.errors import FitDiverged as FitDiverged
     from pendmap.errors import InputError as InputError
+    from pendmap.files.dataset import load as load
     from pendmap.files.dataset import save as save
-    from pendmap.files.saved import load as load
     from pendmap.identification.experiment import identify as identify
     from pendmap.model import PRESETS as PRESETS
     from pendmap.model import Effect as Effect
@@ -96,8 +96,7 @@ _OTHERS = {
     "diagnosis.diagnose": "diagnose",
     "engine.bar": "ProgressBar",
     "errors": "FitDiverged InputError",
-    "files.dataset": "save",
-    "files.saved": "load",
+    "files.dataset": "load save",
     "identification.experiment": "identify",
     "model": "PRESETS Effect Formula Pendulum Rig load_formulas load_model save_model",
     "model.effects": "EffectDefinition EffectParameter effects",

@@ -123,7 +123,8 @@ from scipy.special import ellipk
 
 from pendmap.analysis import result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Schema, summarised, variable
+from pendmap.analysis.result import Field, Schema, summarised
+from pendmap.files.variables import variable
 from pendmap.errors import InputError, check_number
 
 SCHEMA = Schema(

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.grid import coordinate, evenly
-from pendmap.analysis.result import Field, Found, variable
+from pendmap.analysis.result import Field, Found
 from pendmap.errors import InputError
+from pendmap.files.variables import variable
 from pendmap.formatting import span
 from pendmap.model import Rig
 from pendmap.model.labels import LABELS

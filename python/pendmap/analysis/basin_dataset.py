@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.fractality import fitted_map, passes_log2
-from pendmap.analysis.result import variable
+from pendmap.files.variables import variable
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:

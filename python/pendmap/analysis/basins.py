@@ -15,12 +15,13 @@ from pendmap.analysis.draws import drawn
 from pendmap.analysis.draws.basins import basins_over, drawn_basins
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import Field, Found, Schema, none_below_0, variable
+from pendmap.analysis.result import Field, Found, Schema, none_below_0
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import summarise
 from pendmap.engine import Work
 from pendmap.errors import MOST_PERIODS, check_flag
 from pendmap.files import facts
+from pendmap.files.variables import variable
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, VELOCITY
 

@@ -12,12 +12,13 @@ from scipy.ndimage import find_objects, label
 from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, matched
-from pendmap.analysis.result import Field, Schema, point, rows, summarised, variable
+from pendmap.analysis.result import Field, Schema, point, rows, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.errors import InputError, check_number, core_errors, short_repr
 from pendmap.files import facts
+from pendmap.files.variables import variable
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY

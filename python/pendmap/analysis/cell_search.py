@@ -14,12 +14,13 @@ from pendmap.analysis import result
 from pendmap.analysis.along import DRIVE
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.orbit_table import DESCRIBED, described
-from pendmap.analysis.result import Field, Found, point, variable
+from pendmap.analysis.result import Field, Found, point
 from pendmap.errors import (
     MOST_CELLS,
     check_type,
     check_whole,
 )
+from pendmap.files.variables import variable
 from pendmap.formatting import counted, percent
 from pendmap.units import RATE, VELOCITY
 

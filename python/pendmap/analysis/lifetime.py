@@ -17,11 +17,12 @@ from pendmap.analysis.grid import starts as checked
 from pendmap.analysis.lifetime_summary import summary_of, summary_of_draws
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.orbit_table import chaotic
-from pendmap.analysis.result import Field, Found, Schema, flag, variable
+from pendmap.analysis.result import Field, Found, Schema
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import window_said
 from pendmap.errors import MOST_PERIODS, InputError, check_whole
 from pendmap.files import facts
+from pendmap.files.variables import flag, variable
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 

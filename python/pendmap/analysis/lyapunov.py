@@ -11,11 +11,12 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.files import facts
+from pendmap.files.variables import variable
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units

@@ -14,9 +14,10 @@ from numpy.polynomial import legendre
 from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Found, Schema, summarised, variable
+from pendmap.analysis.result import Found, Schema, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.errors import InputError, core_errors
+from pendmap.files.variables import variable
 from pendmap.model import without_dimensions
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from pendmap import _core
 from pendmap.errors import MOST_PERIODS, check_number, check_whole, instruction_set
-from pendmap.files.dataset import FORMAT_VERSION
+from pendmap.files.variables import FORMAT_VERSION
 
 if TYPE_CHECKING:
     from pendmap.analysis.run import RunOptions

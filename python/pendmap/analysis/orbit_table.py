@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.analysis.result import point, records, rows, variable
+from pendmap.analysis.result import point, records, rows
+from pendmap.files.variables import variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:

@@ -15,10 +15,11 @@ from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, named_alike, objects, points_of, table
-from pendmap.analysis.result import Field, Schema, flag, records, summarised, variable
+from pendmap.analysis.result import Field, Schema, records, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
+from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units

@@ -12,13 +12,14 @@ from pendmap.analysis import along, cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.analysis.result import Field, Schema, flag, rows, summarised, variable
+from pendmap.analysis.result import Field, Schema, rows, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import box_said
 from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.analysis.tongues import tongues
 from pendmap.errors import InputError, check_flag, core_errors
 from pendmap.files import facts
+from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import RATE

@@ -9,13 +9,13 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
-import re
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap import ANALYSES, _core
 from pendmap.files import facts
+from pendmap.files.variables import CONVENTIONS, flag, variable
 from pendmap.model.covariance import misses
 from pendmap.model.labels import LABELS
 
@@ -33,17 +33,12 @@ OF_TIME: Final = "1/w0 or s"  # Unit of times: without dimensions or in SI, as t
 OF_RATE: Final = "1/tau or 1/s"  # Unit of exponents: without dimensions or in SI
 OF_VELOCITY: Final = "1 or rad/s"  # Unit of velocities: without dimensions or in SI
 _OF: Final = {OF_TIME: "of_time", OF_RATE: "of_rate", OF_VELOCITY: "of_velocity"}
-NO_YES: Final = {0: "no", 1: "yes"}  # Meanings of a flag
 FLAG: Final = "no or yes"  # Unit of a fact that is 0 or 1
 
-CONVENTIONS: Final = "CF-1.11"
 PAPER: Final = (
     "Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A 366, 767, doi:10.1098/rsta.2007.2126"
 )
 """The paper whose equation of motion all results solve."""
-_UDUNITS: Final = re.compile(r"(1|rad|m|mm|s|Hz)(/(rad|s)\d?)?")  # Units that UDUNITS-2 has too
-_NOT_IN_FLAGS: Final = re.compile(r"[^\w@.+-]", re.ASCII)
-"""Characters that CF does not allow in ``flag_meanings``."""
 _WITHOUT_INDEX: Final = ("bound", "eigenvalue", "part")  # Dimensions with two places each
 
 
@@ -201,45 +196,6 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
 def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
     """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
     dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
-
-
-def variable(  # noqa: PLR0913 (attributes of CF)
-    dims: Hashable | tuple[Hashable, ...],
-    values: Any,  # noqa: ANN401 (an array)
-    units: str = "",
-    long_name: str = "",
-    comment: str = "",
-    *,
-    flags: Mapping[int, str] | None = None,
-    missing: int | None = None,
-) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
-    """Return a variable of a dataset with the attributes of CF that are not empty.
-
-    ``flags`` are the meanings of whole numbers, ``missing`` the number that means none.
-    """
-    units = units.replace("^", "")
-    if units and not _UDUNITS.fullmatch(units):
-        units, long_name = "1", f"{long_name}, in {units}"
-    attributes: dict[str, Any] = {"units": units, "long_name": long_name, "comment": comment}
-    attributes = {key: text for key, text in attributes.items() if text}
-    dtype = getattr(values, "dtype", None) or np.asarray(values).dtype  # reads no lazy array
-    if flags is not None:
-        attributes["flag_values"] = np.array([*flags], dtype=dtype)
-        meanings = (_NOT_IN_FLAGS.sub("_", meaning) for meaning in flags.values())
-        attributes["flag_meanings"] = " ".join(meanings)
-    if missing is not None:
-        attributes["_FillValue"] = dtype.type(missing)
-    return dims, values, attributes
-
-
-def flag(
-    dims: Hashable | tuple[Hashable, ...],
-    values: Any,  # noqa: ANN401 (an array)
-    long_name: str,
-    flags: Mapping[int, str] = NO_YES,
-) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
-    """Return a variable that is 0 or 1, or another small number with a meaning."""
-    return variable(dims, np.asarray(values, dtype=np.int8), "", long_name, flags=flags)
 
 
 def point(

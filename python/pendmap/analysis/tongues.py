@@ -15,11 +15,12 @@ from pendmap.analysis import grid as grids
 from pendmap.analysis.critical_curves import PLANES, in_picture
 from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Found, Schema, flag, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.run import RunOptions, in_rounds
 from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts
+from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted
 from pendmap.model import effects_of, without_dimensions
 from pendmap.units import RATE
@@ -429,9 +430,8 @@ def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], fl
     numbered = {}
     names = (f"{prefix}{name}" for name in ("index", "multiplier", "p"))
     for index, multiplier, p in result.rows(dataset, *names):
-        which = index, multiplier
-        seen[which] = seen.get(which, -1) + 1
-        numbered[*which, seen[which]] = p
+        number = seen[index, multiplier] = seen.get((index, multiplier), -1) + 1
+        numbered[index, multiplier, number] = p
     return numbered
 
 

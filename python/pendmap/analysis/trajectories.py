@@ -9,9 +9,9 @@ import numpy as np
 from pendmap import _core
 from pendmap.analysis.grid import starts
 from pendmap.analysis.numerics import Numerics, optional_whole
-from pendmap.analysis.result import variable
 from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_PERIODS, InputError, check_number, check_whole, core_errors
+from pendmap.files.variables import variable
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY

@@ -12,7 +12,7 @@ from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import ascending, starts
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Found, Schema, summarised, variable
+from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.trajectories import alike, rows_of, several_facts, several_lines
 from pendmap.errors import (
@@ -26,6 +26,7 @@ from pendmap.errors import (
     short_repr,
 )
 from pendmap.files import facts
+from pendmap.files.variables import variable
 from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units

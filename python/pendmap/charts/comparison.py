@@ -175,11 +175,11 @@ def history(one: ForcedComparison, pair: Pair = OF_PAPER, *, member: str = "") -
 
 def phase(one: ForcedComparison, *, member: str = "") -> Panel:
     """Return the path of the record or of a member in the phase plane, with a common scale."""
-    path, colour = (one.measured, one.velocity), MEASURED
+    (theta, velocity), colour = (one.measured, one.velocity), MEASURED
     if member:
-        path, colour = one.example, look(MODEL).colour
+        (theta, velocity), colour = one.example, look(MODEL).colour
     reach = 1.08 * max(float(np.abs(v).max()) for v in (one.velocity, one.example[1]))
-    curve = plane.broken_at_wrap(path[0][:SAMPLES], path[1][:SAMPLES])
+    curve = plane.broken_at_wrap(theta[:SAMPLES], velocity[:SAMPLES])
     sides = names.phase_plane((-math.pi, math.pi), (-reach, reach), _SI)
     return Panel("phase", member or "record", *sides, [Line(*curve.T, colour=colour, width=0.4)])
 

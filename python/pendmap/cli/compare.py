@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import argument, group, new_command
@@ -48,6 +49,7 @@ def command(
     """
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.experiment import as_json, in_short
+    from pendmap.files.dataset import save
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
@@ -56,7 +58,7 @@ def command(
     with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = write_all(outputs.files(comparison, comparison.save), keep=True)
+    written = write_all(outputs.files(comparison, functools.partial(save, comparison)), keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     lines = first_of_all(comparison, [*in_short(comparison), ""])
     outputs.finish(written, lambda: as_json(comparison) | more, lines)

@@ -56,7 +56,7 @@ def command(*, file: Path | Address, **given: Any) -> None:  # noqa: ANN401 (out
     name = PurePath(file).stem if at_address else str(PurePath(file).with_suffix(""))
     outputs = Outputs.take(given, name, reads=[] if at_address else [Path(file)], default=["plot"])
 
-    from pendmap.files.saved import load
+    from pendmap.files.dataset import load
 
     result = load(file)
     with named(str(file)):

@@ -202,7 +202,9 @@ class Outputs:
         if isinstance(self.out, Path) and save is not None:
             yield save, self.out
         if self.whole is not None:
-            yield result.save, self.whole
+            from pendmap.files import dataset
+
+            yield functools.partial(dataset.save, result), self.whole
         for path, module, write in (
             (self.plot, "render", "draw"),
             (self.report, "render", "write_report"),

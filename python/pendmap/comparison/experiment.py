@@ -11,7 +11,7 @@ import pandas as pd
 
 from pendmap.analysis.run import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
-from pendmap.comparison.free import MODEL, RunComparison, compare_free
+from pendmap.comparison.free import ARRAYS, COLUMNS, MODEL, RunComparison, compare_free
 from pendmap.errors import (
     MOST_THREADS,
     FitDiverged,
@@ -61,7 +61,9 @@ class Comparison(Saved):
     """
 
     KIND: ClassVar[str] = "comparison"
+    ARRAYS = ARRAYS
     ROWS: ClassVar[str] = "row"
+    COLUMNS = COLUMNS
 
     model: Rig
     experiment: Experiment
@@ -107,7 +109,8 @@ class Comparison(Saved):
                     for e in one.statistics
                 ]
         columns = ["run", "quantity", "record", "model", "low", "high", "chance", "error_percent"]
-        return pd.DataFrame(rows, columns=[*columns, "unit"]).set_index(columns[:2])
+        table = pd.DataFrame(rows, columns=[*columns, "unit"])
+        return table.astype({"unit": "string"}).set_index(columns[:2])
 
     def text_parts(self) -> tuple[list[Table], list[str]]:
         """Return the tables and the lines that ``pendmap compare`` prints."""

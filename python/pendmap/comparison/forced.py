@@ -201,7 +201,7 @@ class ForcedComparison:
         The record at equal times, s and rad.
     velocity : ndarray, shape (N,)
         Velocity of the record, rad/s.
-    example : (ndarray, ndarray), shape (N,)
+    example : ndarray, shape (2, N)
         Reading and velocity of the member whose statistics are nearest to the ensemble's medians.
     lost : int
         Number of members whose motion overflowed.
@@ -222,7 +222,7 @@ class ForcedComparison:
     time: Floats
     measured: Floats
     velocity: Floats
-    example: tuple[Floats, Floats]
+    example: Floats
     lost: int
     statistics: tuple[Statistic, ...]
     steady: steady.Steady | None
@@ -296,7 +296,7 @@ def compare_forced(
         time=time,
         measured=measured,
         velocity=ruler.velocity(measured),
-        example=(reading, ruler.velocity(reading)),
+        example=np.stack([reading, ruler.velocity(reading)]),
         lost=int((~finite).sum()),
         statistics=statistics,
         steady=cycles,

@@ -14,7 +14,7 @@ from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, c
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.formatting import Estimate
-from pendmap.identification.results import FitResult, Followed
+from pendmap.identification.results import ARRAYS, FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
@@ -71,6 +71,17 @@ class Discrepancy(FitResult):
     """Result of a diagnosis: where a model and records disagree, and why."""
 
     KIND: ClassVar[str] = "diagnosis"
+    ARRAYS = ARRAYS | {
+        "Forecast.horizon": ("bin", "s", "middle of a bin of the horizon"),
+        "Forecast.before": ("bin", "rad", "rms error of the baseline, modulo a turn"),
+        "Forecast.after": ("bin", "rad", "rms error of the selected model, modulo a turn"),
+        "ResidualNoise.laws": {
+            "level": ("law", "1", "level of the noise by a law"),
+            "probability": ("law", "1", "probability of a law"),
+        },
+        "Scores.gram": ("response response_2", "1", "product of two unit responses"),
+        "Scores.pull": ("response", "1", "product of a unit response with the residuals"),
+    }
 
     data: DataSplit  # The records: fitted and held back
     base: ScoredModel  # The baseline
@@ -92,6 +103,12 @@ class Discrepancy(FitResult):
     own: tuple[Formula, ...] = ()  # The user's own formulas among the candidates
     # Reasons for parts that were not computed, by field of the JSON; see ``not_computed``.
     reasons: Reasons = dataclasses.field(default_factory=dict)
+
+    def further(self) -> dict[str, Any]:
+        """Return further variables of the dataset, after what is computed when it is asked for."""
+        for part in (self.not_computed, self.advice):
+            del part
+        return super().further()
 
     def definition(self, name: str) -> EffectDefinition:
         """Return the entry of a candidate in the library, or of the user's formula."""

@@ -160,10 +160,10 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
 
 def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -> None:
     """Raise OSError for a folder or a missing file, InputError for a pipe or a device."""
-    found = Path(path).stat() if descriptor is None else os.fstat(descriptor)
-    if stat.S_ISDIR(found.st_mode):
+    status = Path(path).stat() if descriptor is None else os.fstat(descriptor)
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(path))
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: must be a file, it is a pipe or a device")
 
 

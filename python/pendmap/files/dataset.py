@@ -21,14 +21,15 @@ from pendmap import ANALYSES, _core
 from pendmap.errors import InputError
 from pendmap.files import check_regular, sealed, whole_file, whole_folder
 from pendmap.files.hdf5 import check_alone
+from pendmap.files.saved import Saved, unpacked
 from pendmap.files.sealed import MARK
+from pendmap.files.variables import FORMAT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Hashable, Iterator, Mapping
 
     from pendmap.files.strict import StrictStore
 
-FORMAT_VERSION: Final = 2  # Version of the layout, in the attribute ``format_version``
 SUFFIXES: Final = (".nc", ".zarr")  # Suffixes of files that hold a result
 _MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 # Kinds of result, and the functions that return each
@@ -56,7 +57,7 @@ def save(
     Parameters
     ----------
     dataset : xarray.Dataset or other result
-        A result of pendmap, of records too.
+        A result of pendmap, of records too; :func:`pendmap.save_model` writes a model alone.
     path : str or path
         Its suffix chooses the format: .nc (NetCDF 4) or .zarr.
 
@@ -81,9 +82,8 @@ def save(
     'melnikov.nc'
     """
     target = Path(os.fspath(path).removeprefix("file://"))
-    if hasattr(type(dataset), "KIND"):  # what was found in records writes itself
-        own: Path = dataset.save(target)
-        return own
+    if isinstance(dataset, Saved):
+        dataset = dataset.to_dataset()
     if not (isinstance(dataset, xr.Dataset) and set(dataset.attrs) >= _MARKS):
         made = {name for functions in KINDS.values() for name in functions}
         raise InputError(
@@ -113,7 +113,7 @@ def stored_form(dataset: xr.Dataset) -> tuple[xr.Dataset, dict[Hashable, dict[st
     texts = [name for name in dataset.indexes if dataset[name].dtype.kind not in "iuf"]
     dataset = dataset.reset_index(texts).rename_vars({name: f"{name}{_TEXT}" for name in texts})
     # Coordinates have no missing values.
-    floats = (name for name, each in dataset.coords.items() if each.dtype.kind == "f")
+    floats = (name for name, one in dataset.coords.items() if one.dtype.kind == "f")
     return dataset, {name: {"_FillValue": None} for name in floats}
 
 
@@ -192,45 +192,82 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
     attributes: Any = {}
     with contextlib.suppress(InputError, LookupError, TypeError):
         attributes = dict(sealed.metadata(target)[0]["attributes"])
-    if not attributes.keys() >= _MARKS or attributes["kind"] not in [*KINDS]:
+    known = "content" in attributes or attributes.get("kind") in [*KINDS]
+    if not (attributes.keys() >= _MARKS and known):
         raise InputError(f"{target}: {wanted}; the folder does not contain a result")
     for name in sealed.foreign(target):
         raise InputError(f"{target}: {wanted}; it contains {name!r}, no part of a result")
 
 
-def load(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Return the dataset of a file or a store; raises as :func:`pendmap.load`."""
+def load(path: str | os.PathLike[str]) -> Any:  # noqa: ANN401 (a dataset, or any other result)
+    """Read a result back into memory.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that :func:`pendmap.save` wrote, or a store (``store=``)
+        at a path or an address.
+
+    Returns
+    -------
+    xarray.Dataset, IdentificationReport, Discrepancy or Comparison
+        The result as it was, with the same numbers.
+
+    Raises
+    ------
+    InputError
+        If it is not a result of pendmap, of a later format, or not yet complete; for a result of
+        records, also if another version of pendmap wrote it in another form.
+    OSError
+        If it cannot be read.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> path = pendmap.save(pendmap.melnikov(pendmap.Pendulum(p=1.0, omega=2.0)), "melnikov.nc")
+    >>> pendmap.load(path).attrs["kind"]
+    'melnikov'
+    """
     name = os.fspath(path).removeprefix("file://")
     source = name if "://" in name else Path(name)
+    _check_source(source)
+    try:
+        if PurePath(source).suffix.lower() == ".zarr":
+            mark = _check_complete(source)
+            store = sealed.open_store(source)
+            with open_zarr(source, store=store) as opened:
+                dataset = _loaded(opened, source)
+            sealed.check_digest(source, mark, store.digest())
+            dataset.attrs.pop(MARK, None)
+        else:
+            check_alone(Path(source))
+            with _ONE, _NETCDF(source) as opened:
+                dataset = _loaded(opened, source)
+        if "content" not in dataset.attrs:
+            return dataset
+        arrays = {str(name): one.to_numpy() for name, one in dataset.variables.items()}
+        return unpacked(dataset.attrs["content"], arrays)
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file may raise any error
+        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_source(source: Path | str) -> None:
+    """Raise InputError or OSError for what is no file or store by its name and kind."""
     suffix = PurePath(source).suffix.lower()
-    if isinstance(source, str) and suffix != ".zarr":
-        raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
-    if isinstance(source, Path) and not source.exists():
+    if isinstance(source, str):
+        if suffix != ".zarr":
+            raise InputError(f"{source}: suffix of an address must be .zarr, got {suffix!r}")
+        return
+    if not source.exists():
         if source.with_name(f"{source.name}.part").exists():
             raise InputError(f"{source}: {_UNFINISHED}")
         raise FileNotFoundError(2, "no such file", str(source))
     if suffix not in SUFFIXES:
         raise InputError(f"{source}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}")
-    if isinstance(source, Path) and not (suffix == ".zarr" and source.is_dir()):
+    if not (suffix == ".zarr" and source.is_dir()):
         check_regular(source)
-    try:
-        stored = isinstance(source, str) or suffix == ".zarr"
-        if stored:
-            mark = _check_complete(source)
-            store = sealed.open_store(source)
-        else:
-            check_alone(Path(source))
-        with _ONE, open_zarr(source, store=store) if stored else _NETCDF(source) as opened:
-            _check_result(opened, source)
-            dataset = restored(opened.load())
-        if stored:
-            sealed.check_digest(source, mark, store.digest())
-        dataset.attrs.pop(MARK, None)
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file may raise any error
-        raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
-    return dataset
 
 
 def restored(dataset: xr.Dataset) -> xr.Dataset:
@@ -239,15 +276,15 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in dataset.attrs.items()
     }
-    for each in dataset.variables.values():
-        missing = each.attrs.pop("_FillValue", None)
-        if missing is not None and each.dtype.kind in "iu":
-            each.attrs["_FillValue"] = each.dtype.type(missing)
-        if "flag_values" in each.attrs:  # one alone, or a list, became another type
-            flags = np.atleast_1d(each.attrs["flag_values"]).astype(each.dtype)
-            each.attrs["flag_values"] = flags
-        if "bounds" in each.encoding:
-            each.attrs["bounds"] = each.encoding.pop("bounds")
+    for one in dataset.variables.values():
+        missing = one.attrs.pop("_FillValue", None)
+        if missing is not None and one.dtype.kind in "iu":
+            one.attrs["_FillValue"] = one.dtype.type(missing)
+        if "flag_values" in one.attrs:  # one alone, or a list, became another type
+            flags = np.atleast_1d(one.attrs["flag_values"]).astype(one.dtype)
+            one.attrs["flag_values"] = flags
+        if "bounds" in one.encoding:
+            one.attrs["bounds"] = one.encoding.pop("bounds")
     texts = {f"{name}{_TEXT}": name for name in dataset.dims if f"{name}{_TEXT}" in dataset}
     named = {
         name: (name, dataset[text].values, dataset[text].attrs) for text, name in texts.items()
@@ -267,7 +304,8 @@ def _check_complete(source: Path | str) -> dict[str, Any]:
     return mark
 
 
-def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
+def _loaded(dataset: xr.Dataset, source: Path | str) -> xr.Dataset:
+    """Return an opened result in memory, as it was; InputError for what is none or too large."""
     if not set(dataset.attrs) >= _MARKS:
         raise InputError(f"{source}: is not a result of pendmap")
     version, kind = dataset.attrs["format_version"], dataset.attrs["kind"]
@@ -280,6 +318,7 @@ def _check_result(dataset: xr.Dataset, source: Path | str) -> None:
     if dataset.nbytes > _memory() / 2:
         size = f"{dataset.nbytes / 2**20:.0f} MiB"
         raise InputError(f"{source}: must unpack to half of this memory at most, got {size}")
+    return restored(dataset.load())
 
 
 def _memory() -> float:

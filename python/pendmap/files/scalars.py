@@ -14,9 +14,7 @@ def facts(dataset: Any) -> dict[str, Any]:  # noqa: ANN401 (an xarray.Dataset)
     Attributes hold what was asked for and how it was computed; variables without dimensions what
     was computed and, as coordinates, the parameters of the model.
     """
-    scalars = {
-        name: each.values.item() for name, each in dataset.variables.items() if not each.dims
-    }
+    scalars = {name: one.values.item() for name, one in dataset.variables.items() if not one.dims}
     return {str(name): value for name, value in {**dataset.attrs, **scalars}.items()}
 
 

@@ -95,7 +95,7 @@ def metadata(address: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str,
         raise InputError(f"{address}: must be a store of Zarr 3, it lacks zarr.json") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{address}: zarr.json is damaged: {error}") from None
-    folders = [each["name"] for each in system.ls(path, detail=True) if each["type"] != "file"]
+    folders = [entry["name"] for entry in system.ls(path, detail=True) if entry["type"] != "file"]
     names = {f"{folder}/zarr.json": folder.rsplit("/", 1)[-1] for folder in folders}
     for file in names if is_local(system) else ():
         if Path(file).exists():

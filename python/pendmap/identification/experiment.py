@@ -136,7 +136,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     -0.98
     >>> round(float(report.residual["DataFrame"].std()), 4)
     0.001
-    >>> again = pendmap.identification.IdentificationReport.load(report.save("identify.nc"))
+    >>> again = pendmap.load(pendmap.save(report, "identify.nc"))
     >>> again.model == report.model
     True
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ import xarray as xr
 
 from pendmap.errors import InputError, short_repr
 from pendmap.files.saved import Saved
+from pendmap.files.variables import variable
 from pendmap.formatting import estimate_text, html_table, interval, moment
 from pendmap.identification.motion import Motion, run_forward
 from pendmap.model.effects import definition
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from pendmap.files.saved import About
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
@@ -43,10 +45,61 @@ class Followed(NamedTuple):
     runs: Sequence[Run]  # the records of each
 
 
+OF_MODEL: Final = {
+    "theta": ("reading", "rad", "angle of the model"),
+    "velocity": ("reading", "rad/s", "velocity of the model"),
+}
+ARRAYS: Final[dict[str, About]] = {
+    "Run.time": ("sample", "s", "time of a sample"),
+    "Run.theta": ("sample", "rad", "angle from the downward rest, unwrapped"),
+    "Run.trusted": ("sample", "", "whether a sample is for fitting"),
+    "Run.velocity": ("sample", "rad/s", "measured velocity"),
+    "Run.acceleration": ("sample", "m/s2", "measured acceleration"),
+    "Run.pivot": ("sample", "1", "recorded motion of the pivot, in the unit of its run"),
+    "Pivot.time": ("pivot_sample", "s", "time of a sample of the pivot"),
+    "Pivot.vertical": ("pivot_sample", "1", "motion of the pivot upward, in its unit"),
+    "Pivot.horizontal": ("pivot_sample", "1", "its motion toward positive theta"),
+    "RodSensor.angle": ("reading", "rad", "initial guess of the angle"),
+    "FitRun.time": ("reading", "s", "time of a reading; the phase of the drive is that at 0"),
+    "FitRun.theta": ("reading", "rad", "reading, unwrapped; of a rod sensor over its gain"),
+    "FitRun.sigma": ("reading", "rad", "standard error of a reading"),
+    "FitRun.trusted": ("reading", "", "whether a reading is included"),
+    "Reading.each": ("recorded", "rad", "standard error of a reading"),
+    "Reading.shift": ("recorded", "rad", "bias by timing jitter, subtracted"),
+    "TrajectoryFit.curves": OF_MODEL,
+    "TrajectoryFit.residuals": ("reading", "rad", "reading less model; 0 if excluded"),
+    "TrajectoryFit.white": ("reading", "1", "residual of unit variance"),
+    "Peaks.time": ("peak", "s", "time of a peak"),
+    "Peaks.amplitude": ("peak", "rad", "angle of a peak"),
+    "Peaks.stderr_time": ("peak", "s", "standard error of the time"),
+    "Peaks.stderr_amplitude": ("peak", "rad", "standard error of the angle"),
+    "Peaks.index": ("peak", "1", "number of a peak"),
+    "Peaks.crossing_time": ("crossing", "s", "time of a zero crossing"),
+    "Peaks.crossing_stderr": ("crossing", "s", "standard error of this time"),
+    "Peaks.crossing_index": ("crossing", "1", "number of its half cycle"),
+    "PeakErrors.period_time": ("cycle", "s", "start of a full cycle"),
+    "PeakErrors.period": ("cycle", "s", "measured period of a full cycle"),
+    "PeakErrors.period_error": ("cycle", "percent", "error of a simulated period"),
+    "PeakErrors.peak_index": ("simulated_peak", "1", "number of a peak"),
+    "PeakErrors.peak": ("simulated_peak", "rad", "measured amplitude of a peak"),
+    "PeakErrors.peak_error": ("simulated_peak", "percent", "error of a simulated peak"),
+}
+"""Dimension, unit and meaning of the arrays of records and fits, by class and field."""
+
+
 class Parameters(Saved):
     """A result with parameters, which a file can hold."""
 
+    ARRAYS = ARRAYS
     ROWS: ClassVar[str] = "parameter"
+    COLUMNS: ClassVar[Mapping[str, str]] = {
+        "parameter": "name of a parameter",
+        "value": "value of a parameter",
+        "stderr": "its standard error",
+        "low": "lower end of its 95 % interval",
+        "high": "upper end of its 95 % interval",
+        "unit": "unit of a parameter, SI; empty for a pure number",
+    }
 
     @property
     @abc.abstractmethod
@@ -87,8 +140,21 @@ class Parameters(Saved):
             for name, e in self.parameters.items()
         ]
         columns = ["parameter", "value", "stderr", "low", "high", "unit"]
-        types = dict.fromkeys(columns[1:-1], np.float64)
+        types = dict.fromkeys(columns[1:-1], "float64") | {"unit": "string"}
         return pd.DataFrame(rows, columns=columns).astype(types).set_index("parameter")
+
+    def further(self) -> dict[str, Any]:
+        """Return the covariance matrix; nan where a parameter was not fitted with the others."""
+        if not self.parameters or self.joint_covariance is None:
+            return {}
+        names, matrix = self.joint_covariance
+        every = list(self.parameters)
+        table = pd.DataFrame(matrix, list(names), list(names)).reindex(every, columns=every)
+        dims, text = ("parameter", "parameter_2"), "covariance of two parameters, SI"
+        return {
+            "covariance": variable(dims, table.to_numpy(), "", text),
+            "parameter_2": variable("parameter_2", every, "", "name of a parameter"),
+        }
 
     @property
     def correlation(self) -> pd.DataFrame:
@@ -129,6 +195,22 @@ class FitResult(Parameters):
         """Units of the readings of each fitted run."""
         sensors = (run.rod_sensor for run in self.followed().runs)
         return ["rad" if sensor is None else sensor.unit for sensor in sensors]
+
+    def further(self) -> dict[str, Any]:
+        """Return the covariance, and time and run of each reading that is fitted."""
+        try:
+            _, fitted, runs = self.followed()
+        except InputError:
+            return super().further()
+        pairs = zip(fitted, runs, strict=True)
+        times = [given.time + _begin(given, run) for given, run in pairs]
+        owner = np.repeat(np.arange(len(runs), dtype=np.int16), [time.size for time in times])
+        names = {k: run.name for k, run in enumerate(runs)}
+        text = "time of a reading on the clock of its run"
+        return super().further() | {
+            "time": variable("reading", np.concatenate(times), "s", text),
+            "reading_of": variable("reading", owner, "", "run of a reading", flags=names),
+        }
 
     @property
     def residual(self) -> dict[str, xr.DataArray]:

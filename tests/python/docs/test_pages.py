@@ -31,7 +31,7 @@ PATIENCE = 120.0
 """Upper bound on the processor time of a command, s."""
 OWN_TESTS = {"cells.md", "gallery.md"}
 """Pages whose snippets tests of their own run, in a folder with records."""
-GENERATED = {"_build", "effects", "commands.md"}
+GENERATED = {"_build", "effects", "commands.md", "results.md"}
 PAGES = [
     ROOT / "README.md",
     *(
@@ -179,7 +179,7 @@ def test_every_toml_block_is_a_valid_file_of_its_kind(
 def test_every_link_has_a_target(page: Path) -> None:
     block = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
     prose = block.sub("", page.read_text(encoding="utf-8"))
-    generated = {"commands.md", "effects/index.md", "api/index.md"}
+    generated = {"commands.md", "results.md", "effects/index.md", "api/index.md"}
     for target in re.findall(r"\]\(<?([^)#>]+)(?:#[^)>]*)?>?\)", prose):
         if target.startswith(RAW):
             assert (ROOT / target.removeprefix(RAW)).exists(), target

@@ -127,13 +127,31 @@ def test_a_file_is_read_back_identical(
         assert type(again.attrs[name]) is type(value), name
 
 
+ROWS = {
+    "basins": "velocity theta",
+    "basin_sweep": "velocity theta",
+    "bifurcation": "entry",
+    "lifetime": "start",
+    "lyapunov": "attractor",
+    "melnikov": "omega branch",
+    "orbits": "orbit",
+    "parameter_map": "",
+    "tongues": "critical",
+    "trajectory": "time",
+}
+"""What a row of the table of each kind is; of planes of parameters also a value of each."""
+
+
 def test_a_result_is_a_table_with_rows(saved: tuple[xr.Dataset, Path]) -> None:
     result, _ = saved
     table = result.pendmap.to_dataframe()
-    assert len(table) > 0
-    name = str(table.columns[0])
-    assert len(table) == result[name].size
-    assert np.array_equal(table[name].to_numpy(), result[name].values.ravel())
+    names = table.index.names
+    assert " ".join(names).endswith(ROWS[result.attrs["kind"]]) or names == ["start"]
+    assert len(table) == np.prod([result.sizes[name] for name in names]) > 0
+    assert table.dtypes.map(str).ne("object").all()
+    assert {"multipliers_1_re", "multipliers_2_im"} <= set(table.columns) or names != ["orbit"]
+    for name in set(table.columns) & set(result.data_vars):
+        np.testing.assert_array_equal(table[name].to_numpy(), result[name].values.ravel())
 
 
 def test_other_tools_see_that_a_start_never_settled(tmp_path: Path) -> None:

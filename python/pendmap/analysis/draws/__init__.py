@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.analysis.result import Field, indices, variable
+from pendmap.analysis.result import Field, indices
 from pendmap.analysis.varied import with_values
 from pendmap.errors import MOST_DRAWS, InputError, check_whole, short_repr
+from pendmap.files.variables import variable
 from pendmap.formatting import counted
 from pendmap.model.covariance import covariance_of
 

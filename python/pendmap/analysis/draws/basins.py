@@ -23,7 +23,8 @@ import numpy as np
 from pendmap.analysis.draws import drawn_field, outcomes, sure_line
 from pendmap.analysis.fractality import BOX
 from pendmap.analysis.orbit_table import attractors_of, named_alike, points_of
-from pendmap.analysis.result import rows, variable
+from pendmap.analysis.result import rows
+from pendmap.files.variables import variable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -12,8 +12,8 @@ from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import coordinate
 from pendmap.analysis.orbit_table import DESCRIBED, described
-from pendmap.analysis.result import NO_YES, flag, variable
 from pendmap.analysis.sweeps.tiles import PLANES
+from pendmap.files.variables import NO_YES, flag, variable
 from pendmap.formatting import span
 from pendmap.units import RATE, VELOCITY
 
