@@ -36,24 +36,22 @@ def test_outliers_of_the_virtual_rig_do_not_spoil_its_noise(tmp_path: Path) -> N
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.00205, rel=0.06)
 
 
-@pytest.mark.parametrize("apart", [2, 4, 6, 7, 8, 11])
-def test_adjacent_outliers_are_distinguished_from_a_jump(tmp_path: Path, apart: int) -> None:
-    time, theta = clean()
-    at = [500, 500 + apart, 500 + 2 * apart]
-    theta[at] += [0.5, 2.1, -0.9]
-    run = read(tmp_path, text((time, theta)))
+ADJACENT = [([500, 500 + k, 500 + 2 * k], [0.5, 2.1, -0.9], 0.001) for k in (2, 4, 6, 7, 8, 11)]
+ENDS = [
+    ([k], [size], 0.005) for k in (0, 1, 3, 6, 9, 1991, 1995, 1998, 2000) for size in (0.25, -2.0)
+]
+
+
+@pytest.mark.parametrize(("at", "sizes", "noise"), [*ADJACENT, *ENDS])
+def test_adjacent_outliers_and_those_at_the_ends_are_no_jumps(
+    tmp_path: Path, at: list[int], sizes: list[float], noise: float
+) -> None:
+    time, theta, _ = motion()
+    readings = noisy(theta, noise)
+    readings[at] += sizes
+    run = read(tmp_path, text((time, readings)))
     assert np.flatnonzero(~run.trusted).tolist() == at
     assert "missed-counts" not in found(run)
-
-
-@pytest.mark.parametrize("at", [0, 1, 3, 6, 9, 1991, 1995, 1998, 2000])
-@pytest.mark.parametrize("size", [0.25, -2.0])
-def test_outliers_at_the_ends_are_found(tmp_path: Path, at: int, size: float) -> None:
-    time, theta, _ = motion()
-    readings = noisy(theta, 0.005)
-    readings[at] += size
-    run = read(tmp_path, text((time, readings)))
-    assert np.flatnonzero(~run.trusted).tolist() == [at]
 
 
 def test_an_outlier_next_to_a_gap_is_found(tmp_path: Path) -> None:

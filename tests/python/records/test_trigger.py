@@ -171,23 +171,25 @@ def test_a_drive_is_compared_with_its_trigger(tmp_path: Path) -> None:
     assert "trigger-drive" not in said
 
 
-def test_a_stated_phase_is_used(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("drive", "column", "phi", "key"),
+    [
+        ("Omega = 12.1", ", phase = 0.7", DRIVE[2], "trigger-phase"),
+        ("Omega = 12.1", "", None, "trigger-drive"),
+        ("Omega = 12.1, phi = 0.3", ", phase = 0.7", 0.3, "trigger-drive"),
+        ("Omega = 12.1, phi = 1.5", ", phase = 0.7", 1.5, "trigger-differs"),
+    ],
+)
+def test_a_stated_phase_is_used(
+    tmp_path: Path, drive: str, column: str, phi: float | None, key: str
+) -> None:
     _, _, trigger = driven()
-    run = forced(tmp_path, trigger, "Omega = 12.1", ", phase = 0.7")
+    run = forced(tmp_path, trigger, drive, column)
     assert run.drive is not None
-    assert run.drive["phi"] == pytest.approx(DRIVE[2], abs=0.1)
-    assert "trigger-phase" in found(run)
-    run = forced(tmp_path, trigger, "Omega = 12.1")
-    assert run.drive is not None
-    assert run.drive["phi"] is None
-    run = forced(tmp_path, trigger, "Omega = 12.1, phi = 0.3", ", phase = 0.7")
-    assert run.drive is not None
-    assert run.drive["phi"] == 0.3
-    assert "trigger-differs" not in found(run)
-    run = forced(tmp_path, trigger, "Omega = 12.1, phi = 1.5", ", phase = 0.7")
-    assert "1.5" in found(run)["trigger-differs"].text
-    assert run.drive is not None
-    assert run.drive["phi"] == 1.5
+    within = 0.1 if key == "trigger-phase" else 0.0
+    assert run.drive["phi"] == (phi if phi is None else pytest.approx(phi, abs=within))
+    assert key in found(run)
+    assert ("trigger-differs" in found(run)) == (key == "trigger-differs")
 
 
 def test_bounces_and_lost_edges_do_not_matter(tmp_path: Path) -> None:
