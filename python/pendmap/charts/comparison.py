@@ -56,11 +56,7 @@ _SI: Final = Units(si=True)
 
 
 def sheet(comparison: Comparison) -> Sheet:
-    """Return one row per run: record and model, residual, figure 7, or the panels of a forced run.
-
-    More than :data:`ALL` runs are summarised in one panel, and only :data:`CHOSEN` of them have
-    rows.
-    """
+    """Return a row for each run; of many runs one panel of all, and the rows of a few."""
     every = comparison.every
     many = len(every) > ALL
     ranked = sorted(every, key=lambda one: (not one.run.hold_out, -_ratio(one)))
@@ -208,10 +204,7 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
 
 
 def statistics(one: ForcedComparison) -> Panel:
-    """Return one row per statistic: the ensemble's histogram, and the record's value as a line.
-
-    Events that do not occur before the record's end are hatched at the right.
-    """
+    """Return one row per statistic: the ensemble's histogram, and the record's value as a line."""
     marks: list[Mark] = []
     for k, each in enumerate(one.statistics):
         base = k + 1.0
@@ -281,10 +274,7 @@ def _drive(one: ForcedComparison) -> str:
 
 
 def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:
-    """Return histories above, and phase planes and statistics below, for each run.
-
-    A record and a member of the ensemble are drawn side by side, never superposed.
-    """
+    """Return histories above, and phase planes and statistics below, for each run."""
     charts = []
     for one in runs:
         above = [history(one), history(one, member="a member")]

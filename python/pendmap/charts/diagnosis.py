@@ -273,11 +273,7 @@ def ranking(found: Discrepancy) -> Panel:
 
 
 def shown_coefficients(found: Discrepancy) -> list[str]:
-    """Return the parameters that are drawn run by run: the sizes of the effects found.
-
-    If no effect was found, it is the parameter that differs most between runs, over its errors. A
-    single run cannot be compared with others.
-    """
+    """Return the parameters that are drawn run by run: the sizes of the effects found."""
     if len(found.data.fitted) == 1:
         return []
     sizes = [standing.candidate.free[0] for standing in found.assessment.identified]
@@ -291,10 +287,7 @@ def shown_coefficients(found: Discrepancy) -> list[str]:
 
 
 def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter from all runs together.
-
-    It is that of the effect found; without a claimed effect it follows from the standard error.
-    """
+    """Return the 95 % interval of a parameter from all runs together."""
     trial = found.nearest.fitted
     estimate = trial.fit.estimates[shown]
     for standing, effect in zip(found.assessment.identified, found.effects, strict=False):

@@ -78,11 +78,7 @@ def symbol(name: str, unit: str = "1") -> str:
 
 
 def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
-    """Return the model's parameters in one line, in its units, then its effects.
-
-    Phase, torque and friction are omitted if they are 0, frequency and phase if there is no drive
-    (p = 0), and parameters in ``without``, which vary.
-    """
+    """Return the model's parameters in one line, in its units, then its effects."""
     without = {_LABORATORY.get(name, name) for name in without}
     driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
     units = Units.of(attrs)
@@ -132,11 +128,7 @@ def sizes(name: str, *values: npt.ArrayLike) -> Axis:
 
 
 def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:
-    """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale.
-
-    The linear part contains nearly all of the curve nearest to 0 and is at least ``least``, so that
-    noise is not enlarged. An axis with little beyond it is linear.
-    """
+    """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale."""
     known = [each[np.isfinite(each)] for each in curves]
     known = [each for each in known if np.any(each != 0)]
     if not known:

@@ -64,12 +64,7 @@ _BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is n
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise.
-
-    Axes rise and dimensions have a fixed order. For a selection, shares, tables and summary are
-    recomputed, or marked as those of the whole. A whole result is unchanged. One map of a sweep is
-    a basin map.
-    """
+    """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise."""
     dataset = member(dataset)
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:
@@ -218,8 +213,6 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     """Keep the attractors and points at the selected values."""
     name = str(dataset.attrs["varied"])
     values = dataset[name].values
-    if "entry_value" not in dataset:  # from an earlier version, and whole
-        return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
     _refuse_kinds(dataset)
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}

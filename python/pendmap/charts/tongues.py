@@ -12,7 +12,7 @@ from pendmap.analysis.critical_curves import PLANES, in_plane, window
 from pendmap.analysis.tongues import NEAR
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
+from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
@@ -56,10 +56,7 @@ def chart(
     title: str = "Where rest is stable, hanging and inverted",
     marks: Sequence[tuple[float, float, str]] = (),
 ) -> Chart:
-    """Return the critical curves in both planes; a figure shows one of them.
-
-    ``marks`` are points ``(p, omega, name)`` drawn instead of the pendulum's own.
-    """
+    """Return the critical curves in both planes; a figure shows one of them."""
     del cells
     first = layer or str(dataset.attrs.get("plane", PLANES[0]))
     if first not in PLANES:
@@ -126,8 +123,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     if not marks:
         own = to(np.array([[float(attrs["own_omega"]), float(attrs["own_p"])]]))
         inside = x[0] <= own[0, 0] <= x[1] and 0 <= own[0, 1] <= top
-        star: dict[str, Any] = {"marker": "*", "size": 9.0, "order": 4.0, "path": "own"}
-        drawn.append(Points(*own.T, name="this pendulum" if inside else "", **star))
+        drawn.append(this_pendulum(*map(float, own[0]), named=bool(inside)))
     for p, at, name in marks:
         spot = to(np.array([[at, p]]))
         drawn.append(Points(*spot.T, size=5.0))
@@ -174,11 +170,7 @@ def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tupl
 
 
 def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
-    """Return the lines through the points with this multiplier.
-
-    Counted from below, the two boundaries of a tongue keep their order; if the count changes from
-    one frequency to the next, the nearest points are joined.
-    """
+    """Return the lines through the points with this multiplier."""
     open_: list[list[Point]] = []
     done: list[list[Point]] = []
     for w, row in zip(omega, found, strict=True):
@@ -222,10 +214,7 @@ def _paired(ended: list[list[Point]]) -> list[list[Point]]:
 
 
 def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
-    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it.
-
-    At the tip the linear equation without drive has the multiplier ``(-1)^k``, for any model.
-    """
+    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it."""
     spacing = float(np.diff(omega).max())
     for k in range(1 if multiplier < 0 else 2, 9, 2):
         tip = 2 / k
@@ -251,11 +240,7 @@ def _ahead(line: list[Point], w: float) -> float:
 def _stable(
     omega: Floats, dataset: xr.Dataset, prefix: str, first: npt.NDArray[np.int8], p_max: float
 ) -> list[Floats]:
-    """Return quadrangles between neighbouring frequencies in which rest is stable.
-
-    Between two frequencies with equal curves, strips are matched in order, however steep; otherwise
-    all overlapping ones are joined.
-    """
+    """Return quadrangles between neighbouring frequencies in which rest is stable."""
     keys = ("index", "p", "multiplier", "stable_above")
     index, p, multiplier, above = (dataset[f"{prefix}{key}"].values for key in keys)
     intervals: list[list[tuple[float, float]]] = []

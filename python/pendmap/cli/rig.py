@@ -126,7 +126,7 @@ def command(  # noqa: PLR0913 (an option each)
 
     files: list[tuple[Callable[[Path], Path | str], Path]] = [(write, where.experiment)]
     if plot is not None:
-        files.append((functools.partial(_draw, experiment, where.experiment.name), plot))
+        files.append((functools.partial(_draw, where.experiment), plot))
     written = write_all(files)
     whole, drawn = both in written, written.name(plot)
     if as_json:
@@ -144,27 +144,12 @@ def command(  # noqa: PLR0913 (an option each)
     written.check()
 
 
-def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
-    """Draw the records with their public description, without hidden values."""
-    from pendmap import virtual_rig
-    from pendmap.charts.runs import RunPanel, of_runs
+def _draw(folder: Path, path: Path) -> Path:
+    """Draw the records as ``pendmap look`` does, without hidden values."""
+    from pendmap.records import read_experiment
     from pendmap.render import draw
 
-    held = virtual_rig.held_out(experiment)
-    records = []
-    for k, run in enumerate(experiment.runs):
-        plan = run.plan
-        words = [f"run_{k:02d}: {plan.kind}"]
-        if plan.kind == "forced":
-            omega = "\N{GREEK CAPITAL LETTER OMEGA}"
-            words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
-        words += ["held out"] if k in held else []
-        records.append(RunPanel(", ".join(words), run.time, run.angle))
-    sensor = experiment.sensor
-    counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
-    subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
-    title = f"Measured angle: {name}"
-    return draw(of_runs(records, title=title, subtitle=subtitle), path)
+    return draw(read_experiment(folder), path)
 
 
 def _request(name: str | None, given: dict[str, Any]) -> virtual_rig.Request:

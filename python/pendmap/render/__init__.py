@@ -72,36 +72,19 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 ) -> Path:
     """Draw a result into a file.
 
-    Basin map: labels, attractors with their shares, and settle time; with unreliable labels the
-    settle time and net turns come first; with meaningless labels the net turns and the finite-time
-    exponent. Closed orbits: paths and points in the phase plane. Map over two parameters: kinds of
-    attractor, striped if several coexist, and the largest exponent. Bifurcation diagram:
-    stroboscopic angles, sweeps up and down, exponents. Critical curves: stable regions and their
-    boundaries. Melnikov's criterion: the threshold against the frequency. Trajectory: time history,
-    energy, phase plane, Poincare section. Exponent: growth along the start, the running mean, its
-    distribution. Lifetime: the survival curve with its tail, and the mean lifetime against the
-    start of the tail. Record: the angle with samples used and not used for fitting, findings, the
-    sampling intervals, the noise; of several runs a strip each. Identification: figures 4 to 7 of
-    Horton, Wiercigroch & Xu (2008) and their table 1. Comparison: record and model, the residual
-    with the noise, errors of periods and peaks. Diagnosis: residuals before and after, forecast
-    errors, the missing torque, the candidates, the first effect run by run.
+    The gallery of the manual shows what is drawn of each result. A selection of a dataset (a range,
+    every k-th value, reversed, transposed) is drawn with its own cells, coordinates and shares.
 
     Parameters
     ----------
     result : xarray.Dataset or other result
         Result of an analysis, of ``pendmap.load``, ``read_experiment``, ``identify``, ``compare``
-        or ``diagnose``. A selection of a dataset (a range, every k-th value, reversed, transposed)
-        is drawn with its own cells, coordinates and shares.
+        or ``diagnose``.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Part to draw alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
-        over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
-        ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
-        ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
-        of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map over two parameters
-        ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
-        ``certainty``, or ``share KIND``. An unknown one is answered with those of the result.
+        Part to draw alone, large, such as ``settle`` of a basin map or ``phase`` of a trajectory;
+        an unknown one is answered with those of the result.
     size : (float, float), optional
         Width and height in inches; by default as large as the parts need.
     width : float, optional
