@@ -11,13 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib import rc_context
 
 from conftest import COMMAND
 from interrupted import any_file, started
-from pendmap import InputError
-from pendmap.charts import runs as records
-from pendmap.render import drawing, style
 from pendmap.virtual_rig import EFFECTS, PRESETS, Request, make
 from rigs import read_toml, record
 
@@ -238,21 +234,3 @@ def test_records_are_drawn(rig: Run, tmp_path: Path) -> None:
         assert refused.returncode == 2
         assert name in refused.stderr
     assert not (tmp_path / "other").exists()
-
-
-def test_each_run_has_a_panel_with_gaps_at_lost_samples() -> None:
-    time = np.delete(np.arange(100) / 100, [40, 41, 42])
-    runs = [records.RunPanel(f"run {k}", time, np.sin(k * time)) for k in range(5)]
-    runs.append(records.RunPanel("alone", np.zeros(1), np.ones(1)))
-    runs.append(records.RunPanel("long", np.arange(1e5), np.sin(np.arange(1e5))))
-    with rc_context(style.RC):
-        chart = records.of_runs(runs, title="Records", subtitle="seven")
-        figure = drawing.draw(chart, dpi=50.0)
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [one.title for one in runs]
-    xy = np.asarray(figure.axes[1].lines[0].get_xydata())
-    assert np.flatnonzero(np.isnan(xy[:, 0])).tolist() == [40]
-    assert figure.axes[0].get_xlabel() == "$t$ (s)"
-    assert figure.axes[0].get_ylabel().endswith("(rad)")
-    assert records.BINS < len(figure.axes[6].lines[0].get_xydata()) <= 2 * records.BINS + 2
-    with pytest.raises(InputError, match="one record or more"):
-        records.of_runs([], title="", subtitle="")
