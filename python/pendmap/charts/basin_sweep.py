@@ -72,16 +72,16 @@ def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
         most = None
     named = set(np.argsort(-share, kind="stable")[:most].tolist())
     seen: Counter[str] = Counter()
-    found = []
+    result = []
     for k, name in enumerate(map(str, dataset["attractor"].values)):
         short = plain(name).partition(" from ")[0]
         seen[short] += 1
         if k in named:
-            told = short if seen[short] == 1 else f"{short} #{seen[short]}"
-            found.append(Branch(k + 1, typeset(name), palette.colour(told)))
+            text = short if seen[short] == 1 else f"{short} #{seen[short]}"
+            result.append(Branch(k + 1, typeset(name), palette.colour(text)))
         else:
-            found.append(Branch(k + 1, "", OTHERS))
-    return found
+            result.append(Branch(k + 1, "", OTHERS))
+    return result
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
@@ -189,8 +189,8 @@ def _stack(dataset: xr.Dataset, dim: str, every: list[Branch]) -> list[Mark]:
         ends = np.repeat(low, 2), np.repeat(top, 2)
         marks.append(Band(edges, *ends, colour=colour, name=name, path=f"{k + 1}/share"))
         size = stderr[:, k] if k < len(every) and every[k].name else np.zeros(x.size)
-        own = size > 0
-        at = bars(x[own], (top - size)[own], (top + size)[own])
+        mine = size > 0
+        at = bars(x[mine], (top - size)[mine], (top + size)[mine])
         marks.append(Line(*at, width=0.6, colour=INK, order=3.0))
     return marks
 

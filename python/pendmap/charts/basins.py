@@ -133,8 +133,8 @@ def _layer(  # noqa: PLR0913, PLR0917 (parts of an image)
     labels = Image(label.astype(np.int16) + 1, *window, classes=classes, path=path)
     if layer == "labels":
         return [labels]
-    own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
-    absent, values = missing(layer, own) | (label < 0), own.astype(np.float32)
+    mine = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
+    absent, values = missing(layer, mine) | (label < 0), mine.astype(np.float32)
     if layer == "settle":
         np.maximum(values, 1.0, out=values)
     values[absent] = np.nan
@@ -313,9 +313,9 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
     """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
     driven = float(facts(dataset).get("p", 1.0)) != 0.0
     units = Units.of(facts(dataset))
-    own = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
+    mine = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
     return {
-        "settle": f"periods{own} to settle",
+        "settle": f"periods{mine} to settle",
         "turns": "net turns",
         "exponent": f"exponent {names.per_time(units)}",
         "probability": "probability",

@@ -140,7 +140,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
     owner = dataset["point_entry"].values
     points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
-    found: list[Family] = []
+    result: list[Family] = []
     rare = np.array(["chaos" not in str(dataset["kind"].values[word]) for word in every[:, 0]])
     first = np.lexsort((-count, rare))[:MOST]
     for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first))):
@@ -148,11 +148,11 @@ def families(dataset: xr.Dataset) -> list[Family]:
         called = _name(str(dataset["kind"].values[word]), int(period), int(turns))
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
-        named = len(found) < MOST
+        named = len(result) < MOST
         shade = palette.on_white(palette.colour(called)) if named else palette.UNNAMED
         on = (sweeps["up"] == k, sweeps["down"] == k)
-        found.append(Family(called, shade, points[mine[owner]], exponents, *on))
-    return found
+        result.append(Family(called, shade, points[mine[owner]], exponents, *on))
+    return result
 
 
 def _name(kind: str, n: int, w: int) -> str:

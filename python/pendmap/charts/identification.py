@@ -107,11 +107,11 @@ def simulated(report: IdentificationReport) -> dict[str, Decay]:
         return {}
     made = {}
     for name in drawn(report.methods):
-        found = report.methods[name]
-        if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
+        result = report.methods[name]
+        if not result.applicable or "w0" not in result.estimates or name in report.table.lost:
             continue
-        rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
-        made[name] = Decay.of(rig, report.peaks, found.zero)
+        rig = report.joint.fit.model if name == BEST and report.joint is not None else result.rig
+        made[name] = Decay.of(rig, report.peaks, result.zero)
     return made
 
 
@@ -126,8 +126,8 @@ def decays(report: IdentificationReport) -> Chart:
     made, run, turned = simulated(report), report.run, report.peaks.turned
     last = []
     if (joint := report.joint) is not None:
-        said, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma
-        last = [residuals(run, joint.fit.residuals[0], sigma, BEST, said)]
+        text, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma
+        last = [residuals(run, joint.fit.residuals[0], sigma, BEST, text)]
     if not made:
         chart = nothing(title, report.table.left_out or NOTHING)
         if not (report.table.left_out and last):
@@ -246,16 +246,16 @@ def error_panels(
     ends = (max(float(np.min(some.peak[1:])), 1e-9) / 1.15, float(np.max(some.peak[1:])) * 1.15)
     size = Axis("measured peak |θ| (rad)", ends, "log")
     time = Axis(names.TIME, holding(some.period_time, margin=0.02))
-    periods = [(each.period_time, each.period_error) for each in known.values()]
-    sizes = [(each.peak[1:], each.peak_error[1:]) for each in known.values()]
+    periods = [(one.period_time, one.period_error) for one in known.values()]
+    sizes = [(one.peak[1:], one.peak_error[1:]) for one in known.values()]
     panels: list[Panel] = []
     for title, across, noise, curves in (
         (titles[0], time, _noise(some.period_time, error), periods),
         (titles[1], size, _noise(some.peak[order], wide), sizes),
     ):
         up, lines = names.signed([y for _, y in curves], "error (%)")
-        own = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
-        panels.append(Panel("errors", title, across, up, [*noise, *own, *lines]))
+        mine = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
+        panels.append(Panel("errors", title, across, up, [*noise, *mine, *lines]))
     return panels
 
 

@@ -44,8 +44,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         over = f";   grey dots: {counted(draws, 'draw')}"
     # Stable orbits are drawn last, on top.
     for k in np.argsort(dataset["stable"].values.astype(bool), kind="stable"):
-        own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
-        marks += _orbit(dataset, int(k), paths[k], plane.copies(dataset, own, *theta))
+        mine = points[dataset["point_orbit"].values == dataset["id"].values[k]]
+        marks += _orbit(dataset, int(k), paths[k], plane.copies(dataset, mine, *theta))
     if count > MOST:
         marks.append(Points(NONE, NONE, marker="none", name=f"and {count - MOST} more"))
     n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
@@ -86,8 +86,8 @@ def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
     piece = dataset["path_piece"].values
     lines = []
     for k in np.unique(piece[mine]):
-        own = mine & (piece == k)
-        motion = dataset["path_theta"].values[own], dataset["path_velocity"].values[own]
+        values = mine & (piece == k)
+        motion = dataset["path_theta"].values[values], dataset["path_velocity"].values[values]
         whole = np.stack(motion, axis=1)
         lines.append(whole if plane.on_line(dataset) else plane.broken_at_wrap(*motion))
     return np.stack(together(lines), axis=1)

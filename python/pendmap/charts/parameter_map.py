@@ -78,22 +78,22 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
             presence[name] = presence.get(name, 0.0) + float(share[k])
     frequent = sorted(presence, key=lambda name: -presence[name])[:_MOST]
     frequent = [name for name in frequent if presence[name] >= _LEAST]
-    found: list[Kind] = []
+    result: list[Kind] = []
     rare: dict[str, list[str]] = {}
     for name, here in presence.items():
         family, colour = name.split()[0], palette.colour(_named(name))
         like = _OTHERS[family][1] if family in _OTHERS else ""
         if not like or (name in frequent and colour != palette.colour(like)):
-            found.append(Kind(name, colour, (name,), here))
+            result.append(Kind(name, colour, (name,), here))
         else:
             rare.setdefault(family, []).append(name)
     for family, members in rare.items():
-        own = [set(members) & set(one) for one in sets(dataset)]
-        total = float(sum(s for s, has in zip(share, own, strict=True) if has))
+        mine = [set(members) & set(one) for one in sets(dataset)]
+        total = float(sum(s for s, has in zip(share, mine, strict=True) if has))
         several, like = _OTHERS[family]
         name = several if len(members) > 1 else members[0]
-        found.append(Kind(name, palette.colour(like), tuple(members), total))
-    return sorted(found, key=lambda kind: _place(kind.name))
+        result.append(Kind(name, palette.colour(like), tuple(members), total))
+    return sorted(result, key=lambda kind: _place(kind.name))
 
 
 def _named(name: str) -> str:
@@ -122,8 +122,8 @@ def _place(name: str) -> tuple[int, float, float]:
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:
     """Return an image of indices into :func:`kinds`, row 0 lowest, one block of pixels per cell."""
     listed = kinds(dataset)
-    own = {member: k for k, kind in enumerate(listed) for member in kind.members}
-    groups = [sorted({own[name] for name in one}) for one in sets(dataset)]
+    mine = {member: k for k, kind in enumerate(listed) for member in kind.members}
+    groups = [sorted({mine[name] for name in one}) for one in sets(dataset)]
     regime = plane.pixels(dataset, dataset["regime"], size)
     rows, columns = regime.shape
     factor = [max(1, round(size / count)) for count in (rows, columns)]

@@ -196,8 +196,8 @@ def envelope(time: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
     edges = np.linspace(0, count, bins + 1).astype(np.int64)
     # Bins differ by at most one sample: padded to the longest, each bin is a row.
     rows = np.minimum(edges[:-1, None] + np.arange(np.diff(edges).max()), edges[1:, None] - 1)
-    of_rows, each = values[rows], np.arange(bins)
-    lowest, highest = (rows[each, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
+    of_rows, one = values[rows], np.arange(bins)
+    lowest, highest = (rows[one, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
     at = np.unique(np.concatenate([[0, count - 1], lowest, highest]))
     return time[at], values[at]
 

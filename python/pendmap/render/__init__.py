@@ -124,12 +124,12 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     return style.written(path, make, dpi=dpi)
 
 
-def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """Write the report of a diagnosis with its figures.
 
     Parameters
     ----------
-    found : Discrepancy
+    result : Discrepancy
         Result of ``pendmap.diagnosis.diagnose``.
     path : str or path
         ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
@@ -156,4 +156,4 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
             f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
             f"{target.suffix!r}"
         )
-    return report.write(found, target)
+    return report.write(result, target)

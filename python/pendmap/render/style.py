@@ -82,8 +82,8 @@ _FOUND: Final = re.compile(
 def typeset(text: str) -> str:
     """Return a text of a chart with its symbols in italics, by mathtext."""
 
-    def one(found: re.Match[str]) -> str:
-        return r"\$" if found[0] == "$" else SYMBOLS.get(found[0], found[0])
+    def one(result: re.Match[str]) -> str:
+        return r"\$" if result[0] == "$" else SYMBOLS.get(result[0], result[0])
 
     return _FOUND.sub(one, text.replace(r"\$", "$"))
 
