@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORE := $(shell find src -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-manual test-all lanes wheel man docs outputs notebooks fuzz lint bench build-times clean develop
+.PHONY: demo test test-manual test-all lanes wheel man docs outputs notebooks fuzz lint lint-rust lint-python bench build-times clean develop
 
 demo: $(VENV)/.demo ## set up everything, the viewer too, and map the basins of p = 1.7
 	$(BIN)/pendmap basins --p 1.7
@@ -16,9 +16,10 @@ LANES := $(patsubst tests/rust/%.rs,%::,$(filter-out %/support.rs,$(shell grep -
 # Tests run one beside the other: matrices in several threads would only wait for each other.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal --durations 30
 
-test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones
+MARKS ?= not thorough and not manual
+test: $(VENV)/.develop ## set up everything and run the tests, all but the thorough ones and the manual
 	cargo test --locked --quiet
-	$(PYTEST) -m 'not thorough'
+	$(PYTEST) -m '$(MARKS)'
 
 test-manual: $(VENV)/.develop ## set up everything, build the manual and run its commands, cells, notebooks and links
 	$(PYTEST) tests/python/docs
@@ -52,12 +53,16 @@ COUNT ?= 1000
 fuzz: $(VENV)/.develop ## COUNT cases of bad input and faults drawn from SEED, each a command that must end well
 	$(BIN)/python tests/python/fuzz.py --seed $(SEED) --count $(COUNT)
 
-lint: $(VENV)/.develop ## formatting, warnings, types, stubs, direction of imports
+lint: lint-rust lint-python ## formatting, warnings, types, stubs, direction of imports
+
+lint-rust: $(VENV)/.develop
 	cargo fmt --all --check
 	cargo clippy --locked --quiet --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --quiet --workspace --no-deps
 	! grep -rlE '\b(pyo3|numpy)\b' src Cargo.toml --include=*.rs --include=Cargo.toml | grep -v '^src/python/'
 	! grep -rl '\brayon\b' src --include=*.rs | grep -vE '^src/(maps|fit)/'
+
+lint-python: $(VENV)/.develop
 	$(BIN)/ruff check --quiet
 	$(BIN)/ruff format --check --quiet
 	$(BIN)/mypy

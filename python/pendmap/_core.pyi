@@ -323,7 +323,6 @@ class Fit(FitPoint):
     stages: int
     converged: bool
     given_up: bool
-    promised: float
 
 @final
 class FittedRun:

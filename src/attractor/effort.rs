@@ -76,7 +76,7 @@ impl Effort {
         proved: 16,
         exponents: 256,
         cells: 96,
-        trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 1, returns: 4 },
+        trap: Sampling { points: 8, rays: 64, levels: 54, ratio: 0.82, rounds: 2, returns: 4 },
     };
     /// The budget for a pendulum whose attractors are mostly known from a similar one: what else the starts reach
     /// is found as by a thorough search, but only from those that no trap captures within a long first round,
@@ -85,7 +85,7 @@ impl Effort {
         first_round: 1024,
         observed_alone: 16,
         exponents: 16,
-        trap: Sampling { levels: 14, rounds: 4, ..Self::THOROUGH.trap },
+        trap: Sampling { levels: 14, rounds: 8, ..Self::THOROUGH.trap },
         ..Self::THOROUGH
     };
     /// The budget for one pendulum among thousands.

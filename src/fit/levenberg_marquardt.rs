@@ -175,8 +175,6 @@ pub struct Outcome {
     pub converged: bool,
     /// Whether it was given up, as it cannot come near [`Limit::target`].
     pub given_up: bool,
-    /// Predicted gain of the step after its end: the squared distance from the minimum, in standard errors.
-    pub promised: f64,
 }
 
 /// Descends from `point`, with the parameters `held` fixed.
@@ -191,8 +189,7 @@ pub fn descend(
     cancel: &AtomicBool,
 ) -> Result<Outcome, Error> {
     let (mut damping, mut steps, mut down, mut fell) = (0.0, 0, 0, 0.0);
-    let ended =
-        |steps, converged, promised| Ok(Outcome { steps, converged, given_up: false, promised });
+    let ended = |steps, converged| Ok(Outcome { steps, converged, given_up: false });
     loop {
         unless_cancelled(cancel)?;
         let chi2 = point.normal.chi2;
@@ -204,14 +201,14 @@ pub fn descend(
             {
                 *point = next;
             }
-            return ended(steps + 1, true, promised);
+            return ended(steps + 1, true);
         }
         let settles = damping == 0.0 && down >= TRIED && promised < SHRINKS * fell;
         if settles && chi2 - HOPE * promised > limit.target {
-            return Ok(Outcome { steps, converged: false, given_up: true, promised });
+            return Ok(Outcome { steps, converged: false, given_up: true });
         }
         if steps >= limit.steps {
-            return ended(steps, false, promised);
+            return ended(steps, false);
         }
         let (tried, next) = point.lower(problem, &step, held, cancel)?;
         steps += tried;
@@ -228,7 +225,7 @@ pub fn descend(
             // At a kink, as where a half swing more or less is made before the last stop, the sum
             // of squares has a least value without being flat.
             if promised <= limit.gain + limit.part * chi2 || damping > MOST_DAMPING {
-                return ended(steps, true, promised);
+                return ended(steps, true);
             }
         }
     }

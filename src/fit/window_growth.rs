@@ -60,8 +60,6 @@ pub struct Fit {
     pub converged: bool,
     /// Whether it was given up.
     pub given_up: bool,
-    /// [`Outcome::promised`] of the last stage; infinite if it could not begin.
-    pub promised: f64,
 }
 
 impl Fit {
@@ -98,8 +96,8 @@ pub fn fit(
     let held = held(problem, settings);
     let mut point = Point::new(problem, problem.start(), windows).ok_or(Error::Diverges)?;
     let outcome = descend(problem, &mut point, &held, last, cancel)?;
-    let Outcome { steps, converged, given_up, promised } = outcome;
-    Ok(Fit { point, steps, stages: 1, converged, given_up, promised })
+    let Outcome { steps, converged, given_up } = outcome;
+    Ok(Fit { point, steps, stages: 1, converged, given_up })
 }
 
 /// The parameters that are held fixed.
@@ -133,8 +131,8 @@ fn widened(
             steps += outcome.steps;
         }
         if length >= most {
-            let Outcome { converged, promised, .. } = outcome;
-            return Ok(Fit { point, steps, stages, converged, given_up: false, promised });
+            let converged = outcome.converged;
+            return Ok(Fit { point, steps, stages, converged, given_up: false });
         }
         // Not a rest of the record at the end that is much shorter than the others.
         length *= settings.growth;
@@ -145,8 +143,7 @@ fn widened(
         // A curve that was good in parts may be lost as a whole: then the initial states are all
         // that is known.
         let Some(next) = Point::new(problem, point.values.clone(), windows) else {
-            let (converged, given_up, promised) = (false, false, f64::INFINITY);
-            return Ok(Fit { point, steps, stages, converged, given_up, promised });
+            return Ok(Fit { point, steps, stages, converged: false, given_up: false });
         };
         point = next;
     }

@@ -195,7 +195,6 @@ pub struct Fit {
     stages: usize,
     converged: bool,
     given_up: bool,
-    promised: f64,
 }
 
 /// The model at each sample of a record; no numbers where there is no window.
@@ -284,7 +283,6 @@ pub fn fit_runs(
         stages: found.stages,
         converged: found.converged,
         given_up: found.given_up,
-        promised: found.promised,
     };
     Py::new(py, (own, FitPoint::new(py, &problem, &found.point)?))
 }

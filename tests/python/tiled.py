@@ -7,6 +7,7 @@ killed (``killed``), or the disk is full from there on (``full``); else it tells
 from __future__ import annotations
 
 import errno
+import functools
 import importlib
 import os
 import signal
@@ -34,7 +35,7 @@ _STARTS = np.random.default_rng(1).uniform(-3, 3, (2, 1500))
 _CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, not of what
 
 CASES: dict[str, Callable[..., xr.Dataset]] = {
-    "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(103), **keep),
+    "basins": lambda **keep: pendmap.basins(_DRY, Grid.square(83), **keep),
     "chaos": lambda **keep: pendmap.basins(Pendulum(p=1.5, omega=1.1), Grid.square(103), **keep),
     "slow": lambda **keep: pendmap.basins(_SLOW, Grid.square(163), **keep),
     "map": lambda **keep: pendmap.parameter_map(Pendulum(), _WINDOW, starts=3, **keep),
@@ -45,6 +46,12 @@ CASES: dict[str, Callable[..., xr.Dataset]] = {
     "list": lambda **keep: pendmap.lifetime(Pendulum(p=1.7), *_STARTS, **keep),
 }
 """Analyses that are computed in tiles."""
+
+
+@functools.cache
+def plain(name: str) -> xr.Dataset:
+    """Return the result of one call, computed once in a process."""
+    return CASES[name]()
 
 
 class StoppedError(Exception):

@@ -102,16 +102,6 @@ fn twins_are_mirror_images_with_equal_shares() {
 }
 
 #[test]
-fn the_oscillation_that_leans_to_the_right_is_plus() {
-    let (_, _, map) = &maps()[2];
-    let lean = |name: &str| {
-        let attractor = map.attractors.iter().find(|a| a.name == name).expect(name);
-        attractor.points.iter().map(|p| p[0]).sum::<f64>()
-    };
-    assert!(lean("oscillation 4:0 (+)") > 0.1 && lean("oscillation 4:0 (-)") < -0.1);
-}
-
-#[test]
 fn settling_takes_longer_where_multipliers_are_larger() {
     let mean = |i: usize| {
         let settle = &maps()[i].2.labels.settle;
@@ -130,13 +120,6 @@ fn rest_attracts_below_its_onset() {
     assert_eq!((rest.kind, rest.name.as_str(), rest.twin), (Kind::Rest, "rest", Some(0)));
     assert_eq!(rest.points, [[0.0, 0.0]]);
     assert!((map.fractions[0] - 1.0).abs() < 1e-12);
-}
-
-#[test]
-fn a_rotation_after_doubling_is_of_period_two_and_two_turns() {
-    let map = basins_on_plane(&driven(0.1, 1.4, 2.0), 40);
-    let names: Vec<&str> = map.attractors.iter().map(|a| a.name.as_str()).collect();
-    assert!(names.contains(&"rotation 2:+2") && names.contains(&"rotation 2:-2"), "{names:?}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use pendmap::integrate::State;
 use pendmap::integrate::accuracy::distance;
 use pendmap::model::Pendulum;
+use pendmap::orbit::PoincareMap;
 use pendmap::orbit::newton::find;
-use pendmap::orbit::{PeriodicOrbit, PoincareMap};
 use serde_json::Value;
 
 use crate::support::driven;
@@ -60,86 +60,6 @@ fn multipliers_at_the_known_bifurcations() {
         let error = (image.derivative.trace() - trace).abs();
         assert!(error < 1e-10, "{}: trace {} for {trace}", event.name, image.derivative.trace());
     }
-}
-
-#[test]
-fn traces_are_the_reference_ones() {
-    for event in events() {
-        let map = PoincareMap::new(&event.pendulum);
-        let tables = [&truths()["bifurcations_gamma0.1_omega2"], &truths()["rotation_saddle_node"]];
-        let entry = tables.iter().find_map(|t| t.get(&event.name)).expect("its entry");
-        // For the symmetric oscillation the reference has the trace of -P, its root.
-        let symmetric = event.name == "osc_SB";
-        let n = if symmetric { 1 } else { event.n };
-        let sign = if symmetric { -1.0 } else { 1.0 };
-        let trace = sign * map.iterate(event.point, n).derivative.trace();
-        assert!((trace - number(&entry["trace"])).abs() < 1e-10, "{}: {trace}", event.name);
-    }
-}
-
-#[test]
-fn doublings_take_the_stability() {
-    for event in events().iter().filter(|e| e.multiplier < 0.0) {
-        let at = |p: f64| -> PeriodicOrbit {
-            let pendulum = driven(0.1, p, event.pendulum.drive.omega);
-            let orbit = find(&PoincareMap::new(&pendulum), event.point, event.n, 0.1);
-            orbit.unwrap_or_else(|| panic!("{} at p = {p}", event.name))
-        };
-        let p = event.pendulum.drive.p;
-        assert!(at(p - 1e-5).is_stable(), "{} before", event.name);
-        let after = at(p + 1e-5);
-        assert!(!after.is_stable() && after.multipliers.0[0].re < -1.0, "{} after", event.name);
-        assert_eq!(after.n, event.n, "{}: Newton keeps to the orbit that doubles", event.name);
-        // At the bifurcation itself: Newton's method is regular at -1.
-        let there = at(p);
-        assert!((there.multipliers.0[0].re + 1.0).abs() < 1e-9, "{}", event.name);
-        assert!(there.contains(event.point, 1e-9), "{}", event.name);
-    }
-}
-
-#[test]
-fn folds_end_their_orbits() {
-    for event in events().iter().filter(|e| e.name.contains("SN")) {
-        let try_at = |p: f64| {
-            let map = PoincareMap::new(&driven(0.1, p, event.pendulum.drive.omega));
-            let around = |by: f64| [event.point[0] + by, event.point[1]];
-            [-0.02, -0.005, 0.0, 0.005, 0.02]
-                .into_iter()
-                .filter_map(|by| find(&map, around(by), 1, 0.1))
-                .filter(|orbit| orbit.w == 1)
-                .collect::<Vec<_>>()
-        };
-        let p = event.pendulum.drive.p;
-        assert!(try_at(p - 1e-4).is_empty(), "{}: nothing rotates before the fold", event.name);
-        let after = try_at(p + 1e-4);
-        let stable = after.iter().filter(|orbit| orbit.is_stable()).count();
-        assert!(0 < stable && stable < after.len(), "{}: a node and a saddle", event.name);
-    }
-}
-
-#[test]
-fn symmetry_breaking_makes_two_of_one() {
-    let event = &events()[0];
-    let find_at = |p: f64, start: State| {
-        find(&PoincareMap::new(&driven(0.1, p, 2.0)), start, 2, 0.3).expect("the oscillation")
-    };
-    let p = event.pendulum.drive.p;
-    let before = find_at(p - 0.01, event.point);
-    let mirror = |s: State| [-s[0], -s[1]];
-    assert!(before.is_stable() && before.contains(mirror(before.points[0]), 1e-9));
-    let after = find_at(p + 0.01, event.point);
-    assert!(!after.is_stable() && after.multipliers.0[0].re > 1.0);
-    // Next to it are two stable ones, leaning to either side, mirror images of each other.
-    let map = PoincareMap::new(&driven(0.1, p + 0.01, 2.0));
-    let beside = [event.point[0] + 0.15, event.point[1]];
-    let settled = map.iterate(beside, 1000).state;
-    let one = find_at(p + 0.01, settled);
-    assert!(one.is_stable() && one.n == 2 && one.w == 0);
-    let other = find_at(p + 0.01, mirror(one.points[0]));
-    assert!(other.is_stable() && !other.contains(one.points[0], 1e-2));
-    assert!(
-        other.contains(mirror(one.points[0]), 1e-9) && other.contains(mirror(one.points[1]), 1e-9)
-    );
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn through_births_doublings_and_crises() {
 fn under_friction() {
     let pendulum =
         |k: i32| driven(0.05, 0.9, 2.0).with_friction(0.01 * f64::from(k)).expect("a pendulum");
-    compared((0..6).map(pendulum));
+    compared((0..4).map(pendulum));
 }
 
 #[test]

@@ -2,15 +2,14 @@
 
 use std::f64::consts::PI;
 
-use pendmap::integrate::Schedule;
 use pendmap::integrate::accuracy::distance;
-use pendmap::integrate::kernel::tableau::{A, B, BP, C, ORDER, STAGES};
+use pendmap::integrate::kernel::tableau::ORDER;
 use pendmap::integrate::reference::dense::DenseStep;
 use pendmap::integrate::reference::driver::Driver;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::model::Pendulum;
 
-use crate::support::{advanced, along, driven, fine_strobe, simd, spread};
+use crate::support::{advanced, driven, fine_strobe, simd, spread};
 
 /// Root mean square error over starts after one period, for each number of steps.
 fn errors(pendulum: &Pendulum, steps: &[usize]) -> Vec<f64> {
@@ -47,38 +46,6 @@ fn the_step_has_order_eight() {
     }
 }
 
-#[test]
-fn the_tableau_meets_the_simple_order_conditions() {
-    // sum b c^k = 1/((k+1)(k+2)), sum b' c^k = 1/(k+1), sum_j a_ij = c_i^2/2.
-    for k in 0..ORDER {
-        let moment = |weights: &[f64; STAGES]| {
-            weights.iter().zip(&C).map(|(w, c)| w * c.powi(k)).sum::<f64>()
-        };
-        let k = f64::from(k);
-        if k < f64::from(ORDER) - 1.0 {
-            assert!((moment(&B) - 1.0 / ((k + 1.0) * (k + 2.0))).abs() < 1e-15, "b, {k}");
-        }
-        assert!((moment(&BP) - 1.0 / (k + 1.0)).abs() < 1e-15, "b', {k}");
-    }
-    for (row, c) in A.iter().zip(&C) {
-        assert!((row.iter().sum::<f64>() - 0.5 * c * c).abs() < 2e-14);
-    }
-}
-
-#[test]
-fn schedules_join() {
-    // A period in two parts with different step lengths equals the whole period.
-    let pendulum = Pendulum::new(0.2, 1.2, 1.7, 0.3, 0.1).expect("in range");
-    let period = pendulum.period();
-    let cut = 0.37 * period;
-    let expected = along(&Schedule::period(&pendulum, 400), [1.0, 0.5]);
-    let first = Schedule::new(&pendulum, 0.0, cut, 170);
-    let second = Schedule::new(&pendulum, cut, period - cut, 290);
-    let end = along(&second, along(&first, [1.0, 0.5]));
-    assert!(distance(end, expected) < 3e-14, "{end:?} for {expected:?}");
-    assert!((second.duration() - (period - cut)).abs() < 1e-15);
-}
-
 /// Errors at the end of equal steps of the reference integrator, and the greatest error of the
 /// interpolants, while the sense of friction is constant.
 fn equal_steps(count: usize) -> [f64; 2] {
@@ -111,20 +78,4 @@ fn the_reference_integrator_has_order_eight_and_its_curves_seven() {
     let order = |of: usize| (errors[0][of] / errors[2][of]).ln() / (9.0_f64 / 4.0).ln();
     assert!(order(0) > 7.5, "ends: order {}, {errors:?}", order(0));
     assert!(order(1) > 6.7, "curves: order {}, {errors:?}", order(1));
-}
-
-#[test]
-fn the_error_follows_the_tolerance_through_stick_and_slip() {
-    let pendulum = driven(0.1, 0.8, 1.2).with_friction(0.15).expect("in range");
-    let end = |tolerance: f64| {
-        let ode = OdeProblem::new(&pendulum, true, tolerance, |_, value| value);
-        let mut driver = Driver::new(&ode, 0.0, [2.79, 0.49], 20.0);
-        driver.finish(|_| ());
-        driver.state
-    };
-    let exact = end(1e-15);
-    for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
-        let error = distance(end(tolerance), exact);
-        assert!(error < 30.0 * tolerance, "{tolerance:e}: {error:e}");
-    }
 }

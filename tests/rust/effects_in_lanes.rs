@@ -7,7 +7,7 @@ use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
-use pendmap::integrate::{State, States, Strobe};
+use pendmap::integrate::{State, Strobe};
 use pendmap::maps::advance::advance;
 use pendmap::maps::basins::basins;
 use pendmap::maps::control::Control;
@@ -15,7 +15,8 @@ use pendmap::model::effects::Mappable;
 use pendmap::model::{Effect, Kind, Pendulum};
 
 use crate::effects::{Draws, has};
-use crate::support::{advanced, bits, driven, instruction_sets, plane, simd, spread, unchecked};
+use crate::lanes::result;
+use crate::support::{advanced, driven, instruction_sets, plane, simd, spread, unchecked};
 
 /// All effects that a map may have, each without and with Coulomb friction.
 fn mappable() -> Vec<(Kind, Pendulum)> {
@@ -46,17 +47,9 @@ fn one_at_a_time_gives_the_same_bits() {
     for (_, pendulum) in mappable() {
         for simd in instruction_sets() {
             let strobe = Strobe::new(&pendulum, 30, simd);
-            let states = spread(100, PI, 3.0);
-            let run = |singly: bool| {
-                let mut all = States::from(states.as_slice());
-                if singly {
-                    strobe.advance_singly(&mut all, 2);
-                } else {
-                    strobe.advance(&mut all, 2);
-                }
-                [all.theta(), all.velocity(), all.turns()].map(bits)
-            };
-            assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
+            let [all, each] =
+                [false, true].map(|singly| result(&strobe, &spread(100, PI, 3.0), 1, singly));
+            assert_eq!(all, each, "{simd}, {pendulum:?}");
         }
     }
 }

@@ -9,10 +9,10 @@ use pendmap::integrate::trajectory::{Request, simulate};
 use pendmap::integrate::{State, States, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
-use pendmap::model::{Effect, Kind, Pendulum};
+use pendmap::model::Pendulum;
 
 use crate::support::{
-    advanced, basins_on_plane, bits, driven, instruction_sets, plane, simd, spread, unchecked,
+    advanced, basins_on_plane, driven, instruction_sets, plane, simd, spread, unchecked,
 };
 use crate::truths::{list, number, truths};
 
@@ -63,62 +63,6 @@ fn lanes_agree_with_the_reference_integrator() {
         assert!(median < 1e-9, "{pendulum:?}: median {median:e}");
         assert!(high < 1e-6, "{pendulum:?}: 99th percentile {high:e}");
         assert!(stuck > 0, "{pendulum:?}: nothing stuck");
-    }
-}
-
-#[test]
-fn one_at_a_time_gives_the_same_bits() {
-    let drag = Effect::new(Kind::QuadraticDrag, &[0.05]).expect("in range");
-    let ripple = Effect::new(Kind::BearingHarmonic, &[0.1, 3.0, 0.4]).expect("in range");
-    let base = rubbing(0.05, 1.3, 1.4, 0.1);
-    let models = [
-        base.clone(),
-        base.clone().with_effect(drag).expect("once"),
-        base.with_effect(ripple).expect("once"),
-    ];
-    for simd in instruction_sets() {
-        for pendulum in &models {
-            let strobe = Strobe::new(pendulum, 40, simd);
-            let states = spread(200, PI, 3.0);
-            let run = |singly: bool| {
-                let mut all = States::from(states.as_slice());
-                if singly {
-                    strobe.advance_singly(&mut all, 4);
-                } else {
-                    strobe.advance(&mut all, 4);
-                }
-                [all.theta(), all.velocity(), all.turns()].map(bits)
-            };
-            assert_eq!(run(false), run(true), "{simd}, {pendulum:?}");
-        }
-    }
-}
-
-#[test]
-fn every_route_agrees_with_the_reference_integrator() {
-    let effect = |kind: Kind, values: &[f64]| Effect::new(kind, values).expect("in range");
-    let drag = effect(Kind::QuadraticDrag, &[0.08]);
-    let ripple = effect(Kind::BearingHarmonic, &[0.15, 4.0, 0.4]);
-    let smooth = driven(0.1, 0.6, 2.0);
-    let rough = rubbing(0.1, 0.6, 2.0, 0.04);
-    let with = |base: &Pendulum, effects: &[Effect]| {
-        effects.iter().fold(base.clone(), |p, e| p.with_effect(e.clone()).expect("once"))
-    };
-    for pendulum in [
-        with(&smooth, std::slice::from_ref(&ripple)),
-        with(&smooth, std::slice::from_ref(&drag)),
-        with(&smooth, &[drag.clone(), ripple.clone()]),
-        with(&rough, std::slice::from_ref(&ripple)),
-        with(&rough, std::slice::from_ref(&drag)),
-        with(&rough, &[drag, ripple]),
-    ] {
-        let (starts, ends) = references(&pendulum, 200);
-        let strobe = Strobe::new(&pendulum, 100, simd());
-        for ((found, truth), start) in advanced(&strobe, &starts, 5).iter().zip(&ends).zip(&starts)
-        {
-            let error = distance(*found, *truth);
-            assert!(error < 1e-9, "{pendulum:?} from {start:?}: {error:e}");
-        }
     }
 }
 

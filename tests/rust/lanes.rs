@@ -10,7 +10,7 @@ use pendmap::model::Pendulum;
 use crate::support::{advanced, bits, driven, fine_strobe, instruction_sets, simd, spread};
 
 /// Angles, velocities and turns, as bits.
-fn result(strobe: &Strobe, states: &[State], periods: usize, singly: bool) -> [Vec<u64>; 3] {
+pub fn result(strobe: &Strobe, states: &[State], periods: usize, singly: bool) -> [Vec<u64>; 3] {
     let mut all = States::from(states);
     // Twice: turns are added.
     for _ in 0..2 {

@@ -136,18 +136,6 @@ fn every_instruction_set_gives_the_same_fractions() {
 }
 
 #[test]
-fn avx512_and_avx2_give_the_same_map() {
-    let both = [InstructionSet::Avx512, InstructionSet::Avx2];
-    if !both.iter().all(|simd| simd.available()) {
-        eprintln!("skipped: this processor lacks one of them");
-        return;
-    }
-    let [a, b] = both.map(|simd| labelled(&driven(0.1, 1.34, 2.0), &plane(50), simd));
-    assert_same(&a.2, &b.2, "two widths");
-    assert_eq!(a.0.steps(), b.0.steps());
-}
-
-#[test]
 fn a_start_that_fails_is_a_status_and_the_others_do_not_see_it() {
     let mut states: Vec<State> = spread(60, 3.0, 2.5);
     let pendulum = driven(0.1, 0.6, 2.0);

@@ -81,7 +81,7 @@ fn where_no_orbit_attracts_near_the_first_point_the_others_are_tried() {
 
 #[test]
 fn a_finer_grid_finds_no_more() {
-    for (p, omega) in [(0.6, 2.0), (1.0, 2.0), (1.7, 0.87), (1.3, 1.8)] {
+    for (p, omega) in [(1.0, 2.0), (1.7, 0.87)] {
         let pendulum = driven(0.1, p, omega);
         for (n, w) in [(1, 0), (2, 0), (1, 1), (2, 1), (2, 2)] {
             let [coarse, fine] = [120, 240].map(|cells| {
@@ -274,39 +274,26 @@ fn doublings_leave_an_orbit_of_twice_the_period() {
     for (name, n, w) in [("osc_PD1", 2, 0), ("osc_PD2", 4, 0), ("rot_PD1", 1, 1)] {
         let entry = &at_two[name];
         let p = number(&entry["p"]);
-        let [before, after] = about(p, 2.0, n, w);
-        let own = |orbits: &[PeriodicOrbit]| near(orbits, point(entry))[0].multipliers.0[0].re;
-        let (stable, lost) = (own(&before), own(&after));
-        assert!(-1.0 < stable && stable < -0.99 && lost < -1.0, "{name}: {stable}, {lost}");
         // There are many orbits of long periods elsewhere: only those here are requested.
         let [theta, velocity] = point(entry);
-        let mut here = request(2 * n, 2 * w, 40);
-        here.theta = Axis::new("theta", theta - 0.03, theta + 0.03, 40).expect("an axis");
-        here.velocity = Axis::new("velocity", velocity - 0.03, velocity + 0.03, 40).expect("it");
-        let [before, after] = [p - BESIDE, p + BESIDE].map(|p| {
-            let pendulum = driven(0.1, p, 2.0);
-            orbits(&pendulum, &here, &Control::default()).expect("a search").closed
-        });
+        let here = |times: usize| {
+            let mut here = request(times * n, times as i64 * w, 40);
+            here.theta = Axis::new("theta", theta - 0.03, theta + 0.03, 40).expect("an axis");
+            here.velocity =
+                Axis::new("velocity", velocity - 0.03, velocity + 0.03, 40).expect("it");
+            [p - BESIDE, p + BESIDE].map(|p| {
+                let pendulum = driven(0.1, p, 2.0);
+                orbits(&pendulum, &here, &Control::default()).expect("a search").closed
+            })
+        };
+        let own = |orbits: &[PeriodicOrbit]| near(orbits, point(entry))[0].multipliers.0[0].re;
+        let [stable, lost] = here(1).map(|orbits| own(&orbits));
+        assert!(-1.0 < stable && stable < -0.99 && lost < -1.0, "{name}: {stable}, {lost}");
+        let [before, after] = here(2);
         assert!(near(&before, point(entry)).is_empty(), "{name}");
         let doubled = near(&after, point(entry));
         assert!(doubled.len() == 1 && doubled[0].is_stable(), "{name}: {}", doubled.len());
     }
-}
-
-#[test]
-fn without_drive_the_orbits_are_the_rests() {
-    for (gamma, torque) in [(0.0_f64, 0.0_f64), (0.1, 0.0), (0.0, 0.3), (0.1, 0.3)] {
-        let found = all(&undriven(gamma, torque), 1, 0).closed;
-        let mut angles: Vec<f64> = found.iter().map(|o| o.points[0][0].abs()).collect();
-        angles.sort_by(f64::total_cmp);
-        let expected = [torque.asin(), PI - torque.asin()];
-        assert_eq!(angles.len(), 2, "{gamma} {torque}: {angles:?}");
-        for (angle, expected) in angles.iter().zip(expected) {
-            assert!((angle - expected).abs() < 1e-9);
-        }
-        assert!(found.iter().all(|o| o.points[0][1].abs() < 1e-12));
-    }
-    assert!(all(&undriven(0.1, 1.3), 1, 0).closed.is_empty());
 }
 
 #[test]

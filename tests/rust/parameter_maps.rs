@@ -55,10 +55,6 @@ fn closed(cell: &Cell) -> Vec<(usize, i64)> {
     found
 }
 
-fn chaos(cell: &Cell) -> Vec<Kind> {
-    cell.found.iter().map(|f| f.attractor.kind).filter(|kind| kind.is_chaotic()).collect()
-}
-
 #[test]
 fn each_cell_has_the_reference_attractors() {
     for p in [0.5, 0.6, 1.0] {
@@ -178,18 +174,6 @@ fn coexisting_branches_are_followed_to_their_ends() {
 }
 
 #[test]
-fn the_points_of_figure_2_are_tumbling_chaos_and_nothing_else() {
-    for (p, omega) in [(1.03, 0.87), (1.7, 0.87), (1.5, 1.8)] {
-        let map = mapped(&driven(0.1, p, omega), vec![p], vec![omega], 9, 1);
-        let cell = &map.cells[0];
-        assert_eq!(chaos(cell), [Kind::TumblingChaos], "p = {p}");
-        assert_eq!(cell.found.len(), 1);
-        assert!(cell.found[0].share > 0.99);
-        assert!(cell.found[0].attractor.exponent > 0.05);
-    }
-}
-
-#[test]
 fn transients_however_long_are_no_chaos() {
     // On the saddle the exponent is at least 0.15; chaos at the end of a cascade has less.
     let transient = |cell: &Cell| {
@@ -201,15 +185,6 @@ fn transients_however_long_are_no_chaos() {
         assert!(!transient(cell), "p = {p}");
         assert!(!closed(cell).is_empty(), "p = {p}");
     }
-}
-
-#[test]
-fn friction_keeps_its_own_attractors() {
-    let base = driven(0.1, 1.0, 2.0).with_friction(0.02).expect("in range");
-    let map = mapped(&base, vec![0.7, 1.0], vec![2.0], 9, 1);
-    let (low, high) = (closed(&map.cells[0]), closed(&map.cells[1]));
-    assert!(low.contains(&(2, 0)) && low.contains(&(1, 0)), "{low:?}");
-    assert!(high.contains(&(1, 1)) && high.contains(&(1, -1)), "{high:?}");
 }
 
 #[test]

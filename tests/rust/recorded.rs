@@ -7,7 +7,6 @@ use pendmap::integrate::reference::driver::Driver;
 use pendmap::integrate::reference::event::EventKind;
 use pendmap::integrate::reference::problem::OdeProblem;
 use pendmap::integrate::reference::sample::sample;
-use pendmap::integrate::reference::sensitivity::sensitivities;
 use pendmap::model::Pendulum;
 use pendmap::model::recorded::{Quantity, Recorded, Samples};
 
@@ -120,37 +119,6 @@ fn a_recorded_push_frees_a_stuck_pendulum_when_it_is_strong_enough() {
     let mut short = Driver::new(&ode, 0.0, [0.0, 0.0], 20.0);
     short.finish(|_| ());
     assert!(short.is_stuck() && !short.is_stuck_for_ever());
-}
-
-#[test]
-fn derivatives_hold_under_a_recorded_motion() {
-    let times = times(0.0, 30.0, 600);
-    let up = values(&times, |t| 0.9 * (1.3 * t).cos() + 0.4 * (2.9 * t).sin());
-    let side = values(&times, |t| 0.5 * (0.8 * t).sin());
-    let samples = |values| Some(Samples { quantity: Quantity::Acceleration, values });
-    let recorded = Recorded::new(&times, samples(&up), samples(&side)).expect("samples");
-    let recorded = Arc::new(recorded);
-    let end = |theta: f64, theta_r: f64| {
-        let pendulum = undriven(0.1, 0.0).with_friction(theta_r).expect("in range");
-        sensitivities(&pendulum, Some(&recorded), [theta, 0.4], 0.0, &[25.0], 1e-14)
-    };
-    let run = end(1.0, 0.4);
-    assert!(run.events.iter().any(|event| event.kind == EventKind::Release));
-    let h = 1e-6;
-    for (name, [plus, minus]) in [
-        ("theta0", [end(1.0 + h, 0.4), end(1.0 - h, 0.4)]),
-        ("theta_r", [end(1.0, 0.4 + h), end(1.0, 0.4 - h)]),
-    ] {
-        let column = run.names.iter().position(|other| other == name).expect("a name");
-        for of in 0..2 {
-            let expected = (plus.states[0][of] - minus.states[0][of]) / (2.0 * h);
-            let slope = run.slopes[0][column][of];
-            assert!(
-                (slope - expected).abs() < 1e-6 * expected.abs().max(1.0),
-                "{name}: {slope} {expected}"
-            );
-        }
-    }
 }
 
 fn positions(values: &[f64]) -> Samples<'_> {

@@ -2,17 +2,15 @@
 //! threads.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pendmap::error::Error;
 use pendmap::fit::replay::replay;
 use pendmap::maps::control::pool;
-use pendmap::model::recorded::{Quantity, Samples};
-use pendmap::model::{Kind, Recorded};
+use pendmap::model::Kind;
 
-use crate::fit_records::{every, record, with};
-use crate::support::{driven, spread, undriven};
+use crate::fit_records::{record, with};
+use crate::support::{driven, spread};
 
 #[test]
 fn members_read_what_one_trajectory_would() {
@@ -41,24 +39,6 @@ fn members_read_what_one_trajectory_would() {
         }
     }
     assert_eq!(on(1), all);
-}
-
-#[test]
-fn a_recorded_pivot_drives_like_the_drive_that_it_is() {
-    let (p, omega) = (0.7, 2.1);
-    let times = every(0.02, 40.0);
-    let up: Vec<f64> = times.iter().map(|tau| p * (omega * tau).cos()).collect();
-    let vertical = Samples { quantity: Quantity::Acceleration, values: &up };
-    let pivot = Recorded::new(&times, Some(vertical), None).expect("a motion");
-    let starts = spread(5, 1.0, 1.0);
-    let shaken = record(undriven(0.1, 0.0), Some(Arc::new(pivot)), starts[0], 30.0);
-    let forced = record(driven(0.1, p, omega), None, starts[0], 30.0);
-    let [a, b] = [shaken, forced].map(|one| {
-        replay(&one, &starts, &one.times, 1e-12, &AtomicBool::new(false), &|| ()).expect("all")
-    });
-    for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
-        assert!((a - b).abs() < 1e-6, "{a} {b}");
-    }
 }
 
 #[test]

@@ -87,11 +87,6 @@ class FittedModel:
         return self.fit.chi2
 
     @property
-    def distance(self) -> float:
-        """Predicted distance of an unconverged fit from its minimum, in standard errors."""
-        return 0.0 if self.fit.converged else math.sqrt(self.fit.promised / self.level)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the added effects."""
         return tuple(candidate.name for candidate in self.chosen)

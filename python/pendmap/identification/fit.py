@@ -56,7 +56,6 @@ class TrajectoryFit:
     steps: int  # number of iterations
     converged: bool  # whether the search converged
     given_up: bool  # whether the search ended because the target was out of reach
-    promised: float  # predicted fall of chi2 in the step after the last
     widening: float  # squared factor on the intervals, above 1 if the model does not fit
     mixed: tuple[str, ...]  # sizes with a free exponent, whose intervals are in equal ratios
 
@@ -205,7 +204,6 @@ def _result(
         steps=found.steps,
         converged=found.converged,
         given_up=found.given_up,
-        promised=found.promised,
         widening=found.widening,
         mixed=tuple(unknown.names[k] for k in unknown.mixed),
     )

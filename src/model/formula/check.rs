@@ -84,6 +84,11 @@ pub(super) fn term(tree: &Tree, parameters: &[Parameter]) -> Result<(), String> 
                     tanh(x/width) for sign(x)"
             .to_owned());
     }
+    if tree.kinks().into_iter().any(|inner| probe::vanishes_at_rest(inner, parameters)) {
+        return Err("has a kink where v passes zero that is not one of abs(v): what is under abs(...), \
+                    min(...) and max(...) must have v as a factor, as v*(1 + v^2), or not vanish with v"
+            .to_owned());
+    }
     if let Some((at, values)) = probe::gap(tree, parameters) {
         let given: Vec<String> = parameters
             .iter()

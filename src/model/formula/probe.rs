@@ -100,6 +100,17 @@ pub fn jumps(term: &Tree, parameters: &[Parameter]) -> bool {
     })
 }
 
+/// Whether the term is zero wherever the velocity is.
+pub fn vanishes_at_rest(term: &Tree, parameters: &[Parameter]) -> bool {
+    usual(parameters).all(|values| {
+        let size = places().map(|at| term.value(&values, &at).abs()).fold(0.0, f64::max);
+        places().all(|at| {
+            let still = Place { velocity: 0.0, ..at };
+            term.value(&values, &still).abs() <= CLOSE * size
+        })
+    })
+}
+
 /// Whether the term is proportional to its first parameter.
 pub fn is_proportional(term: &Tree, parameters: &[Parameter]) -> bool {
     usual(parameters).all(|values| {

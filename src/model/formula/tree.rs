@@ -93,14 +93,18 @@ impl Tree {
     /// Two trees, joined; numbers and what changes nothing are left out, so that `max(v, 0)` has the kink of
     /// `abs(v)`.
     pub fn join(operator: Operator, left: Self, right: Self) -> Self {
-        use Operator::{Add, Multiply, Subtract};
+        use Operator::{Add, Divide, Multiply, Power, Subtract};
         match (operator, left, right) {
             (_, Self::Number(a), Self::Number(b)) => Self::Number(operator.of(a, b)),
             (Add, Self::Number(0.0), other)
             | (Add | Subtract, other, Self::Number(0.0))
             | (Multiply, Self::Number(1.0), other)
-            | (Multiply, other, Self::Number(1.0)) => other,
+            | (Multiply | Divide | Power, other, Self::Number(1.0)) => other,
+            (Multiply, Self::Number(0.0), _) | (Multiply, _, Self::Number(0.0)) => {
+                Self::Number(0.0)
+            }
             (Subtract, Self::Number(0.0), other) => other.negated(),
+            (Power, base, Self::Number(0.5)) => Self::apply(Function::Root, base),
             (_, left, right) => Self::Join(operator, Box::new(left), Box::new(right)),
         }
     }
@@ -113,10 +117,20 @@ impl Tree {
         }
     }
 
-    /// A function of a tree. Absolute values and signs of products are products of them, so that
-    /// the argument under them is a further kink.
+    /// A function of a tree. Absolute values and signs of products are products of them, and the velocity is
+    /// taken out of the sums that contain it, so that a kink at rest is one of `abs(v)` and any other argument is
+    /// a further kink.
     pub fn apply(function: Function, inner: Self) -> Self {
+        if function == Function::Root
+            && let Some(rest) = inner.over_velocity().and_then(|once| once.over_velocity())
+        {
+            let speed = Self::apply(Function::Abs, Self::Variable(Variable::Velocity));
+            return Self::join(Operator::Multiply, speed, Self::apply(function, rest));
+        }
         if !matches!(function, Function::Abs | Function::Sign) {
+            if let (Function::Root, Self::Number(value)) = (function, &inner) {
+                return Self::Number(value.sqrt());
+            }
             return Self::Apply(function, Box::new(inner));
         }
         match inner {
@@ -128,7 +142,58 @@ impl Tree {
             Self::Join(operator @ (Operator::Multiply | Operator::Divide), left, right) => {
                 Self::join(operator, Self::apply(function, *left), Self::apply(function, *right))
             }
-            other => Self::Apply(function, Box::new(other)),
+            Self::Apply(Function::Abs, _) if function == Function::Abs => inner,
+            Self::Join(Operator::Power, _, ref exponent)
+                if function == Function::Abs && whole(exponent).is_some_and(|n| n % 2 == 0) =>
+            {
+                inner
+            }
+            Self::Apply(Function::Tanh, inner) if function == Function::Abs => {
+                Self::apply(Function::Tanh, Self::apply(function, *inner))
+            }
+            Self::Apply(Function::Tanh, inner) => Self::apply(function, *inner),
+            Self::Variable(_) => Self::Apply(function, Box::new(inner)),
+            other => match other.over_velocity() {
+                Some(factor) => Self::join(
+                    Operator::Multiply,
+                    Self::apply(function, factor),
+                    Self::Apply(function, Box::new(Self::Variable(Variable::Velocity))),
+                ),
+                None => Self::Apply(function, Box::new(other)),
+            },
+        }
+    }
+
+    /// What it is the velocity times.
+    fn over_velocity(&self) -> Option<Self> {
+        use Operator::{Add, Divide, Multiply, Power, Subtract};
+        match self {
+            Self::Number(0.0) => Some(self.clone()),
+            Self::Variable(Variable::Velocity) => Some(Self::Number(1.0)),
+            Self::Join(operator @ (Add | Subtract), left, right) => {
+                Some(Self::join(*operator, left.over_velocity()?, right.over_velocity()?))
+            }
+            Self::Join(Multiply, left, right) => match left.over_velocity() {
+                Some(left) => Some(Self::join(Multiply, left, (**right).clone())),
+                None => Some(Self::join(Multiply, (**left).clone(), right.over_velocity()?)),
+            },
+            Self::Join(Divide, left, right) => {
+                Some(Self::join(Divide, left.over_velocity()?, (**right).clone()))
+            }
+            Self::Join(Power, base, exponent) => {
+                let power = whole(exponent).filter(|power| *power >= 1)?;
+                let rest = (**base).clone().raised(power - 1);
+                Some(Self::join(Multiply, base.over_velocity()?, rest))
+            }
+            _ => None,
+        }
+    }
+
+    fn raised(self, power: i32) -> Self {
+        match power {
+            0 => Self::Number(1.0),
+            1 => self,
+            _ => Self::join(Operator::Power, self, Self::Number(f64::from(power))),
         }
     }
 

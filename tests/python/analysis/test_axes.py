@@ -14,7 +14,6 @@ import pendmap
 from pendmap import Axis, Effect, Formula, Grid, InputError, Pendulum, Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     import xarray as xr
@@ -76,38 +75,6 @@ def test_falling_values_give_the_result_of_rising_ones(tmp_path: Path) -> None:
         assert listed.p.values.tolist() == values
         again = found({"p": values, **more}, store=tmp_path / f"{name}.zarr", resume=True)
         assert again.drop_attrs().equals(listed.drop_attrs())
-
-
-RESULTS: dict[str, Callable[[Any], xr.Dataset]] = {
-    "simulate": lambda model: pendmap.simulate(model, [1.0, 0.5], 0.0, 5.0),
-    "basins": lambda model: pendmap.basins(model, 6, check=False),
-    "basins_of": lambda model: pendmap.basins_of(model, [1.0], [0.0], check=False),
-    "sweep": lambda model: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=6, check=False),
-    "parameter_map": lambda model: pendmap.parameter_map(
-        model, {"p": [0.5, 0.6], "gamma": [0.1]}, starts=2
-    ),
-    "bifurcation": lambda model: pendmap.bifurcation(model, {"p": [0.5, 0.6]}, starts=2),
-    "orbit": lambda model: pendmap.orbit(model, grid=Grid.square(12, model.units.w0)),
-    "lyapunov": lambda model: pendmap.lyapunov(model, max_periods=200),
-    "lifetime": lambda model: pendmap.lifetime(model, starts=100, max_periods=200),
-    "tongues": lambda model: pendmap.tongues(model, [1.9, 2.0]),
-    "melnikov": lambda model: pendmap.melnikov(model, [2.0]),
-}
-
-
-@pytest.mark.parametrize("name", RESULTS)
-@pytest.mark.parametrize("model", [BARE, SI], ids=["bare", "si"])
-def test_every_result_has_the_model_that_made_it(
-    name: str, model: Pendulum | Rig, tmp_path: Path
-) -> None:
-    result = RESULTS[name](model)
-    assert pendmap.pendulum_of(result) == model
-    assert pendmap.pendulum_of(pendmap.load(pendmap.save(result, tmp_path / "a.nc"))) == model
-
-
-def test_results_are_of_every_function() -> None:
-    functions = {name for _, names, _ in pendmap.ANALYSES.values() for name in names}
-    assert functions == {*RESULTS}
 
 
 def test_a_selected_value_is_in_the_model() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,22 +9,14 @@ import pytest
 
 import pendmap
 from drawn import made, named
-from pendmap import Pendulum, Rig, render
+from pendmap import Pendulum
 from pendmap.charts import bifurcation as drawn
 from pendmap.charts import palette
-from recordings import recorded
 
 if TYPE_CHECKING:
-    from pathlib import Path
     from typing import Any
 
     import xarray as xr
-
-    from conftest import Run
-
-RANGES = (
-    "ranges must be a mapping like {'p': (0.5, 2.0, 100)}, or on the command line --p 0.5:2:100"
-)
 
 
 @pytest.fixture(scope="module")
@@ -96,15 +87,6 @@ def test_sweeps_settle_at_supercritical_bifurcations(truths: dict[str, Any], off
         assert "hysteresis" not in found.attrs["summary"]
 
 
-def test_results_in_si_agree() -> None:
-    bare = pendmap.bifurcation(Pendulum(), {"omega": (1.9, 2.1, 5)})
-    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
-    si = pendmap.bifurcation(rig, {"Omega": (9.5, 10.5, 5)})
-    assert si.sizes["entry"] == bare.sizes["entry"]
-    assert np.allclose(si["point_velocity"].values, 5 * bare["point_velocity"].values, atol=1e-6)
-    assert np.allclose(si["entry_exponent"].values, 5 * bare["entry_exponent"].values, atol=1e-6)
-
-
 def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
     figure = made(diagram)
     texts = named(figure)
@@ -116,46 +98,6 @@ def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
         pendmap.InputError, match=r"layer must be one of .* in a diagram, got 'labels'"
     ):
         made(diagram, "labels")
-
-
-@pytest.mark.usefixtures("strict_recordings")
-def test_the_recording(diagram: xr.Dataset, tmp_path: Path) -> None:
-    back = recorded(diagram, tmp_path)
-    assert {"/bifurcation/data/0/points", "/exponent/data/0/points", "/legend"} <= back.static
-
-
-def test_a_diagram_is_read_back_from_its_file(diagram: xr.Dataset, tmp_path: Path) -> None:
-    back = pendmap.load(pendmap.save(diagram, tmp_path / "b.nc"))
-    assert back.equals(diagram)
-    assert render.draw(back, tmp_path / "b.svg").stat().st_size > 0
-
-
-def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
-    run = pendmap_command("bifurcation", "--vary", "p", "0.9:1.4:20")
-    assert run.returncode == 0, run.stderr
-    assert "hysteresis" in run.stdout
-    names = {f"bifurcation.{suffix}" for suffix in ("nc", "png", "rrd")}
-    assert {p.name for p in tmp_path.iterdir()} == names
-    told = json.loads(pendmap_command("bifurcation", "--p", "0.9:1.4:20", "--json").stdout)
-    assert told["points"] > 20
-    assert {"kind", "w", "first", "last"} == told["branches"][0].keys()
-    for words, wanted in (
-        (
-            ("bifurcation",),
-            f"{RANGES}; got nothing",
-        ),
-        (
-            ("bifurcation", "--p", "0:1:3", "--omega", "1:2:3"),
-            f"{RANGES}; got p, omega",
-        ),
-        (
-            ("bifurcation", "--p", "0:1:3", "--theta", "1"),
-            "both or neither of --theta and --velocity must be given, got one",
-        ),
-    ):
-        refused = pendmap_command(*words)
-        assert refused.returncode == 2, words
-        assert wanted in refused.stderr
 
 
 def test_chaos_in_few_cells_is_named(diagram: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import pendmap
-from pendmap import Axis, Grid, InputError, Pendulum, Rig, cli, render, viewer
+from pendmap import Grid, InputError, Pendulum, Rig, cli, render, viewer
 from pendmap.identification import identify
 from pendmap.identification.experiment import identified_model, provenance
 
@@ -227,19 +227,6 @@ def test_identify_writes_the_residual_of_its_model_and_the_noise(tmp_path: Path)
     said = identified_model(report).notes["provenance"]
     assert said["rms"] == pytest.approx(1e-3, rel=0.05)
     assert said["noise"] == pytest.approx(1e-3, rel=0.1)
-
-
-def test_a_number_of_cells_is_the_default_window_in_the_model_s_own_units() -> None:
-    rig = Rig(w0=6.2, c_over_m=1.0, p=0.6, Omega=12.4)
-    result = pendmap.basins(rig, 10, check=False)
-    bounds = result.velocity_bounds.values[[0, -1], [0, 1]]
-    assert bounds == pytest.approx([-18.6, 18.6])
-    said = "theta = -3.14159 to 3.14159 rad, velocity = -18.6 to 18.6 rad/s (the default window"
-    assert result.attrs["summary"].startswith(said)
-    narrow = pendmap.basins(rig, Grid(Axis(-3, 3, 5), Axis(-3, 3, 5)), check=False)
-    assert "default" not in narrow.attrs["summary"].splitlines()[0]
-    with pytest.raises(InputError, match=r"grid must be a Grid, like .*, got 'a'"):
-        pendmap.basins(rig, "a")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -131,13 +131,38 @@ def test_an_equilibrium_under_a_torque_has_the_growth_of_both_half_swings() -> N
     assert of_rest(found) == pytest.approx(exact, abs=1e-6)
 
 
-@pytest.mark.parametrize("term", ["-b*max(v, 0)", "-b*max(0, v)", "b*min(-v, 0)"])
-def test_a_kink_may_be_written_as_the_greater_of_two(term: str) -> None:
-    # (v + abs(v))/2: half of it is viscous damping.
-    greater = Formula("greater", term, {"b": 1})(b=0.2)
-    same = FORMULA(b=0.1)
-    found = pendmap.basins(Pendulum(0.05, 0.35, 2.1, effects=(greater,)), 8)
-    truth = pendmap.basins(Pendulum(0.15, 0.35, 2.1, effects=(same,)), 8)
+@pytest.mark.parametrize(
+    ("half", "term"),
+    [
+        # (v + abs(v))/2: half of it is viscous damping.
+        (True, "-b*max(v, 0)"),
+        (True, "-b*max(0, v)"),
+        (True, "b*min(-v, 0)"),
+        (True, "-b*0.5*(v + abs(2*v - v))"),
+        (True, "-b*(max(v, 3*v) - v)/2"),
+        (True, "-b*max(v*abs(1 + theta*0), 0)"),
+        (False, "-b*sqrt(v^2)"),
+        (False, "-b*((v - 3*v)*(v/4 + v/4)*-1)^0.5"),
+        (False, "-b*max(v, -v)"),
+        (False, "-b*max(abs(v), 0)"),
+        (False, "b*v*-1*sign(3*v - v)"),
+    ],
+)
+def test_a_kink_may_be_written_in_other_ways(half: bool, term: str) -> None:  # noqa: FBT001 (a row of the table)
+    written = Formula("written", term, {"b": 1})(b=0.2 if half else 0.1)
+    found = pendmap.basins(Pendulum(0.05 if half else 0.15, 0.35, 2.1, effects=(written,)), 8)
+    truth = pendmap.basins(Pendulum(0.15, 0.35, 2.1, effects=(FORMULA(b=0.1),)), 8)
     assert np.array_equal(found["label"], truth["label"])
     assert found.attrs["steps_per_period"] == truth.attrs["steps_per_period"]
     assert of_rest(found) == pytest.approx(of_rest(truth), abs=1e-9)
+
+
+def test_the_kink_of_a_rest_is_one_of_the_speed() -> None:
+    whole = Formula("whole", "-b*w0*abs(tanh(v/w0 + (v/w0)^3))", {"b": 1})
+    model = Pendulum(0.15, 0.35, 2.1, effects=(whole(b=0.1),))
+    plain = Pendulum(0.15, 0.35, 2.1, effects=(FORMULA(b=0.1),))
+    one, other = (pendmap.basins(m, 8) for m in (model, plain))
+    assert of_rest(one) == pytest.approx(of_rest(other), abs=1e-9)
+    for term in ("-b*w0*abs(sin(v/w0))", "-b*w0*max(exp(v/w0) - 1, 0)"):
+        with pytest.raises(pendmap.InputError, match="must have v as a factor"):
+            Formula("other", term, {"b": 1})

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from interrupted import started
-from pendmap import Axis, Grid, InputError, Pendulum, cli
+from pendmap import Grid, Pendulum, cli
 from pendmap.files import facts
 
 
@@ -75,64 +75,10 @@ def test_a_map_has_its_model_numerics_and_summary_in_its_attributes(smooth: Any)
     assert smooth["unreliable"].item() == 0
 
 
-def test_multipliers_multiply_to_the_damping(smooth: Any) -> None:  # noqa: ANN401
-    pairs = smooth.multipliers.values
-    product = (pairs[:, 0, 0] + 1j * pairs[:, 0, 1]) * (pairs[:, 1, 0] + 1j * pairs[:, 1, 1])
-    expected = np.exp(-0.1 * smooth.n.values * math.pi)
-    assert np.abs(product - expected).max() < 1e-12
-
-
-def test_settled_trajectories_are_near_their_attractor(smooth: Any) -> None:  # noqa: ANN401
-    """The settling time of a cell plus 60 periods leads to a point of its attractor."""
-    picks = np.linspace(0, 3599, 200).astype(int)
-    theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
-    starts = theta.ravel()[picks], velocity.ravel()[picks]
-    settle = smooth.settle_periods.values.ravel()[picks]
-    labels = smooth.label.values.ravel()[picks]
-    periods = int(settle.max()) + 60
-    angle, speed, _ = pendmap.advance(Pendulum(p=0.6), *starts, periods, tol=1e-9)
-    for a, v, label in zip(angle, speed, labels, strict=True):
-        own = smooth.point_attractor.values == label
-        da = np.remainder(smooth.point_theta.values[own] - a + math.pi, math.tau) - math.pi
-        assert np.hypot(da, smooth.point_velocity.values[own] - v).min() < 1e-3
-
-
-def test_net_turns_are_those_of_the_trajectory(smooth: Any) -> None:  # noqa: ANN401
-    for j, i in ((0, 0), (20, 33), (59, 58), (50, 12)):
-        start = float(smooth.theta[i]), float(smooth.velocity[j])
-        periods = int(smooth.settle_periods[j, i])
-        run = pendmap.simulate(Pendulum(p=0.6), *start, periods * math.pi)
-        turns = (float(run.theta[-1]) - start[0]) / math.tau
-        assert int(smooth.net_turns[j, i]) == round(turns)
-
-
-def test_results_do_not_depend_on_threads() -> None:
-    runs = [pendmap.basins(Pendulum(p=1.2), Grid.square(50), threads=n) for n in (1, 2)]
-    for name in ("label", "settle_periods", "net_turns"):
-        assert np.array_equal(runs[0][name], runs[1][name])
-
-
 def test_a_list_of_starts_gives_the_labels_of_the_grid(smooth: Any) -> None:  # noqa: ANN401
     theta, velocity = np.meshgrid(smooth.theta.values, smooth.velocity.values)
     listed = pendmap.basins_of(Pendulum(p=0.6), theta.ravel(), velocity.ravel())
     assert np.array_equal(listed.label.values, smooth.label.values.ravel())
-
-
-def test_one_chaotic_attractor_takes_everything() -> None:
-    result = pendmap.basins(pendmap.PRESETS["fig2b"], Grid.square(30))
-    assert result.attrs["layers"] == "finite_time"
-    assert result.kind.values.tolist() == ["tumbling_chaos"]
-    assert result.fraction.values == pytest.approx([1.0])
-    assert np.isfinite(result.finite_time_exponent).all()
-    assert "One chaotic attractor captures all starts" in result.attrs["summary"]
-
-
-def test_without_damping_there_are_no_attractors() -> None:
-    result = pendmap.basins(Pendulum(gamma=0, p=0.5), Grid.square(20))
-    assert result.sizes["attractor"] == 0
-    assert result.attrs["layers"] == "finite_time"
-    assert result["undecided"].item() == 1
-    assert "there are no attractors" in result.attrs["summary"]
 
 
 def test_unreliable_labels_are_reported() -> None:
@@ -141,59 +87,6 @@ def test_unreliable_labels_are_reported() -> None:
     assert result["labels_reliable"].item() == 0
     for words in ("NOT RELIABLE", "equal shares by symmetry", "hardly better than chance"):
         assert words in result.attrs["summary"]
-
-
-def test_without_drive_the_running_state_has_its_own_period() -> None:
-    result = pendmap.basins(Pendulum(p=0, torque=0.5), Grid.square(40))
-    assert [str(name) for name in result.attractor.values] == ["rest", "rotation 1:+1"]
-    assert float(result.theta_point[0]) == pytest.approx(math.asin(0.5), abs=1e-12)
-    period = float(result.period[1])
-    # There is one multiplier, that of the section in angle; it follows from damping alone.
-    assert float(result.multipliers[1, 0, 0]) == pytest.approx(math.exp(-0.1 * period), rel=1e-9)
-    assert np.isnan(result.multipliers.values[1, 1, 0])
-    run = pendmap.simulate(Pendulum(p=0, torque=0.5), 0, float(result.velocity_point[1]), period)
-    assert float(run.theta[-1]) == pytest.approx(math.tau, abs=1e-8)
-    assert float(run.velocity[-1]) == pytest.approx(float(result.velocity_point[1]), abs=1e-8)
-
-
-def test_shares_of_the_pendulum_with_torque() -> None:
-    """A published comparison with random starts gives fixed point 0.152, running state 0.848."""
-    rng = np.random.default_rng(5)
-    theta = rng.uniform(-math.pi + math.asin(0.5), math.pi + math.asin(0.5), 40_000)
-    result = pendmap.basins_of(Pendulum(p=0, torque=0.5), theta, rng.uniform(-10, 10, 40_000))
-    shares = dict(zip(result.kind.values.tolist(), result.fraction.values, strict=True))
-    assert shares["rest"] == pytest.approx(0.152, abs=0.005)
-    assert shares["rotation"] == pytest.approx(0.848, abs=0.005)
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        ({"tol": 1e-20}, "tol must be a number from 1e-13 to 1e-2, got 1e-20"),
-        ({"tol": math.nan}, "tol must be a finite number, got nan"),
-        ({"max_periods": 0}, "max_periods must be .*, got 0"),
-        ({"threads": 0}, "threads must be .*, got 0"),
-        ({"seed": -1}, "seed must be .*, got -1"),
-    ],
-)
-def test_bad_choices_are_refused(words: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
-        pendmap.basins(Pendulum(), Grid.square(5), **words)
-
-
-@pytest.mark.parametrize("axis", [(1, 1, 5), (2, 1, 5), (math.nan, 1, 5), (0, 1, 0), (0, 1, 10**6)])
-def test_bad_axes_are_refused(axis: tuple[float, float, int]) -> None:
-    with pytest.raises(InputError):
-        Axis(*axis)
-
-
-def test_bad_lists_are_refused() -> None:
-    with pytest.raises(InputError, match="as many"):
-        pendmap.basins_of(Pendulum(), [1.0, 2.0], [1.0])
-    with pytest.raises(InputError, match="finite"):
-        pendmap.basins_of(Pendulum(), [1.0, math.nan], [1.0, 1.0])
-    with pytest.raises(InputError, match=r"starts must be .*, got 0"):
-        pendmap.basins_of(Pendulum(), [], [])
 
 
 def test_other_threads_run_and_progress_is_reported() -> None:
@@ -252,18 +145,6 @@ def available_paths() -> list[str]:
     return _core.simd_available()
 
 
-@pytest.mark.parametrize("path", available_paths())
-def test_every_instruction_set_gives_the_same_smooth_map(
-    path: str,
-    smooth: Any,  # noqa: ANN401
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(os.environ, "PENDMAP_SIMD", path)
-    again = pendmap.basins(Pendulum(p=0.6), Grid.square(60))
-    assert again.attrs["simd"] == path
-    assert np.array_equal(again.label, smooth.label)
-
-
 def test_the_option_simd_applies_to_one_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -306,12 +187,6 @@ def test_the_option_simd_applies_to_one_command(
     assert "Invalid value for '--simd': must be one of " in said
     assert " on this processor, got 'mmx'" in said
     assert said.count("\n") == 1
-
-
-def test_an_unknown_instruction_set_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(os.environ, "PENDMAP_SIMD", "mmx")
-    with pytest.raises(InputError, match=r"PENDMAP_SIMD must be .*, got 'mmx'"):
-        pendmap.basins(Pendulum(), Grid.square(5))
 
 
 @pytest.mark.parametrize(

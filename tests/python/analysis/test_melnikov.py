@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +13,12 @@ from scipy.optimize import minimize_scalar
 
 import pendmap
 from drawn import made, named
-from pendmap import Effect, Pendulum, Rig
+from pendmap import Effect, Pendulum
 from pendmap.analysis.melnikov import loop
 from pendmap.files import facts
-from recordings import recorded
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
-
-    from conftest import Run
 
 
 def formula(gamma: float, omega: float, theta_r: float = 0.0, torque: float = 0.0) -> float:
@@ -295,36 +289,9 @@ def test_thresholds_that_rounding_hides_are_not_given() -> None:
     assert "below rounding errors" in said["summary"]
 
 
-def test_results_in_si_agree() -> None:
-    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
-    assert pendmap.melnikov(rig, [1.0])["own_p_melnikov"].item() == pytest.approx(formula(0.1, 2.0))
-
-
 def test_invalid_models_are_refused() -> None:
     with pytest.raises(pendmap.InputError, match="ascending"):
         pendmap.melnikov(Pendulum(), [2.0, 1.0])
-
-
-def test_figure_recording_and_file(tmp_path: Path) -> None:
-    for torque, name in ((0.01, "forward"), (0.4, "loop")):
-        model = Pendulum(gamma=0.1, theta_r=0.02, torque=torque)
-        found = pendmap.melnikov(model, np.linspace(0.3, 4, 30))
-        texts = named(made(found))
-        assert all(any(word in text for text in texts) for word in ("backward", name))
-        assert f"/melnikov/data/{name}" in recorded(found, tmp_path).static
-        assert pendmap.load(pendmap.save(found, tmp_path / "m.nc")).equals(found)
-
-
-def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
-    run = pendmap_command("melnikov", "--omega", 1, "--json")
-    said = json.loads(run.stdout)
-    assert abs(said["p_melnikov"] - 0.293010476667326976) < 1e-9
-    assert said["p_tangency"] is None
-    assert not list(tmp_path.iterdir())
-    run = pendmap_command("melnikov", "--omega", 1)
-    assert run.returncode == 0, run.stderr
-    names = {p.name for p in tmp_path.iterdir()}
-    assert names == {"melnikov.nc", "melnikov.png", "melnikov.rrd"}
 
 
 def test_without_damping_any_drive_tangles_and_there_are_no_basins() -> None:

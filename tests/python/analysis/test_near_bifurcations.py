@@ -115,3 +115,20 @@ def test_friction_holds_all_angles_where_the_load_is_less(
     assert found["undecided"].item() == 0
     truth = held(pendulum, theta.ravel(), velocity.ravel())
     assert np.array_equal(np.isin(found["label"].values.ravel(), rests), truth)
+
+
+@pytest.mark.parametrize(
+    ("gamma", "p", "omega", "theta_r"),
+    [(0.3, 40, 20, 1e-3), (0.1, 40, 20, 5e-4), (0.2, 14.3, 10, 5e-4), (0.3, 60, 30, 1e-4)],
+)
+def test_small_stick_slip_orbits_beside_a_rest_capture_their_starts(
+    gamma: float, p: float, omega: float, theta_r: float
+) -> None:
+    # They come within 1e-6 to 1e-4 of the set that friction holds upside down.
+    model = Pendulum(gamma, p, omega, theta_r=theta_r)
+    found = pendmap.basins(model, 16)
+    assert (found["label"].values >= 0).all()
+    names = [str(name) for name in found["attractor"].values if "oscillation" in str(name)]
+    assert len(names) == 2
+    shares = found["fraction"].sel(attractor=names).values
+    assert shares[0] == shares[1] > 0

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +14,10 @@ from scipy.optimize import brentq
 import pendmap
 from drawn import plain
 from models import DRAG, SWING
-from pendmap import Effect, Grid, Pendulum, Rig, render, viewer
+from pendmap import Effect, Grid, Pendulum, Rig
 from pendmap.charts import basins, names, registry
 from pendmap.files import facts
 from pendmap.render import drawing, style
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def term(rig: Rig, t: float, theta: float, velocity: float) -> float:
@@ -113,61 +109,6 @@ def test_the_free_decay_with_friction_in_si(truths: dict[str, Any]) -> None:
     assert run.event_time.attrs["units"] == "s"
 
 
-def test_simulate_is_the_same_in_both_units() -> None:
-    rig = SWING
-    there = pendmap.simulate(rig, 1.0, 3.1, 20.0, lyapunov=True)
-    bare = pendmap.simulate(rig.pendulum, 1.0, 0.5, 124.0, lyapunov=True)
-    assert there.theta.values == pytest.approx(bare.theta.values, abs=1e-9)
-    for name, factor in (
-        ("velocity", 6.2),
-        ("section_velocity", 6.2),
-        ("time", 1 / 6.2),
-        ("section_time", 1 / 6.2),
-        ("event_time", 1 / 6.2),
-    ):
-        assert there[name].values == pytest.approx(factor * bare[name].values, abs=1e-7), name
-    for name, factor in (("exponent", 6.2), ("exponent_stderr", 6.2), ("exponent_from", 1 / 6.2)):
-        assert there[name].item() == pytest.approx(factor * bare[name].item(), rel=1e-6), name
-    units = {name: there[name].attrs["units"] for name in ("time", "velocity", "theta")}
-    assert units == {"time": "s", "velocity": "rad/s", "theta": "rad"}
-    assert "per second" in there.attrs["summary"]
-    assert "per unit of tau" in bare.attrs["summary"]
-    assert " rad/s" in there.attrs["summary"].split("\n")[0]
-
-
-def test_maps_are_the_same_in_both_units() -> None:
-    rig = Rig(w0=5.0, c_over_m=0.5, p=0.6, Omega=10.0, effects=(DRAG,))
-    there = pendmap.basins(rig, Grid.square(24, rig.w0))
-    bare = pendmap.basins(rig.pendulum, Grid.square(24))
-    assert np.array_equal(there.label.values, bare.label.values)
-    for name in ("velocity", "velocity_point", "point_velocity", "exponent"):
-        assert there[name].values == pytest.approx(5 * bare[name].values, abs=1e-8), name
-    assert there.period.values == pytest.approx(bare.period.values / 5)
-    assert there.velocity.attrs["units"] == there.point_velocity.attrs["units"] == "rad/s"
-    assert there.velocity_bounds.values[[0, -1], [0, 1]].tolist() == [-15.0, 15.0]
-    assert there.exponent.attrs["units"] == "1/s"
-    assert there.period.attrs["units"] == "s"
-    starts = [0.1, 1.0, 2.5], [3.0, -10.0, 12.0]
-    lists = pendmap.basins_of(rig, *starts)
-    other = pendmap.basins_of(rig.pendulum, starts[0], [v / 5 for v in starts[1]])
-    assert np.array_equal(lists.label.values, other.label.values)
-    assert list(lists.start_velocity.values) == starts[1]
-
-
-def test_without_a_grid_a_rig_has_the_same_window() -> None:
-    assert Grid.square(10, 5.0).velocity.as_tuple == (-15.0, 15.0, 10)
-    assert Grid.square(10).velocity.as_tuple == (-3.0, 3.0, 10)
-
-
-def test_finite_time_exponents_are_per_second() -> None:
-    rig = Rig(w0=5.0)
-    there = pendmap.basins(rig, Grid.square(12, rig.w0), layer_periods=20)
-    bare = pendmap.basins(rig.pendulum, Grid.square(12), layer_periods=20)
-    values = there.finite_time_exponent.values
-    assert values == pytest.approx(5 * bare.finite_time_exponent.values, rel=1e-5)
-    assert there.finite_time_exponent.attrs["units"] == "1/s"
-
-
 def test_starts_are_advanced_in_rad_per_second() -> None:
     rig = Rig(w0=5.0, c_over_m=0.5, p=0.6, Omega=10.0, effects=(DRAG,))
     theta, velocity, turns = pendmap.advance(rig, [0.3, 1.0], [2.0, -20.0], 7, tol=1e-9)
@@ -185,27 +126,6 @@ def test_an_effect_changes_the_motion() -> None:
 
 
 # Files and pictures
-
-
-@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
-def test_results_in_si_are_stored_and_drawn(tmp_path: Path, suffix: str) -> None:
-    results = {
-        "run": pendmap.simulate(SWING, 1.0, 3.0, 5.0),
-        "map": pendmap.basins(SWING, Grid.square(8, 6.2)),
-    }
-    for name, result in results.items():
-        back = pendmap.load(pendmap.save(result, tmp_path / f"{name}{suffix}"))
-        assert back.drop_attrs(deep=False).identical(result.drop_attrs(deep=False))
-        assert back.attrs == result.attrs | {"history": back.attrs["history"]}
-        assert back.attrs["units"] == "SI"
-        assert (back["w0"].item(), back["Omega"].item()) == (6.2, 12.0)
-        assert back["gamma"].item() == pytest.approx(0.05 / 6.2)
-        effects = tomllib.loads(back.attrs["model"])["effect"]
-        assert effects[0] == {"name": "quadratic_drag", "parameters": {"q": 0.01}}
-        assert "quadratic_drag (q = 0.01 1/rad), bearing_harmonic" in back.attrs["title"]
-        assert "w0 = 6.2 rad/s" in back.attrs["title"]
-        assert render.draw(back, tmp_path / f"{name}.svg").stat().st_size > 1000
-        assert viewer.record(back, tmp_path / f"{name}.rrd").stat().st_size > 1000
 
 
 def test_axes_are_named_in_the_units_of_the_result() -> None:

@@ -14,14 +14,11 @@ from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
 from drawn import made, named, plain
-from pendmap import Effect, Formula, Pendulum, Rig, render
+from pendmap import Effect, Formula, Pendulum
 from pendmap.analysis import critical_curves
 from pendmap.charts import tongues as drawn
-from recordings import recorded
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -33,18 +30,6 @@ DAMPED = Pendulum(gamma=0.1)
 def found_at(model: Pendulum, omega: float, p_max: float = 6.0) -> list[tuple[float, int]]:
     found = pendmap.tongues(model, omega, p_max, inverted=False)
     return list(zip(found["p"].values, found["multiplier"].values, strict=True))
-
-
-@pytest.mark.parametrize(("key", "gamma"), [("undamped", 0.0), ("damped_gamma0.1", 0.1)])
-def test_the_known_boundaries_to_1e_9(truths: dict[str, Any], key: str, gamma: float) -> None:
-    for omega, rows in truths["mathieu_boundaries"][key].items():
-        found = found_at(Pendulum(gamma=gamma), float(omega))
-        for row in rows:
-            gap, multiplier = min((abs(p - float(row["p"])), m) for p, m in found)
-            assert gap < 1e-9, (omega, row["p"], gap)
-            assert multiplier == row["multiplier"]
-        # There are no other boundaries.
-        assert len(found) == len(rows), (omega, found)
 
 
 def test_the_onset_of_resonance_is_found_to_1e_9(truths: dict[str, Any]) -> None:
@@ -111,18 +96,6 @@ def test_stable_means_that_motions_decay() -> None:
     stable = [int(found["stable_at_first"][0]), *found["stable_above"].values]
     for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
         assert (largest_multiplier((low + high) / 2, omega, 0.1) < 1) == bool(yes)
-
-
-def test_inverted_rest_is_stable_between_the_known_amplitudes() -> None:
-    # From the linear equation by scipy.
-    known = {6.0: (8.58866407032, 18.0218486957), 10.0: (14.2045148229, 47.0869701821)}
-    found = pendmap.tongues(DAMPED, list(known), 60.0)
-    for k, expected in enumerate(known.values()):
-        mine = found["inverted_index"].values == k
-        assert np.allclose(found["inverted_p"].values[mine], expected, atol=1e-9, rtol=0)
-        assert found["inverted_multiplier"].values[mine].tolist() == [1, -1]
-        assert found["inverted_stable_above"].values[mine].tolist() == [1, 0]
-    assert "from p = 14.2045148 to 47.086970" in found.attrs["summary"]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -287,21 +260,9 @@ def test_bad_values_are_named(given: dict[str, Any], match: str) -> None:
         pendmap.tongues(DAMPED, **given)
 
 
-def test_results_in_si_have_the_frequency_in_si() -> None:
-    rig = Rig(w0=5.0, c_over_m=0.5, p=1.0, Omega=10.0)
-    si, bare = pendmap.tongues(rig, [1.9, 2.0]), pendmap.tongues(DAMPED, [1.9, 2.0])
-    assert np.allclose(si["p"], bare["p"], atol=1e-12)
-    assert np.allclose(si["Omega"], [9.5, 10.0])
-
-
 @pytest.fixture(scope="module")
 def whole() -> xr.Dataset:
     return pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60))
-
-
-def test_results_do_not_depend_on_threads(whole: xr.Dataset) -> None:
-    again = pendmap.tongues(DAMPED, np.linspace(0.5, 3.0, 60), threads=1)
-    assert again["p"].equals(whole["p"])
 
 
 @pytest.mark.parametrize("plane", ["omega-p", "e-alpha2"])
@@ -312,14 +273,6 @@ def test_the_figure_in_both_planes(whole: xr.Dataset, plane: str) -> None:
     texts = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
     for name in ("multiplier", "hanging rest is stable", "inverted rest is stable"):
         assert any(name in text for text in texts)
-
-
-@pytest.mark.usefixtures("strict_recordings")
-def test_the_recording_has_both_planes(whole: xr.Dataset, tmp_path: Path) -> None:
-    back = recorded(whole, tmp_path)
-    for root in ("tongues", "paper"):
-        for name in ("plus", "minus", "inverted_plus", "inverted_minus", "undamped", "own"):
-            assert f"/{root}/data/{name}" in back.static
 
 
 @pytest.fixture(scope="module")
@@ -378,38 +331,11 @@ def tongues_of(omega: NDArray[np.float64]) -> xr.Dataset:
 
 def test_json_lists_the_frequencies_that_were_asked_for(pendmap_command: Run) -> None:
     told = [
-        json.loads(pendmap_command("tongues", "--omega", "1.2:1.4:5", "--json", *more).stdout)
-        for more in ((), ("--plot", "noses.png"))
+        json.loads(pendmap_command("tongues", "--omega", span, "--json", *more).stdout)
+        for span, *more in (("1.2:1.4:5",), ("1.2:1.4:5", "--plot", "noses.png"), ("1.4:1.2:5",))
     ]
-    assert told[0]["curves"] == told[1]["curves"]
-    assert told[0]["inverted"] == told[1]["inverted"]
-    assert told[0]["asymptotic"] == told[1]["asymptotic"]
-
-
-def test_the_command(pendmap_command: Run, tmp_path: Path) -> None:
-    run = pendmap_command("tongues", "--omega", "1.5:2.5:11")
-    assert run.returncode == 0, run.stderr
-    assert {p.name for p in tmp_path.iterdir()} == {"tongues.nc", "tongues.png", "tongues.rrd"}
-    again = pendmap_command("plot", "tongues.nc", "--layer", "e-alpha2", "--plot", "again.pdf")
-    assert again.returncode == 0, again.stderr
-    run = pendmap_command("tongues", "--omega", "2:2:1", "--json")
-    (curve,) = json.loads(run.stdout)["curves"]
-    assert {"omega", "p", "multiplier"} <= curve.keys()
-    (upright,) = json.loads(run.stdout)["inverted"]
-    assert upright["stable_above"] == [True, False]
-    assert curve["omega"] == 2.0
-    refused = pendmap_command("tongues", "--theta-r", 0.1)
-    assert refused.returncode == 2
-    assert "friction" in refused.stderr
-    both = [pendmap_command("tongues", "--omega", span, "--json") for span in ("3:1:5", "1:3:5")]
-    falling, rising = (json.loads(run.stdout)["curves"] for run in both)
-    assert falling == rising
-
-
-def test_files_hold_the_result(whole: xr.Dataset, tmp_path: Path) -> None:
-    back = pendmap.load(pendmap.save(whole, tmp_path / "tongues.nc"))
-    assert back.equals(whole)
-    assert render.draw(back, tmp_path / "tongues.svg").stat().st_size > 0
+    for key in ("curves", "inverted", "asymptotic"):
+        assert told[0][key] == told[1][key] == told[2][key]
 
 
 def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:

@@ -122,15 +122,6 @@ def test_help_names_the_files_that_are_written(pendmap_command: Run, name: str) 
     assert f"Writes {name}.nc, {name}.png and {name}.rrd if no output is named." in said
 
 
-def test_without_a_named_output_three_files_are_written(
-    pendmap_command: Run, tmp_path: Path
-) -> None:
-    run = pendmap_command("basins", "--p", 0.6, "--grid", 20)
-    assert (run.returncode, run.stderr) == (0, "")
-    assert sorted(p.name for p in tmp_path.iterdir()) == FILES
-    assert f"Written: {', '.join(FILES)}" in run.stdout
-
-
 def test_files_of_another_run_are_kept(pendmap_command: Run, tmp_path: Path) -> None:
     for name in (FILES[0], FILES[2]):
         (tmp_path / name).write_bytes(b"old")
@@ -346,6 +337,17 @@ def test_a_typed_option_overrides_the_model_file(pendmap_command: Run, tmp_path:
         ("basins --threads 0", "0"),
         ("basins --threads 100000", "1 to 256"),
         ("basins surplus", "surplus"),
+        ("bifurcation", "--p 0.5:2:100; got nothing"),
+        ("bifurcation --p 0:1:3 --omega 1:2:3", "--p 0.5:2:100; got p, omega"),
+        ("bifurcation --p 0:1:3 --theta 1", "both or neither of --theta and --velocity"),
+        ("map --p 1", "--p 0.5:2:100 --omega 0.5:3:100; got nothing"),
+        ("map --p 0:1", "A:B:N"),
+        ("map --p 0:1:3 --vary p 0:1:4", "--vary p must be given once, got it twice"),
+        ("map --p 0:1:3 --vary drag 0:1:4", "drag"),
+        ("lyapunov --precision 1", "up to 0.5"),
+        ("lifetime --starts 3", "100"),
+        ("orbit --n 0", "1 to 64"),
+        ("tongues --theta-r 0.1", "friction"),
         ("simulate --until 0", "until"),
         ("simulate --theta x", "x"),
         ("view absent.rrd", "absent.rrd"),

@@ -55,6 +55,15 @@ REFUSED = {
     ("a direct drive", "melnikov"): "not proportional to p",
 }
 """Meaningless combinations, with the reason."""
+ROWS = {
+    "basins": {"attractors": {"id", "name", "kind", "n", "w", "multipliers", "fraction"}},
+    "map": {"regimes": {"kinds", "share"}},
+    "sweep": {"maps": {"attractors", "undecided"}},
+    "bifurcation": {"branches": {"kind", "w", "first", "last"}},
+    "orbit": {"orbits": {"n", "w", "theta", "velocity", "multipliers", "stable"}},
+    "tongues": {"curves": {"omega", "p", "multiplier", "stable_above"}},
+}
+"""Lists in the JSON of a command, and keys of their rows."""
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -83,11 +92,32 @@ def test_every_output_of_every_command_takes_every_model(
         return
     assert not end.value.code, err
     assert there == {"a.nc", "a.png", "a.rrd"}
-    assert json.loads(out)
+    told = json.loads(out, parse_constant=pytest.fail)  # nulls, no NaN
+    for name, keys in ROWS.get(command, {}).items():
+        assert all(keys <= row.keys() for row in told[name])
+    assert command != "map" or (told["columns"], told["rows"]) == ("gamma", "p")
     result = pendmap.load(tmp_path / "a.nc")
     known = pendmap.load_model(tmp_path / "model.toml")
     assert effects_of(result.attrs) == known.effects
     render.draw(result, tmp_path / "again.png")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_without_a_named_output_three_files_are_written(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Figure, "savefig", lambda figure, part, **_: part.write_text(str(figure)))
+    monkeypatch.setattr(sys, "argv", ["pendmap", command, *COMMANDS[command]])
+    with pytest.raises(SystemExit) as end:
+        cli.run()
+    assert not end.value.code
+    files = [f"{command}.{suffix}" for suffix in ("nc", "png", "rrd")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
+    assert f"Written: {', '.join(files)}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_refused_files_leave_none(

@@ -35,7 +35,11 @@ def test_invalid_parameters_are_refused_on_one_short_line(p: Any) -> None:  # no
 
 
 @pytest.mark.parametrize(
-    "axis", [(0, 1, 2.5), (0, 1, True), (0, 1, "5"), ("0", 1, 5), (-1e308, 1e308, 5)]
+    "axis",
+    [
+        *((0, 1, 2.5), (0, 1, True), (0, 1, "5"), ("0", 1, 5), (-1e308, 1e308, 5), (1, 1, 5)),
+        *((2, 1, 5), (math.nan, 1, 5), (0, 1, 0), (0, 1, 10**6)),
+    ],
 )
 def test_invalid_axes_are_refused(axis: tuple[Any, Any, Any]) -> None:
     with pytest.raises(InputError, match="must be"):

@@ -18,7 +18,7 @@ import pytest
 
 import pendmap
 
-pytestmark = pytest.mark.thorough
+pytestmark = pytest.mark.manual
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "cells.md"
 HEAD, *PARTS = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)

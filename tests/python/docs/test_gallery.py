@@ -71,7 +71,7 @@ def own_style() -> Iterator[None]:
     plt.close("all")
 
 
-@pytest.mark.thorough
+@pytest.mark.manual
 @pytest.mark.parametrize("name", SNIPPETS)
 @pytest.mark.usefixtures("own_style")
 def test_a_snippet_of_the_gallery_draws_a_figure(name: str, records: dict[str, Path]) -> None:

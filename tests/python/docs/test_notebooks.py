@@ -26,7 +26,7 @@ def test_there_are_notebooks() -> None:
     assert len(NOTEBOOKS) >= 6
 
 
-@pytest.mark.thorough
+@pytest.mark.manual
 @named
 def test_a_notebook_runs_without_an_error(path: Path) -> None:
     pytest.importorskip("nbclient")

@@ -43,8 +43,8 @@ PAGES = [
 
 
 def marks(page: Path) -> list[pytest.MarkDecorator]:
-    """Commands and snippets of the pages in docs are thorough tests, those of README.md are not."""
-    return [] if page.name == "README.md" else [pytest.mark.thorough]
+    """Return the mark of pages in docs, whose commands are tests of the manual."""
+    return [] if page.name == "README.md" else [pytest.mark.manual]
 
 
 def blocks(language: str, text: str = README) -> list[str]:

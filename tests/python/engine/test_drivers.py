@@ -46,7 +46,7 @@ def test_a_second_run_is_refused(tmp_path: Path) -> None:
         first.send_signal(signal.SIGCONT)
         assert first.wait(120) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
-    tiled.assert_same(pendmap.load(store), tiled.CASES["basins"]())
+    tiled.assert_same(pendmap.load(store), tiled.plain("basins"))
 
 
 def test_a_killed_run_holds_nothing(tmp_path: Path) -> None:
@@ -54,12 +54,12 @@ def test_a_killed_run_holds_nothing(tmp_path: Path) -> None:
     with running(store) as first:
         first.kill()
         first.wait(60)
-        tiled.assert_same(tiled.CASES["basins"](store=store, resume=True), tiled.CASES["basins"]())
+        tiled.assert_same(tiled.CASES["basins"](store=store, resume=True), tiled.plain("basins"))
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
 def test_threads_are_runs_too(tmp_path: Path) -> None:
-    refused, truth = [], tiled.CASES["sweep"]()
+    refused, truth = [], tiled.plain("sweep")
 
     def run() -> None:
         try:

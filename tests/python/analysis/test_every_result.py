@@ -1,0 +1,145 @@
+"""What holds of the result of every function that computes one, in both units."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, render, viewer
+from pendmap.files import facts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import xarray as xr
+
+DRAG = Effect("quadratic_drag", {"q": 0.02}, ci95={"q": (0.01, 0.03)}, probability=0.9)
+OWN = Formula("own_pull", "-k*sin(2*theta)", {"k": 2})
+BARE = Pendulum(gamma=0.1, p=0.6, omega=2.0, effects=(DRAG, OWN(k=0.01)))
+SI = Rig(w0=6.2, c_over_m=0.7, p=0.6, Omega=12.1, effects=(DRAG,))
+MODELS = pytest.mark.parametrize("model", [BARE, SI], ids=["bare", "si"])
+
+RESULTS: dict[str, Callable[..., xr.Dataset]] = {
+    "simulate": lambda model, **more: pendmap.simulate(
+        model, 1.0, 0.5 * model.units.w0, 31.0 / model.units.w0, **more
+    ),
+    "basins": lambda model, **more: pendmap.basins(model, 8, **more),
+    "basins_of": lambda model, **more: pendmap.basins_of(
+        model, [1.0, 2.0], [0.0, 2.5 * model.units.w0], **more
+    ),
+    "sweep": lambda model, **more: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=6, **more),
+    "parameter_map": lambda model, **more: pendmap.parameter_map(
+        model, {"p": [0.5, 0.6], "gamma": [0.1, 0.2]}, starts=3, **more
+    ),
+    "bifurcation": lambda model, **more: pendmap.bifurcation(
+        model, {"p": [0.5, 0.6]}, starts=2, **more
+    ),
+    "orbit": lambda model, **more: pendmap.orbit(
+        model, 1, 0, Grid.square(12, model.units.w0), **more
+    ),
+    "lyapunov": lambda model, **more: pendmap.lyapunov(model, **{"max_periods": 200} | more),
+    "lifetime": lambda model, **more: pendmap.lifetime(
+        model, **{"starts": 100, "max_periods": 200} | more
+    ),
+    "tongues": lambda model, **more: pendmap.tongues(model, [1.9, 2.0], 4.0, **more),
+    "melnikov": lambda model, **more: pendmap.melnikov(model, [1.9, 2.0], **more),
+}
+OF_ALL = ("Conventions", "comment", "history", "source", "references")
+
+
+def test_results_are_of_every_function() -> None:
+    functions = {name for _, names, _ in pendmap.ANALYSES.values() for name in names}
+    assert functions == {*RESULTS}
+
+
+@MODELS
+@pytest.mark.usefixtures("strict_recordings")
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_is_kept_and_shown(name: str, model: Pendulum | Rig, tmp_path: Path) -> None:
+    result = RESULTS[name](model)
+    assert pendmap.pendulum_of(result) == model
+    for suffix in ("nc", "zarr"):
+        back = pendmap.load(pendmap.save(result, tmp_path / f"a.{suffix}"))
+        assert back.drop_attrs(deep=False).identical(result.drop_attrs(deep=False))
+        assert back.attrs | {"history": ""} == result.attrs | {"history": ""}
+        assert pendmap.pendulum_of(back) == model
+    assert len(back.pendmap.to_dataframe())
+    if name != "basins_of":  # a list of starts has no picture
+        assert render.draw(back, tmp_path / "a.svg").stat().st_size > 1000
+        assert viewer.record(back, tmp_path / "a.rrd").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_follows_its_schema(name: str) -> None:
+    kind = next(kind for kind, (_, names, _) in pendmap.ANALYSES.items() if name in names)
+    schema = importlib.import_module(f"pendmap.analysis.{kind}").SCHEMA
+    names = [field.name for field in schema.fields]
+    assert len(set(names)) == len(names)
+    assert all(field.meaning for field in schema.fields)
+    result = RESULTS[name](BARE)
+    known = set(facts(result)) - set(BARE.attributes) - {"kind", "title", *OF_ALL}
+    assert known <= {field.place for field in schema.fields}
+    fields = schema.json(result)
+    assert list(fields) == [f.name for f in schema.fields if f.json and f.name in fields]
+    assert not {f.name for f in schema.fields if not f.json} & set(fields)
+    json.dumps(fields)
+
+
+POWERS = {"rad/s": 1, "1/s": 1, "s": -1}
+"""Powers of w0 by unit in SI."""
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_is_the_same_in_both_units(name: str) -> None:
+    rig = Rig(w0=5.0, c_over_m=0.5, p=0.6, Omega=10.0, phi=0.3, effects=(DRAG,))
+    there, bare = RESULTS[name](rig), RESULTS[name](rig.pendulum)
+    for variable in set(bare.variables) - set(rig.pendulum.attributes):
+        unit = there[str(variable).removesuffix("_bounds")].attrs.get("units", "")
+        one, other = there[variable].values, bare[variable].values
+        if one.dtype.kind == "f":
+            factor = 5.0 ** POWERS.get(unit, 0)
+            assert one == pytest.approx(factor * other, rel=1e-5, abs=1e-6, nan_ok=True), variable
+        else:
+            assert np.array_equal(one, other), variable
+    assert (bare.attrs["units"], there.attrs["units"]) == ("nondimensional", "SI")
+
+
+@pytest.mark.parametrize("name", [name for name in RESULTS if name not in {"melnikov", "simulate"}])
+def test_no_result_depends_on_threads(name: str) -> None:
+    one, two, eight = (RESULTS[name](BARE, threads=n) for n in (1, 2, 8))
+    for other in (two, eight):
+        assert one.drop_vars("seconds", errors="ignore").equals(
+            other.drop_vars("seconds", errors="ignore")
+        )
+
+
+REFUSED = {
+    "tol": (1.0, "tol must be a number from 1e-13 to 1e-2, got 1"),
+    "max_periods": (0, "max_periods must be a whole number from 1 to .*, got 0"),
+    "threads": (0, "threads must be a whole number from 1 to 256, got 0"),
+    "seed": (-1, "seed must be a whole number from 0 to .*, got -1"),
+    "progress": (3, "progress must be a function of two numbers"),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_function_checks_its_numerical_choices(name: str) -> None:
+    known = inspect.signature(getattr(pendmap, name)).parameters
+    for choice in REFUSED.keys() & known:
+        value, text = REFUSED[choice]
+        with pytest.raises(InputError, match=text):
+            RESULTS[name](BARE, **{choice: value})
+
+
+@pytest.mark.parametrize("name", [name for name in RESULTS if name not in {"melnikov", "simulate"}])
+def test_effects_that_no_map_can_have_are_refused(name: str) -> None:
+    ever = Pendulum(effects=(Effect("drive_chirp", {"r": 0.001}),))
+    with pytest.raises(InputError, match="drive_chirp"):
+        RESULTS[name](ever)
